@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
+# What every binary of our own is compiled with. It never reaches somebody who links palpate::palpate.
+
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+add_library(palpate_options INTERFACE)
+
+target_compile_options(
+  palpate_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+if(PALPATE_WARNINGS_AS_ERRORS)
+  target_compile_options(palpate_options INTERFACE -Werror)
+endif()
+
+if(PALPATE_SANITIZE)
+  target_compile_options(
+    palpate_options INTERFACE "-fsanitize=${PALPATE_SANITIZE}" -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(palpate_options INTERFACE "-fsanitize=${PALPATE_SANITIZE}")
+endif()
