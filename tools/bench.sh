@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Builds and runs every benchmark; one JSON file each in build/bench/. A benchmark whose answer is wrong fails.
+set -euo pipefail
+
+scale=${PALPATE_BENCH_SCALE:-1}
+seconds=$(awk -v scale="$scale" 'BEGIN { print 0.5 * scale }')
+governor=$(cat /sys/devices/system/cpu/cpu0/cpufreq/scaling_governor 2>/dev/null || echo unknown)
+commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
+
+cmake --preset release >/dev/null
+cmake --build --preset release
+mkdir -p build/bench
+
+compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' build/release/CMakeCache.txt)
+flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCache.txt)
+
+for source in bench/*.cpp; do
+    name=$(basename "$source" .cpp)
+    "build/release/bench/$name" \
+        --benchmark_min_time="$seconds" \
+        --benchmark_out="build/bench/$name.json" --benchmark_out_format=json \
+        --benchmark_context=commit="$commit" --benchmark_context=governor="$governor" \
+        --benchmark_context=compiler="$("$compiler" --version | head -1 | tr ', ' '__')" \
+        --benchmark_context=flags="${flags// /_}"
+    if grep -q '"error_occurred": true' "build/bench/$name.json"; then
+        echo "$name: a benchmark gave a wrong answer" >&2
+        exit 1
+    fi
+done
+echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."

@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# clang-format over all C++ sources, clang-tidy over the headers and the bindings. A file that was clean is not
+# looked at again until it, a header or the settings change.
+set -euo pipefail
+export LC_ALL=C
+
+find cpp tests bench \( -name '*.hpp' -o -name '*.cpp' \) -print0 |
+    xargs -0r .venv/bin/clang-format --dry-run --Werror
+
+export commands cache headers
+commands=$(dirname "$(ls -t build/python-*/compile_commands.json | head -1)")
+cache=build/clang-tidy
+headers=$({
+    .venv/bin/clang-tidy --version
+    find cpp -name '*.hpp' -print0 | sort -z | xargs -0 cat .clang-tidy
+} | sha256sum)
+mkdir -p "$cache"
+
+tidy() {
+    local source=$1 mark flags=()
+    mark="$cache/$({ echo "$headers" "$source"; cat "$source"; } | sha256sum | cut -c1-40)"
+    [ -e "$mark" ] && return
+    case $source in
+    *.hpp) flags=(-- -std=c++20 -Icpp/include -x c++ -Wno-pragma-once-outside-header) ;;
+    *) flags=(-p "$commands") ;;
+    esac
+    if .venv/bin/clang-tidy --quiet "$source" "${flags[@]}" 2>/dev/null; then
+        touch "$mark"
+    else
+        echo "clang-tidy is not content with $source" >&2
+        return 1
+    fi
+}
+export -f tidy
+
+find cpp \( -path '*/bindings/*.cpp' -o -path '*/include/palpate/palpate.hpp' \) -print0 |
+    xargs -0r -n 1 -P "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" bash -c 'tidy "$1"' tidy

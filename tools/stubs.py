@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the type stubs of palpate._core, or checks that those in the tree are the ones it would write.
+
+python tools/stubs.py [--check]
+"""
+
+import argparse
+import difflib
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+MODULE = "palpate._core"
+PACKAGE = Path(__file__).parents[1] / "python" / "palpate"
+LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
+
+
+def generated() -> dict[str, str]:
+    """The stub files as pybind11-stubgen writes them now: name below the package -> text."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
+        subprocess.run(command, check=True)
+        root = Path(folder) / "palpate"
+        return {
+            str(path.relative_to(root)): LICENCE + path.read_text(encoding="utf-8")
+            for path in sorted(root.rglob("_core*.pyi")) + sorted(root.glob("_core/**/*.pyi"))
+        }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="change nothing, fail where the tree differs")
+    check = parser.parse_args().check
+
+    stubs = generated()
+    stale = 0
+    for name, text in stubs.items():
+        path = PACKAGE / name
+        present = path.read_text(encoding="utf-8") if path.exists() else ""
+        if not check:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        elif present != text:
+            stale += 1
+            lines = difflib.unified_diff(
+                present.splitlines(), text.splitlines(), f"{name} (in the tree)", f"{name} (of the module)", lineterm=""
+            )
+            print("\n".join(lines))
+    if stale:
+        print("The stubs do not describe the compiled module: run `make stubs`.", file=sys.stderr)
+        return 1
+    if check:
+        return subprocess.run([sys.executable, "-m", "mypy.stubtest", MODULE], check=False).returncode
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs the Debian or Ubuntu packages that this machine lacks, or says in one line which ones to install.
+#
+#   tools/system_packages.sh PYTHON build|test
+set -euo pipefail
+
+python=$1
+purpose=$2
+
+compiles() { echo "$1" | "${CXX:-g++}" -std=c++20 -fsyntax-only -x c++ - 2>/dev/null; }
+python_says() { "$python" -c "$1" >/dev/null 2>&1; }
+
+missing_packages() {
+    command -v "${CXX:-g++}" >/dev/null || echo g++
+    command -v cmake >/dev/null || echo cmake
+    command -v ninja >/dev/null || echo ninja-build
+    python_says 'import sys' || echo python3
+    python_says 'import venv, ensurepip' || echo python3-venv
+    python_says 'import os, sysconfig
+assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' || echo python3-dev
+    if [ "$purpose" = test ]; then
+        compiles '#include <gtest/gtest.h>' || echo libgtest-dev
+        compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
+    fi
+}
+
+refuse() {
+    echo "$1" >&2
+    exit 1
+}
+
+install() {
+    local as_root=()
+    if [ "$(id -u)" -ne 0 ]; then
+        as_root=(sudo -n)
+    fi
+    local get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 -o DPkg::Lock::Timeout=300)
+    # The package lists are fetched only where the ones at hand do not do.
+    "${get[@]}" install --yes --no-install-recommends "$@" >/dev/null 2>&1 ||
+        { "${get[@]}" update >/dev/null && "${get[@]}" install --yes --no-install-recommends "$@" >/dev/null; }
+}
+
+mapfile -t missing < <(missing_packages)
+if [ "${#missing[@]}" -gt 0 ]; then
+    wanted="sudo apt-get install ${missing[*]}"
+    command -v apt-get >/dev/null ||
+        refuse "palpate needs what Debian and Ubuntu call: ${missing[*]}; install it, then call make again."
+    [ "$(id -u)" -eq 0 ] || sudo -n true 2>/dev/null ||
+        refuse "palpate needs system packages: run '$wanted', then call make again."
+    echo "Installing system packages: ${missing[*]}"
+    install "${missing[@]}" || refuse "The system packages could not be installed: run '$wanted', then call make again."
+    mapfile -t missing < <(missing_packages)
+    [ "${#missing[@]}" -eq 0 ] ||
+        refuse "Still missing after the installation: ${missing[*]}; $python may not be the system's Python (make PYTHON=/usr/bin/python3)."
+fi
+
+python_says 'import sys; assert sys.version_info >= (3, 10)' ||
+    refuse "$python is $("$python" --version 2>&1), palpate needs Python 3.10 or later: make PYTHON=python3.12, for instance."
+compiles '#include <concepts>
+static_assert(std::same_as<int, int>);' ||
+    refuse "${CXX:-g++} has no C++20, palpate needs g++ 11 or clang 14 or later: make CXX=g++-12, for instance."
