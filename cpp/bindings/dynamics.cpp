@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <pybind11/complex.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "palpate/dynamics/filters.hpp"
+#include "palpate/dynamics/transfer_function.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+void bind_dynamics(py::module_& module) {
+    py::class_<TransferFunction>(module, "TransferFunction",
+                                 "H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) with its state.")
+        .def(py::init<std::array<double, 3>, std::array<double, 3>>(), "numerator"_a, "denominator"_a)
+        .def_property_readonly("numerator", &TransferFunction::numerator)
+        .def_property_readonly("denominator", &TransferFunction::denominator)
+        .def("step", &TransferFunction::step, "input"_a, "The next output sample.")
+        .def("reset", &TransferFunction::reset, "Back to rest.")
+        .def("at", &TransferFunction::at, "z"_a, "H(z), for instance at z = exp(1j * omega * T).")
+        .def("poles", &TransferFunction::poles)
+        .def(
+            "filter",
+            [](TransferFunction filter, const Array& input) {
+                require_vector(input, "input");
+                py::array_t<double> output(input.size());
+                for (py::ssize_t k = 0; k < input.size(); ++k) {
+                    output.mutable_data()[k] = filter.step(input.data()[k]);
+                }
+                return output;
+            },
+            "input"_a, "The response to a signal (n,) from this state; the state itself is left as it is.");
+
+    py::class_<EnvironmentFilters>(module, "EnvironmentFilters",
+                                   "Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.")
+        .def_readonly("i1", &EnvironmentFilters::i1)
+        .def_readonly("i2", &EnvironmentFilters::i2)
+        .def_readonly("g1", &EnvironmentFilters::g1)
+        .def_readonly("g2", &EnvironmentFilters::g2);
+    module.attr("paper_sample_time_s") = paper_sample_time;
+    module.def(
+        "environment_filters",
+        [](const std::string& pair, const std::string& design) {
+            if (pair != "implicit" && pair != "explicit") {
+                throw std::invalid_argument("pair is '" + pair + "', must be 'implicit' or 'explicit'");
+            }
+            if (design != "paper" && design != "matched") {
+                throw std::invalid_argument("design is '" + design + "', must be 'paper' or 'matched'");
+            }
+            return environment_filters(pair == "implicit" ? FilterPair::Implicit : FilterPair::Explicit,
+                                       design == "paper" ? FilterDesign::Paper : FilterDesign::Matched);
+        },
+        "pair"_a, "design"_a = "paper",
+        "The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.");
+}
+
+}  // namespace palpate::bindings

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bindings.hpp"
+
+PYBIND11_MODULE(_core, module) {
+    module.doc() = "The C++ core of palpate: evaluation, filters, solvers, structures and simulation.";
+    module.attr("__version__") = PALPATE_VERSION;
+
+    palpate::bindings::bind_status(module);
+    palpate::bindings::bind_wavelet(module);
+    palpate::bindings::bind_model(module);
+    palpate::bindings::bind_dynamics(module);
+    palpate::bindings::bind_device(module);
+    palpate::bindings::bind_rendering(module);
+}

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <vector>
+
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/simulation.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
+    std::vector<std::int8_t> numbers;
+    numbers.reserve(statuses.size());
+    for (const Status status : statuses) {
+        numbers.push_back(static_cast<std::int8_t>(status));
+    }
+    return numbers;
+}
+
+py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
+                            const Hand& hand, double duration_s, int substeps) {
+    detail::require(std::isfinite(duration_s) && duration_s > 0.0,
+                    "duration_s is " + std::to_string(duration_s) + ", must be > 0");
+    detail::require(substeps >= 1, "substeps is " + std::to_string(substeps) + ", must be at least 1");
+    const auto ticks = static_cast<std::size_t>(std::llround(duration_s / device.period_s));
+    Trace trace;
+    {
+        const py::gil_scoped_release unlocked;
+        trace = simulate(model, scheme, device, hand, ticks, substeps);
+    }
+    return py::dict("time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
+                    "velocity"_a = moved(std::move(trace.velocity)),
+                    "handle_start"_a = moved(std::move(trace.handle_start)),
+                    "handle_end"_a = moved(std::move(trace.handle_end)),
+                    "environment_position"_a = moved(std::move(trace.environment_position)),
+                    "force"_a = moved(std::move(trace.force)), "applied"_a = moved(std::move(trace.applied)),
+                    "evaluations"_a = moved(std::move(trace.evaluations)),
+                    "status"_a = moved(numbered(trace.status)), "extrapolated"_a = py::cast(trace.extrapolated));
+}
+
+py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
+    std::vector<double> force;
+    std::vector<double> position;
+    std::vector<int> evaluations;
+    std::vector<Status> status;
+    for (const Rendered& tick : rendered) {
+        force.push_back(tick.force);
+        position.push_back(tick.environment_position);
+        evaluations.push_back(tick.evaluations);
+        status.push_back(tick.status);
+    }
+    return py::dict("force"_a = moved(std::move(force)), "environment_position"_a = moved(std::move(position)),
+                    "evaluations"_a = moved(std::move(evaluations)), "status"_a = moved(numbered(status)));
+}
+
+void require_period(double period_s) {
+    detail::require(std::isfinite(period_s) && period_s > 0.0,
+                    "period_s is " + std::to_string(period_s) + ", must be > 0");
+}
+
+}  // namespace
+
+void bind_rendering(py::module_& module) {
+    const Scheme scheme;
+    const std::string structure{structure_names[static_cast<std::size_t>(scheme.structure)]};
+    module.attr("structure_names") = py::make_tuple("direct", "massless", "implicit", "explicit");
+    py::class_<Scheme>(module, "Scheme", "How a model is rendered: the structure and its numbers, SI units.")
+        .def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping, double mass,
+                         double damping, bool compensated, double play_radius) {
+                 return Scheme{structure_named(name),
+                               {coupling_stiffness, coupling_damping},
+                               {mass, damping},
+                               compensated,
+                               play_radius};
+             }),
+             py::kw_only(), "structure"_a = structure, "coupling_stiffness"_a = scheme.coupling.stiffness,
+             "coupling_damping"_a = scheme.coupling.damping, "mass"_a = scheme.inertia.mass,
+             "damping"_a = scheme.inertia.damping, "compensated"_a = scheme.compensated,
+             "play_radius"_a = scheme.play_radius)
+        .def_property_readonly(
+            "structure",
+            [](const Scheme& s) { return std::string(structure_names[static_cast<std::size_t>(s.structure)]); })
+        .def_property_readonly("coupling_stiffness", [](const Scheme& s) { return s.coupling.stiffness; })
+        .def_property_readonly("coupling_damping", [](const Scheme& s) { return s.coupling.damping; })
+        .def_property_readonly("mass", [](const Scheme& s) { return s.inertia.mass; })
+        .def_property_readonly("damping", [](const Scheme& s) { return s.inertia.damping; })
+        .def_readonly("compensated", &Scheme::compensated)
+        .def_readonly("play_radius", &Scheme::play_radius)
+        .def(
+            "validate", [](const Scheme& s, const ForceModel& model) { validate(s, model); }, "model"_a,
+            "ValueError names the field, its value and what would be right for this model.")
+        .def("__repr__", [](const Scheme& s) {
+            return "Scheme(structure='" + std::string(structure_names[static_cast<std::size_t>(s.structure)]) +
+                   "', coupling_stiffness=" + std::to_string(s.coupling.stiffness) +
+                   ", coupling_damping=" + std::to_string(s.coupling.damping) +
+                   ", mass=" + std::to_string(s.inertia.mass) + ", damping=" + std::to_string(s.inertia.damping) +
+                   ", compensated=" + (s.compensated ? "True" : "False") +
+                   ", play_radius=" + std::to_string(s.play_radius) + ")";
+        });
+
+    module.def("simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
+               "substeps"_a = 20,
+               "The model rendered on a simulated device held by a simulated hand, in virtual time.\n\n"
+               "Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true\n"
+               "handle when sampled and at the end of the tick that holds the force), environment_position, force\n"
+               "(commanded), applied, evaluations, status, extrapolated.");
+    module.def(
+        "motion_driven",
+        [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
+            require_vector(position, "position");
+            require_period(period_s);
+            std::vector<Rendered> rendered;
+            {
+                const py::gil_scoped_release unlocked;
+                rendered = motion_driven(model, s, view(position), period_s);
+            }
+            return rendered_arrays(rendered);
+        },
+        "model"_a, "scheme"_a, "position"_a, "period_s"_a,
+        "The force that would have been rendered while a recorded motion (n,) moves the device.\n"
+        "Arrays (n,) by name: force, environment_position, evaluations, status.");
+    module.def(
+        "force_driven",
+        [](const ForceModel& model, const Scheme& s, const Array& force, double period_s, double start_position) {
+            require_vector(force, "force");
+            require_period(period_s);
+            std::vector<Rendered> rendered;
+            {
+                const py::gil_scoped_release unlocked;
+                rendered = force_driven(model, s, view(force), period_s, start_position);
+            }
+            return rendered_arrays(rendered);
+        },
+        "model"_a, "scheme"_a, "force"_a, "period_s"_a, "start_position"_a = 0.0,
+        "The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).\n"
+        "Arrays (n,) by name: force, environment_position, evaluations, status.");
+}
+
+}  // namespace palpate::bindings

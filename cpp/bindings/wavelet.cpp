@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/model/wavelet.hpp"
+
+#include <cstddef>
+#include <vector>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+/// Samples and wavelets of one call: X (n, d), alpha and beta (N, d). One-dimensional arrays mean d = 1.
+struct Frame {
+    std::size_t samples, wavelets, dimension;
+    const double *x, *alpha, *beta;
+
+    Frame(const Array& x_array, const Array& alpha_array, const Array& beta_array) {
+        const auto columns = [](const Array& array, const char* name) {
+            if (array.ndim() != 1 && array.ndim() != 2) {
+                throw std::invalid_argument(std::string(name) + " has shape " + shape_of(array) +
+                                            ", must be (n, d) or (n,)");
+            }
+            return static_cast<std::size_t>(array.ndim() == 2 ? array.shape(1) : 1);
+        };
+        dimension = columns(x_array, "x");
+        if (columns(alpha_array, "alpha") != dimension || columns(beta_array, "beta") != dimension ||
+            alpha_array.size() != beta_array.size()) {
+            throw std::invalid_argument("alpha has shape " + shape_of(alpha_array) + " and beta " +
+                                        shape_of(beta_array) + ", both must be (N, " + std::to_string(dimension) +
+                                        ") for x of shape " + shape_of(x_array));
+        }
+        samples = static_cast<std::size_t>(x_array.shape(0));
+        wavelets = static_cast<std::size_t>(alpha_array.shape(0));
+        x = x_array.data();
+        alpha = alpha_array.data();
+        beta = beta_array.data();
+    }
+
+    /// u_j of wavelet i at sample k.
+    [[nodiscard]] double scaled(std::size_t i, std::size_t k, std::size_t j) const noexcept {
+        return alpha[i * dimension + j] * (x[k * dimension + j] - beta[i * dimension + j]);
+    }
+
+    [[nodiscard]] RadialMexicanHat radial(std::size_t i, std::size_t k) const noexcept {
+        double square = 0.0;
+        for (std::size_t j = 0; j < dimension; ++j) {
+            const double u = scaled(i, k, j);
+            square += u * u;
+        }
+        return radial_mexican_hat(square, static_cast<double>(dimension));
+    }
+};
+
+/// An (n, N) array stored column by column, as linear algebra wants it.
+[[nodiscard]] py::array_t<double, py::array::f_style> columns(std::size_t samples, std::size_t wavelets) {
+    return py::array_t<double, py::array::f_style>(
+        {static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
+}
+
+auto wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
+    const Frame frame(x, alpha, beta);
+    auto result = columns(frame.samples, frame.wavelets);
+    double* out = result.mutable_data();
+    const py::gil_scoped_release unlocked;
+    for (std::size_t i = 0; i < frame.wavelets; ++i) {
+        for (std::size_t k = 0; k < frame.samples; ++k) {
+            *out++ = frame.radial(i, k).value;
+        }
+    }
+    return result;
+}
+
+auto wavelet_jacobian(const Array& x, const Array& alpha, const Array& beta) {
+    const Frame frame(x, alpha, beta);
+    auto value = columns(frame.samples, frame.wavelets);
+    std::vector<py::array_t<double, py::array::f_style>> by_alpha;
+    std::vector<py::array_t<double, py::array::f_style>> by_beta;
+    std::vector<double*> alpha_out;
+    std::vector<double*> beta_out;
+    for (std::size_t j = 0; j < frame.dimension; ++j) {
+        by_alpha.push_back(columns(frame.samples, frame.wavelets));
+        by_beta.push_back(columns(frame.samples, frame.wavelets));
+        alpha_out.push_back(by_alpha.back().mutable_data());
+        beta_out.push_back(by_beta.back().mutable_data());
+    }
+    double* value_out = value.mutable_data();
+    {
+        const py::gil_scoped_release unlocked;
+        for (std::size_t i = 0; i < frame.wavelets; ++i) {
+            for (std::size_t k = 0; k < frame.samples; ++k) {
+                const std::size_t at = i * frame.samples + k;
+                const RadialMexicanHat psi = frame.radial(i, k);
+                value_out[at] = psi.value;
+                for (std::size_t j = 0; j < frame.dimension; ++j) {
+                    const double dilation = frame.alpha[i * frame.dimension + j];
+                    const double by_u = psi.gradient_over_u * frame.scaled(i, k, j);
+                    alpha_out[j][at] = by_u * (frame.x[k * frame.dimension + j] - frame.beta[i * frame.dimension + j]);
+                    beta_out[j][at] = -dilation * by_u;
+                }
+            }
+        }
+    }
+    return py::make_tuple(value, py::tuple(py::cast(by_alpha)), py::tuple(py::cast(by_beta)));
+}
+
+/// One function of the one-dimensional wavelet on every (sample, wavelet) pair.
+template <class Function>
+auto one_dimensional_columns(const Array& x, const Array& alpha, const Array& beta, Function function) {
+    const Frame frame(x, alpha, beta);
+    if (frame.dimension != 1) {
+        throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,): this is for one input");
+    }
+    auto result = columns(frame.samples, frame.wavelets);
+    double* out = result.mutable_data();
+    const py::gil_scoped_release unlocked;
+    for (std::size_t i = 0; i < frame.wavelets; ++i) {
+        for (std::size_t k = 0; k < frame.samples; ++k) {
+            *out++ = function(mexican_hat(frame.scaled(i, k, 0)), frame.alpha[i]);
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
+void bind_wavelet(py::module_& module) {
+    module.attr("wavelet_slope_bound") = wavelet_slope_bound;
+    module.attr("wavelet_curvature_bound") = wavelet_curvature_bound;
+    module.attr("wavelet_jerk_bound") = wavelet_jerk_bound;
+
+    module.def("mexican_hat", py::vectorize([](double u) { return mexican_hat(u).value; }), "u"_a,
+               "The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.");
+    module.def("mexican_hat_slope", py::vectorize([](double u) { return mexican_hat(u).slope; }), "u"_a,
+               "psi'(u) = (3u - u^3) exp(-u^2 / 2).");
+    module.def("mexican_hat_curvature", py::vectorize([](double u) { return mexican_hat_curvature(u); }), "u"_a,
+               "psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).");
+    module.def("mexican_hat_jerk", py::vectorize([](double u) { return mexican_hat_jerk(u); }), "u"_a,
+               "psi'''(u) = (-u^5 + 10u^3 - 15u) exp(-u^2 / 2).");
+    module.def("mexican_hat_integral", py::vectorize([](double u) { return mexican_hat(u).integral; }), "u"_a,
+               "An antiderivative of psi: -u exp(-u^2 / 2).");
+
+    module.def("wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
+               "psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.\n\n"
+               "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
+    module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
+               "The wavelet columns and their derivatives by the dilations and the translations:\n"
+               "(value, by_alpha, by_beta), value (n, N), the others tuples of d arrays (n, N).");
+    module.def(
+        "wavelet_slope_columns",
+        [](const Array& x, const Array& alpha, const Array& beta) {
+            return one_dimensional_columns(
+                x, alpha, beta, [](const MexicanHat& psi, double dilation) { return dilation * psi.slope; });
+        },
+        "x"_a, "alpha"_a, "beta"_a, "d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).");
+    module.def(
+        "wavelet_integral_columns",
+        [](const Array& x, const Array& alpha, const Array& beta) {
+            return one_dimensional_columns(
+                x, alpha, beta, [](const MexicanHat& psi, double dilation) { return psi.integral / dilation; });
+        },
+        "x"_a, "alpha"_a, "beta"_a, "An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).");
+}
+
+}  // namespace palpate::bindings

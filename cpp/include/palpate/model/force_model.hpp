@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "palpate/model/hysteresis.hpp"
+#include "palpate/model/network.hpp"
+
+namespace palpate {
+
+/// An identified environment of whichever kind a model file holds.
+///
+/// A hysteresis model identified from separate press and release strokes knows no play radius: that is then a
+/// choice of the rendering, made with `with_play_radius`.
+class ForceModel {
+  public:
+    using Kind = std::variant<WaveletNetwork, HysteresisNetwork>;
+
+    ForceModel(NetworkParameters network, Domain domain) : kind_{WaveletNetwork{std::move(network), std::move(domain)}} {}
+
+    ForceModel(NetworkParameters network, LossParameters loss, Domain domain, std::optional<double> play_radius)
+        : kind_{make_hysteresis(std::move(network), std::move(loss), std::move(domain), play_radius)},
+          play_radius_{play_radius} {}
+
+    [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
+    [[nodiscard]] const WaveletNetwork* network() const noexcept { return std::get_if<WaveletNetwork>(&kind_); }
+    [[nodiscard]] const HysteresisNetwork* hysteresis() const noexcept {
+        return std::get_if<HysteresisNetwork>(&kind_);
+    }
+    [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
+
+    [[nodiscard]] const NetworkParameters& parameters() const noexcept {
+        return std::visit([](const auto& kind) -> const NetworkParameters& { return kind.parameters(); }, kind_);
+    }
+    [[nodiscard]] const Domain& domain() const noexcept {
+        return std::visit([](const auto& kind) -> const Domain& { return kind.domain(); }, kind_);
+    }
+
+    /// Smallest and largest slope inside the domain (d = 1), sliding either way: sampled, not proved.
+    [[nodiscard]] std::pair<double, double> slope_range() const noexcept {
+        if (const WaveletNetwork* single = network()) {
+            return single->curve().slope_range();
+        }
+        const auto [low, high] = hysteresis()->force().slope_range();
+        const auto [loss_low, loss_high] = hysteresis()->loss().slope_range();
+        const double loss = std::max(std::abs(loss_low), std::abs(loss_high));
+        return {low - loss, high + loss};
+    }
+
+    /// The narrowest width 1 / alpha of its wavelets; the travel when it has none (d = 1).
+    [[nodiscard]] double finest_width() const noexcept {
+        const auto& alpha = parameters().alpha;
+        const double travel = domain().upper[0] - domain().lower[0];
+        return alpha.empty() ? travel : std::min(travel, 1.0 / *std::max_element(alpha.begin(), alpha.end()));
+    }
+
+    [[nodiscard]] ForceModel with_play_radius(double radius) const {
+        const HysteresisNetwork* both = hysteresis();
+        if (both == nullptr) {
+            return *this;
+        }
+        const NetworkParameters& loss = both->loss().parameters();
+        return {both->parameters(), {loss.weight, loss.linear[0], loss.bias}, both->domain(), radius};
+    }
+
+  private:
+    static HysteresisNetwork make_hysteresis(NetworkParameters network, LossParameters loss, Domain domain,
+                                             std::optional<double> play_radius) {
+        detail::require(domain.lower.size() == 1 && domain.upper.size() == 1, "a hysteresis network has one input");
+        const double radius = play_radius.value_or(0.01 * std::abs(domain.upper[0] - domain.lower[0]));
+        return {std::move(network), std::move(loss), std::move(domain), radius};
+    }
+
+    Kind kind_;
+    std::optional<double> play_radius_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "palpate/model/environment.hpp"
+#include "palpate/model/network.hpp"
+#include "palpate/model/network_curve.hpp"
+#include "palpate/model/parameters.hpp"
+
+namespace palpate {
+
+/// The second set of weights of a hysteresis network: h shares the wavelets of g.
+struct LossParameters {
+    std::vector<double> weight;  ///< N
+    double linear = 0.0;
+    double bias = 0.0;
+};
+
+/// A force that differs between the way in and the way out,
+///
+///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1],
+///
+/// with the play operator play_k = min(x_k + r, max(x_k - r, play_{k-1})). While h >= 0 no loop generates
+/// energy: with the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi sticking (|s| < 1) is
+/// lossless and sliding loses.
+class HysteresisNetwork {
+  public:
+    struct State {
+        double play = 0.0;  ///< the play operator's position
+    };
+
+    HysteresisNetwork(NetworkParameters network, LossParameters loss, Domain domain, double play_radius)
+        : domain_{std::move(domain)},
+          play_radius_{play_radius},
+          force_{(check(network, loss, domain_, play_radius), continued_force(network, domain_))},
+          loss_{continued_loss(network, loss)} {}
+
+    [[nodiscard]] const NetworkParameters& parameters() const noexcept { return force_.parameters(); }
+    [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
+    [[nodiscard]] double play_radius() const noexcept { return play_radius_; }
+
+    /// g, what press and release have in common.
+    [[nodiscard]] const NetworkCurve& force() const noexcept { return force_; }
+    /// h, half of what they differ by.
+    [[nodiscard]] const NetworkCurve& loss() const noexcept { return loss_; }
+
+    /// Force, slope and energy at x for a given s: +1 pressing, -1 releasing.
+    [[nodiscard]] EnvironmentSample sliding(double x, double s) const noexcept {
+        const Curve g = force_.at(x);
+        const Curve h = loss_.at(x);
+        return {g.value + s * h.value, g.slope + s * h.slope, g.integral, force_.extrapolated(x)};
+    }
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        const double play = moved(x, state.play);
+        const double s = (x - play) / play_radius_;
+        const Curve g = force_.at(x);
+        const Curve h = loss_.at(x);
+        const bool sticks = play == state.play;
+        // int_play^x (xi - play) h = (x - play) H(x) - int_play^x H
+        const double stored = (x - play) * h.integral - (h.double_integral - loss_.at(play).double_integral);
+        return {g.value + s * h.value, g.slope + s * h.slope + (sticks ? h.value / play_radius_ : 0.0),
+                g.integral + stored / play_radius_, force_.extrapolated(x)};
+    }
+
+    void advance(double x, State& state) const noexcept { state.play = moved(x, state.play); }
+
+    /// At rest the object pushes neither way: s = 0.
+    [[nodiscard]] State start(double x) const noexcept { return {x}; }
+
+  private:
+    [[nodiscard]] double moved(double x, double play) const noexcept {
+        return std::min(x + play_radius_, std::max(x - play_radius_, play));
+    }
+
+    static void check(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
+                      double play_radius) {
+        validate(network, domain);
+        detail::require(network.dimension == 1, "a hysteresis network has " + std::to_string(network.dimension) +
+                                                    " inputs, must have 1");
+        detail::require_size(loss.weight, network.weight.size(), "weight_hysteresis");
+        detail::require_finite(loss.weight, "weight_hysteresis");
+        detail::require(std::isfinite(loss.linear), "linear_hysteresis is not a finite number");
+        detail::require(std::isfinite(loss.bias), "bias_hysteresis is not a finite number");
+        detail::require(play_radius > 0.0 && std::isfinite(play_radius),
+                        "play_radius is " + std::to_string(play_radius) + ", must be > 0");
+    }
+
+    [[nodiscard]] NetworkCurve continued_loss(const NetworkParameters& network, const LossParameters& loss) const {
+        NetworkParameters h = network;
+        h.weight = loss.weight;
+        h.linear = {loss.linear};
+        h.bias = loss.bias;
+        NetworkCurve curve{h, domain_};
+        const double travel = domain_.upper[0] - domain_.lower[0];
+        // h dies out together with g, but never over less than 2 % of the travel: no jump, no steep flank.
+        const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward, Continuation continuation) {
+            return continue_loss(edge.edge, edge.at_edge, outward, continuation, std::max(g.reach, 0.02 * travel));
+        };
+        curve.continue_with(line(force_.below(), curve.below(), -1.0, domain_.below),
+                            line(force_.above(), curve.above(), +1.0, domain_.above));
+        return curve;
+    }
+
+    Domain domain_;
+    double play_radius_;
+    NetworkCurve force_;
+    NetworkCurve loss_;
+};
+
+static_assert(Environment<HysteresisNetwork>);
+
+}  // namespace palpate

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "palpate/model/continuation.hpp"
+#include "palpate/model/parameters.hpp"
+#include "palpate/model/wavelet.hpp"
+
+namespace palpate {
+
+/// A wavelet network of one input as a curve over the whole line: eq. 4 inside the domain, an edge line on
+/// either side of it, or the same period again and again.
+class NetworkCurve {
+  public:
+    NetworkCurve(const NetworkParameters& network, const Domain& domain)
+        : network_{network},
+          lower_{domain.lower[0]},
+          upper_{domain.upper[0]},
+          periodic_{domain.period.has_value()} {
+        if (periodic_) {
+            close_the_seam();
+        }
+        continue_with({lower_, inside(lower_)}, {upper_, inside(upper_)});
+    }
+
+    void continue_with(const EdgeLine& below, const EdgeLine& above) noexcept {
+        below_ = below;
+        above_ = above;
+    }
+
+    [[nodiscard]] const NetworkParameters& parameters() const noexcept { return network_; }
+    [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
+    [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
+
+    [[nodiscard]] Curve at(double x) const noexcept {
+        if (periodic_) {
+            return wrapped(x);
+        }
+        if (x < lower_) {
+            return below_.at(x);
+        }
+        if (x > upper_) {
+            return above_.at(x);
+        }
+        return inside(x);
+    }
+
+    [[nodiscard]] bool extrapolated(double x) const noexcept { return !periodic_ && (x < lower_ || x > upper_); }
+
+    /// Eq. 4 and nothing else: value, slope and antiderivatives from one exponential a wavelet.
+    [[nodiscard]] Curve inside(double x) const noexcept {
+        const double c = network_.linear[0];
+        const double b = network_.bias;
+        Curve sum{c * x + b, c, (0.5 * c * x + b) * x, (c * x / 6.0 + 0.5 * b) * x * x};
+        for (std::size_t i = 0; i < network_.weight.size(); ++i) {
+            const double alpha = network_.alpha[i];
+            const double width = 1.0 / alpha;
+            const double weight = network_.weight[i];
+            const MexicanHat psi = mexican_hat(alpha * (x - network_.beta[i]));
+            sum.value += weight * psi.value;
+            sum.slope += weight * alpha * psi.slope;
+            sum.integral += weight * width * psi.integral;
+            sum.double_integral += weight * width * width * psi.double_integral;
+        }
+        return sum;
+    }
+
+    /// Calls `visit` on an even grid and at every wavelet's centre and steepest points within [from, to].
+    template <class Visitor>
+    void visit(double from, double to, Visitor visitor) const noexcept {
+        constexpr int steps = 1024;
+        constexpr double steepest = 0.74196378430272591;  // |u| where |psi'| is largest
+        for (int k = 0; k <= steps; ++k) {
+            visitor(from + (to - from) * k / steps);
+        }
+        for (std::size_t i = 0; i < network_.weight.size(); ++i) {
+            for (const double u : {-steepest, 0.0, steepest}) {
+                const double x = network_.beta[i] + u / network_.alpha[i];
+                if (x >= from && x <= to) {
+                    visitor(x);
+                }
+            }
+        }
+    }
+
+    /// Smallest and largest slope inside the domain: sampled densely, not proved.
+    [[nodiscard]] std::pair<double, double> slope_range() const noexcept { return slope_range(lower_, upper_); }
+
+    [[nodiscard]] CurveExtent extent() const noexcept {
+        CurveExtent extent{upper_ - lower_, 0.0, 0.0};
+        visit(lower_, upper_,
+              [&](double x) { extent.largest_force = std::max(extent.largest_force, std::abs(inside(x).value)); });
+        // The outer 2 % are left out: a fit is least sure of its slope at the ends of its data.
+        const double margin = 0.02 * extent.travel;
+        extent.slope_cap = std::max(0.0, slope_range(lower_ + margin, upper_ - margin).second);
+        return extent;
+    }
+
+  private:
+    [[nodiscard]] std::pair<double, double> slope_range(double from, double to) const noexcept {
+        std::pair<double, double> range{std::numeric_limits<double>::infinity(),
+                                        -std::numeric_limits<double>::infinity()};
+        visit(from, to, [&](double x) {
+            const double slope = inside(x).slope;
+            range = {std::min(range.first, slope), std::max(range.second, slope)};
+        });
+        return range;
+    }
+
+    /// Value and slope repeat; the antiderivatives gain what each turn adds.
+    [[nodiscard]] Curve wrapped(double x) const noexcept {
+        const double period = upper_ - lower_;
+        const double turns = std::floor((x - lower_) / period);
+        const double along = x - turns * period - lower_;
+        const Curve& first = below_.at_edge;
+        const Curve& last = above_.at_edge;
+        const double turn = last.integral - first.integral;
+        const double double_turn = last.double_integral - first.double_integral - first.integral * period;
+        Curve here = inside(lower_ + along);
+        here.double_integral += turns * (turn * along + double_turn + 0.5 * (turns - 1.0) * turn * period) -
+                                first.double_integral - first.integral * along;
+        here.integral += turns * turn - first.integral;
+        return here;
+    }
+
+    /// The jump between the two ends of a period is spread over it as a ramp: the force is continuous.
+    void close_the_seam() noexcept {
+        const double ramp = (inside(upper_).value - inside(lower_).value) / (upper_ - lower_);
+        network_.linear[0] -= ramp;
+        network_.bias += ramp * 0.5 * (lower_ + upper_);
+    }
+
+    NetworkParameters network_;
+    double lower_;
+    double upper_;
+    bool periodic_;
+    EdgeLine below_;
+    EdgeLine above_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "palpate/model/continuation.hpp"
+
+namespace palpate {
+
+/// The numbers of a wavelet network of N wavelets over d inputs, matrices row by row.
+struct NetworkParameters {
+    std::size_t dimension = 1;      ///< d
+    std::vector<double> alpha;      ///< N x d dilations, > 0
+    std::vector<double> beta;       ///< N x d translations
+    std::vector<double> weight;     ///< N
+    std::vector<double> linear{0};  ///< d
+    double bias = 0.0;
+};
+
+/// The box of data that a network was identified on, and how it goes on outside.
+struct Domain {
+    std::vector<double> lower{0.0};
+    std::vector<double> upper{1.0};
+    Continuation below = Continuation::Linear;  ///< d = 1: below lower
+    Continuation above = Continuation::Linear;  ///< d = 1: above upper
+    std::optional<double> period;               ///< d = 1: a knob that repeats; equals upper - lower
+};
+
+namespace detail {
+
+inline void require(bool holds, const std::string& sentence) {
+    if (!holds) {
+        throw std::invalid_argument(sentence);
+    }
+}
+
+inline void require_finite(const std::vector<double>& values, const char* field) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        require(std::isfinite(values[i]), std::string(field) + "[" + std::to_string(i) + "] is not a finite number");
+    }
+}
+
+inline void require_size(const std::vector<double>& values, std::size_t size, const char* field) {
+    require(values.size() == size, std::string(field) + " has " + std::to_string(values.size()) +
+                                       " values, must have " + std::to_string(size));
+}
+
+}  // namespace detail
+
+/// Throws std::invalid_argument with the field, its value and what would be right.
+inline void validate(const NetworkParameters& network, const Domain& domain) {
+    using detail::require;
+    const std::size_t d = network.dimension;
+    const std::size_t n = network.weight.size();
+    require(d >= 1, "dimension is 0, must be at least 1");
+    detail::require_size(network.alpha, n * d, "alpha");
+    detail::require_size(network.beta, n * d, "beta");
+    detail::require_size(network.linear, d, "linear");
+    detail::require_size(domain.lower, d, "lower");
+    detail::require_size(domain.upper, d, "upper");
+    detail::require_finite(network.alpha, "alpha");
+    detail::require_finite(network.beta, "beta");
+    detail::require_finite(network.weight, "weight");
+    detail::require_finite(network.linear, "linear");
+    require(std::isfinite(network.bias), "bias is not a finite number");
+    detail::require_finite(domain.lower, "lower");
+    detail::require_finite(domain.upper, "upper");
+    for (std::size_t i = 0; i < network.alpha.size(); ++i) {
+        require(network.alpha[i] > 0.0, "alpha[" + std::to_string(i / d) + "][" + std::to_string(i % d) + "] is " +
+                                            std::to_string(network.alpha[i]) + ", must be > 0");
+    }
+    for (std::size_t j = 0; j < d; ++j) {
+        require(domain.lower[j] < domain.upper[j], "lower[" + std::to_string(j) + "] is " +
+                                                       std::to_string(domain.lower[j]) + ", must be below upper " +
+                                                       std::to_string(domain.upper[j]));
+    }
+    if (domain.period) {
+        const double travel = domain.upper[0] - domain.lower[0];
+        require(d == 1, "period is set, but the network has " + std::to_string(d) + " inputs, must have 1");
+        require(std::abs(*domain.period - travel) <= 1e-9 * travel, "period is " + std::to_string(*domain.period) +
+                                                                        ", must equal upper - lower, " +
+                                                                        std::to_string(travel));
+    }
+}
+
+}  // namespace palpate

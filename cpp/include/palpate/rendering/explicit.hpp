@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+
+#include "palpate/dynamics/coupling.hpp"
+#include "palpate/model/environment.hpp"
+#include "palpate/rendering/inertia.hpp"
+#include "palpate/rendering/structure.hpp"
+
+namespace palpate {
+
+/// m v' = F_c - f(x) - B_o v with the paper's delayed integrator (figure 14): everything on the right is one
+/// sample old, so nothing has to be solved, and the step is stable only for slopes below
+/// (4m - 2 B_o T) / T^2 with B_o T < 2m:
+///
+///     v_k = v_{k-1} + (T/m)(F_{k-1} - f(y_{k-1}) - B_o v_{k-1}),   y_k = y_{k-1} + T v_k,
+///     F_k = K_c (x_k - y_k) + B_c (v_device - v_k).
+template <Environment E>
+class Explicit {
+  public:
+    Explicit(E environment, Inertia inertia, VirtualCoupling coupling, double period)
+        : environment_{std::move(environment)}, inertia_{inertia}, coupling_{coupling}, period_{period} {
+        reset(0.0);
+    }
+
+    void reset(double position) noexcept {
+        state_ = environment_.start(position);
+        device_ = position;
+        position_ = position;
+        velocity_ = 0.0;
+        force_ = environment_.at(position, state_).force;
+    }
+
+    /// Behind the coupling: the device's measured position in, the coupling's force out.
+    [[nodiscard]] Rendered step(double device) noexcept {
+        if (!std::isfinite(device)) {
+            return detail::refused(position_);
+        }
+        Rendered rendered = drive(force_);
+        if (rendered.status == Status::NonFinite) {
+            return rendered;
+        }
+        rendered.force = coupling_.force(device - position_, (device - device_) / period_ - velocity_);
+        device_ = device;
+        force_ = rendered.force;
+        return rendered;
+    }
+
+    /// Without the coupling: a given force drives the environment.
+    [[nodiscard]] Rendered drive(double force) noexcept {
+        const EnvironmentSample sample = environment_.at(position_, state_);
+        const double velocity =
+            velocity_ + period_ / inertia_.mass * (force - sample.force - inertia_.damping * velocity_);
+        const double position = position_ + period_ * velocity;
+        if (!std::isfinite(position)) {
+            return detail::refused(position_);
+        }
+        velocity_ = velocity;
+        position_ = position;
+        environment_.advance(position_, state_);
+        return {force, position_, 1, Status::Ok, sample.extrapolated};
+    }
+
+  private:
+    E environment_;
+    Inertia inertia_;
+    VirtualCoupling coupling_;
+    double period_;
+    typename E::State state_;
+    double device_ = 0.0;    ///< x_{k-1}
+    double position_ = 0.0;  ///< y_{k-1}
+    double velocity_ = 0.0;  ///< v_{k-1}
+    double force_ = 0.0;     ///< F_{k-1}
+};
+
+}  // namespace palpate

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+
+#include "palpate/dynamics/coupling.hpp"
+#include "palpate/model/environment.hpp"
+#include "palpate/rendering/inertia.hpp"
+#include "palpate/rendering/structure.hpp"
+#include "palpate/solver/newton.hpp"
+
+namespace palpate {
+
+/// m v' = F_c - f(x) - B_o v behind the coupling, backward Euler with the coupling inside the solve: the load
+/// line with
+///
+///     p = m/T^2 + B_o/T + K_c + B_c/T,
+///     q = m (2 y_{k-1} - y_{k-2}) / T^2 + B_o y_{k-1} / T + K_c x_k + B_c (v_k + y_{k-1} / T),
+///
+/// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit
+/// equation of section 4.3, with the damping of figure 14.
+template <Environment E>
+class Implicit {
+  public:
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, LoadLineSolver solver = {})
+        : environment_{std::move(environment)},
+          inertia_{inertia},
+          coupling_{coupling},
+          period_{period},
+          solver_{solver} {
+        reset(0.0);
+    }
+
+    void reset(double position) noexcept {
+        state_ = environment_.start(position);
+        device_ = position;
+        position_ = position;
+        before_ = position;
+    }
+
+    /// Behind the coupling: the device's measured position in, the coupling's force out.
+    [[nodiscard]] Rendered step(double device) noexcept {
+        const double velocity = (device - device_) / period_;
+        const double damping = coupling_.damping / period_;
+        const double last = position_;
+        const LoadLine coupled{coupling_.stiffness + damping,
+                               coupling_.stiffness * device + coupling_.damping * velocity + damping * last};
+        Rendered rendered = advance(coupled);
+        if (rendered.status == Status::NonFinite) {
+            return rendered;
+        }
+        device_ = device;
+        rendered.force = coupling_.force(device - position_, velocity - (position_ - last) / period_);
+        return rendered;
+    }
+
+    /// Without the coupling: a given force drives the environment (paper figure 12).
+    [[nodiscard]] Rendered drive(double force) noexcept {
+        Rendered rendered = advance({0.0, force});
+        rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;
+        return rendered;
+    }
+
+  private:
+    /// Adds the environment's own inertia and damping to a load line, solves it and moves on.
+    [[nodiscard]] Rendered advance(LoadLine line) noexcept {
+        const double inertia = inertia_.mass / (period_ * period_);
+        const double damping = inertia_.damping / period_;
+        line.slope += inertia + damping;
+        line.intercept += inertia * (2.0 * position_ - before_) + damping * position_;
+        const Solution solution = solver_.solve(environment_, state_, line, position_);
+        if (solution.status == Status::NonFinite) {
+            return detail::refused(position_);
+        }
+        environment_.advance(solution.position, state_);
+        before_ = position_;
+        position_ = solution.position;
+        return {0.0, position_, solution.evaluations, solution.status, solution.environment.extrapolated};
+    }
+
+    E environment_;
+    Inertia inertia_;
+    VirtualCoupling coupling_;
+    double period_;
+    LoadLineSolver solver_;
+    typename E::State state_;
+    double device_ = 0.0;    ///< x_{k-1}
+    double position_ = 0.0;  ///< y_{k-1}
+    double before_ = 0.0;    ///< y_{k-2}
+};
+
+}  // namespace palpate

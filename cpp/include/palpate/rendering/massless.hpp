@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+
+#include "palpate/dynamics/coupling.hpp"
+#include "palpate/model/environment.hpp"
+#include "palpate/rendering/structure.hpp"
+#include "palpate/solver/newton.hpp"
+
+namespace palpate {
+
+/// The environment without mass or damping behind the coupling. Coupling force and f are equal, which is the
+/// load line with
+///
+///     p = K_c + B_c / T,   q = K_c x_k + (B_c / T)(x_k - x_{k-1} + y_{k-1});   then F = f(y).
+template <Environment E>
+class Massless {
+  public:
+    Massless(E environment, VirtualCoupling coupling, double period, LoadLineSolver solver = {})
+        : environment_{std::move(environment)}, coupling_{coupling}, period_{period}, solver_{solver} {
+        reset(0.0);
+    }
+
+    void reset(double position) noexcept {
+        state_ = environment_.start(position);
+        device_ = position;
+        position_ = position;
+    }
+
+    [[nodiscard]] Rendered step(double device) noexcept {
+        const double damping = coupling_.damping / period_;
+        const LoadLine line{coupling_.stiffness + damping,
+                            coupling_.stiffness * device + damping * (device - device_ + position_)};
+        const Solution solution = solver_.solve(environment_, state_, line, position_);
+        if (solution.status == Status::NonFinite) {
+            return detail::refused(position_);
+        }
+        environment_.advance(solution.position, state_);
+        device_ = device;
+        position_ = solution.position;
+        return {solution.environment.force, position_, solution.evaluations, solution.status,
+                solution.environment.extrapolated};
+    }
+
+  private:
+    E environment_;
+    VirtualCoupling coupling_;
+    double period_;
+    LoadLineSolver solver_;
+    typename E::State state_;
+    double device_ = 0.0;    ///< x_{k-1}
+    double position_ = 0.0;  ///< y_{k-1}
+};
+
+}  // namespace palpate

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "palpate/dynamics/coupling.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/explicit.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/inertia.hpp"
+#include "palpate/rendering/massless.hpp"
+
+namespace palpate {
+
+enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit };
+
+inline constexpr std::array<std::string_view, 4> structure_names{"direct", "massless", "implicit", "explicit"};
+
+[[nodiscard]] inline StructureKind structure_named(std::string_view name) {
+    for (std::size_t k = 0; k < structure_names.size(); ++k) {
+        if (structure_names[k] == name) {
+            return static_cast<StructureKind>(k);
+        }
+    }
+    throw std::invalid_argument("structure is '" + std::string(name) +
+                                "', must be direct, massless, implicit or explicit");
+}
+
+/// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are ignored.
+struct Scheme {
+    StructureKind structure = StructureKind::Massless;
+    VirtualCoupling coupling;
+    Inertia inertia;
+    bool compensated = false;  ///< take the coupling's spring out of the model beforehand
+    double play_radius = 0.0;  ///< r of a hysteresis model [m or rad]; 0 = the model's own
+};
+
+/// Throws std::invalid_argument: the field, its value, what would be right.
+inline void validate(const Scheme& scheme, const ForceModel& model) {
+    const auto require = [](bool holds, const char* field, double value, const char* right) {
+        detail::require(holds, std::string(field) + " is " + std::to_string(value) + ", must be " + right);
+    };
+    const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
+    const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
+    detail::require(model.parameters().dimension == 1,
+                    "the model has " + std::to_string(model.parameters().dimension) +
+                        " inputs; only a force over one position can be rendered");
+    if (scheme.structure != StructureKind::Direct) {
+        require(positive(scheme.coupling.stiffness), "coupling_stiffness", scheme.coupling.stiffness, "> 0");
+        require(not_negative(scheme.coupling.damping), "coupling_damping", scheme.coupling.damping, ">= 0");
+    }
+    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+        require(positive(scheme.inertia.mass), "mass", scheme.inertia.mass, "> 0");
+        require(not_negative(scheme.inertia.damping), "damping", scheme.inertia.damping, ">= 0");
+    }
+    require(not_negative(scheme.play_radius), "play_radius", scheme.play_radius, ">= 0");
+    detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
+                    "play_radius is 0, but the model leaves it to the rendering: must be > 0");
+    if (scheme.compensated) {
+        detail::require(scheme.structure != StructureKind::Direct,
+                        "compensated is set for the direct structure, which has no coupling to compensate");
+        detail::require(!model.hysteresis(),
+                        "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
+        const double steepest = std::max(model.slope_range().second, 0.0);
+        detail::require(steepest <= 0.9 * scheme.coupling.stiffness,
+                        "coupling_stiffness is " + std::to_string(scheme.coupling.stiffness) +
+                            ", must be at least " + std::to_string(steepest / 0.9) +
+                            " to compensate a model whose steepest slope is " + std::to_string(steepest));
+    }
+}
+
+/// The numerical search of a structure's load line: where p + f' can vanish it must not step over a whole
+/// wavelet, or it could miss the branch that a slow motion follows.
+[[nodiscard]] inline LoadLineSolver solver_for(const ForceModel& model, double load_line_slope) noexcept {
+    LoadLineSolver solver;
+    if (load_line_slope + model.slope_range().first <= 0.0) {
+        solver.longest_step = 0.25 * model.finest_width();
+    }
+    return solver;
+}
+
+/// Calls `visit` with the structure that the scheme asks for, built over the model's environment.
+template <class Visitor>
+auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, Visitor visit) {
+    validate(scheme, given);
+    const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
+    const double coupling = scheme.coupling.stiffness + scheme.coupling.damping / period_s;
+    const double inertia = (scheme.inertia.mass / period_s + scheme.inertia.damping) / period_s;
+    const auto build = [&](const auto& environment, const LoadLineSolver& massless, const LoadLineSolver& implicit) {
+        switch (scheme.structure) {
+            case StructureKind::Direct:
+                return visit(Direct{environment});
+            case StructureKind::Massless:
+                return visit(Massless{environment, scheme.coupling, period_s, massless});
+            case StructureKind::Implicit:
+                return visit(Implicit{environment, scheme.inertia, scheme.coupling, period_s, implicit});
+            case StructureKind::Explicit:
+                break;
+        }
+        return visit(Explicit{environment, scheme.inertia, scheme.coupling, period_s});
+    };
+    return std::visit(
+        [&](const auto& environment) {
+            if (scheme.compensated) {
+                // Its slope is above -K_c everywhere: the load line is unique.
+                return build(Compensated{environment, scheme.coupling.stiffness}, {}, {});
+            }
+            return build(environment, solver_for(model, coupling), solver_for(model, coupling + inertia));
+        },
+        model.kind());
+}
+
+}  // namespace palpate

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "palpate/controller.hpp"
+#include "palpate/device/simulated.hpp"
+#include "palpate/rendering/scheme.hpp"
+
+namespace palpate {
+
+/// What a rendering did, tick by tick.
+struct Trace {
+    std::vector<double> time;                  ///< [s]
+    std::vector<double> position;              ///< measured by the encoder
+    std::vector<double> velocity;              ///< differenced by the device
+    std::vector<double> handle_start;          ///< true position when the encoder was read
+    std::vector<double> handle_end;            ///< true position at the end of the tick that holds the force
+    std::vector<double> environment_position;  ///< y
+    std::vector<double> force;                 ///< commanded
+    std::vector<double> applied;               ///< what the device made of it
+    std::vector<int> evaluations;
+    std::vector<Status> status;
+    std::vector<bool> extrapolated;
+};
+
+/// A model rendered on a simulated device, hand included, in virtual time: the same controller tick as in
+/// real time, as fast as it goes.
+[[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
+                                    const Hand& hand, std::size_t ticks, int substeps = 20) {
+    return with_structure(model, scheme, profile.period_s, [&](auto structure) {
+        SimulatedDevice device{profile, hand, substeps};
+        (void)device.open();
+        Controller controller{device, std::move(structure), ForceLimit{profile.force_limit}};
+        (void)controller.start();
+        Trace trace;
+        for (std::size_t k = 0; k < ticks; ++k) {
+            const double start = device.handle_position();
+            const Tick tick = controller.tick();
+            trace.time.push_back(static_cast<double>(k) * profile.period_s);
+            trace.position.push_back(tick.reading.position);
+            trace.velocity.push_back(tick.reading.velocity);
+            trace.handle_start.push_back(start);
+            trace.handle_end.push_back(device.handle_position());
+            trace.environment_position.push_back(tick.rendered.environment_position);
+            trace.force.push_back(tick.command.force);
+            trace.applied.push_back(device.applied_force());
+            trace.evaluations.push_back(tick.rendered.evaluations);
+            trace.status.push_back(tick.status);
+            trace.extrapolated.push_back(tick.rendered.extrapolated);
+        }
+        return trace;
+    });
+}
+
+/// A recorded motion moves the device: what force would have been rendered?
+[[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
+                                                         std::span<const double> position, double period_s) {
+    return with_structure(model, scheme, period_s, [&](auto structure) {
+        std::vector<Rendered> rendered;
+        rendered.reserve(position.size());
+        if (!position.empty()) {
+            structure.reset(position.front());
+        }
+        for (const double x : position) {
+            rendered.push_back(structure.step(x));
+        }
+        return rendered;
+    });
+}
+
+/// A recorded force drives the environment (paper figures 12 and 14): what motion results?
+[[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
+                                                        std::span<const double> force, double period_s,
+                                                        double start_position) {
+    return with_structure(model, scheme, period_s, [&](auto structure) -> std::vector<Rendered> {
+        if constexpr (requires { structure.drive(0.0); }) {
+            std::vector<Rendered> rendered;
+            rendered.reserve(force.size());
+            structure.reset(start_position);
+            for (const double f : force) {
+                rendered.push_back(structure.drive(f));
+            }
+            return rendered;
+        } else {
+            throw std::invalid_argument("structure is " +
+                                        std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
+                                        ", must be implicit or explicit: only an inertia turns force into motion");
+        }
+    });
+}
+
+}  // namespace palpate
