@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "palpate/model/environment.hpp"
+#include "palpate/model/hysteresis.hpp"
+#include "palpate/model/network.hpp"
+
+namespace palpate::test {
+
+/// How many random cases to try: `quick` in the ordinary tier, PALPATE_TEST_SCALE times that in the full one.
+inline int cases(int quick) {
+    const char* scale = std::getenv("PALPATE_TEST_SCALE");
+    return quick * std::max(1, scale == nullptr ? 1 : std::atoi(scale));
+}
+
+using Random = std::mt19937_64;
+
+inline double uniform(Random& random, double low, double high) {
+    return std::uniform_real_distribution<double>{low, high}(random);
+}
+
+/// A network of `size` wavelets over [0, 1]^d.
+inline NetworkParameters random_network(Random& random, std::size_t size, std::size_t dimension = 1) {
+    NetworkParameters network;
+    network.dimension = dimension;
+    network.linear.clear();
+    for (std::size_t k = 0; k < size * dimension; ++k) {
+        network.alpha.push_back(std::exp(uniform(random, 0.0, 4.0)));
+        network.beta.push_back(uniform(random, -0.1, 1.1));
+    }
+    for (std::size_t k = 0; k < size; ++k) {
+        network.weight.push_back(uniform(random, -1.0, 1.0));
+    }
+    for (std::size_t k = 0; k < dimension; ++k) {
+        network.linear.push_back(uniform(random, -2.0, 4.0));
+    }
+    network.bias = uniform(random, -0.5, 0.5);
+    return network;
+}
+
+inline Domain unit_domain(Continuation below = Continuation::Linear, Continuation above = Continuation::Linear) {
+    return {{0.0}, {1.0}, below, above, std::nullopt};
+}
+
+/// f = stiffness * x, the environment every limit is known of.
+struct Spring {
+    using State = Stateless;
+    double stiffness;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {stiffness * x, stiffness, 0.5 * stiffness * x * x, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+/// The comparison scene of spec section 6: a spring, a click and a wall,
+/// f(x) = 2x + 0.6 exp(-((x - 0.15)/0.03)^2) + 60 * 0.004 softplus((x - 0.4)/0.004) N*m over rad.
+struct ClickAndWall {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double u = (x - 0.15) / 0.03;
+        const double click = 0.6 * std::exp(-u * u);
+        const double z = (x - 0.4) / 0.004;
+        const double softplus = std::max(z, 0.0) + std::log1p(std::exp(-std::abs(z)));
+        const double wall_slope = 60.0 / (1.0 + std::exp(-z));
+        return {2.0 * x + click + 60.0 * 0.004 * softplus, 2.0 - 2.0 * u / 0.03 * click + wall_slope, 0.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+}  // namespace palpate::test

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "palpate/controller.hpp"
+#include "palpate/device/simulated.hpp"
+#include "palpate/rendering/direct.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr Hand no_hand{0.0, 0.0, 0.0, 0.0, 1.0};
+
+DeviceProfile frictionless() {
+    DeviceProfile profile;
+    profile.viscous_damping = 0.0;
+    profile.encoder_step = 0.0;
+    return profile;
+}
+
+TEST(SimulatedDevice, AcceleratesAgainstTheForceOfTheObject) {
+    SimulatedDevice device{frictionless(), no_hand};
+    ASSERT_TRUE(device.open());
+    for (int k = 0; k < 100; ++k) {
+        (void)device.exchange({0.01});
+    }
+    const double acceleration = -0.01 / device.profile().inertia;
+    EXPECT_NEAR(device.handle_velocity(), acceleration * 0.1, 1e-9);
+    EXPECT_NEAR(device.handle_position(), 0.5 * acceleration * 0.01, 3e-4 * std::abs(acceleration) * 0.01);
+}
+
+TEST(SimulatedDevice, ViscousDampingHasItsTimeConstant) {
+    DeviceProfile profile = frictionless();
+    profile.viscous_damping = 0.02;
+    SimulatedDevice device{profile, no_hand, 200};
+    ASSERT_TRUE(device.open());
+    for (int k = 0; k < 10; ++k) {
+        (void)device.exchange({-0.01});
+    }
+    EXPECT_NEAR(device.handle_velocity(), 0.01 / 0.02 * (1.0 - std::exp(-1.0)), 1e-3);
+}
+
+TEST(SimulatedDevice, CoulombFrictionHoldsAgainstLessAndNeverTurnsTheHandleRound) {
+    DeviceProfile profile = frictionless();
+    profile.coulomb_friction = 0.05;
+    SimulatedDevice device{profile, no_hand};
+    ASSERT_TRUE(device.open());
+    for (int k = 0; k < 50; ++k) {
+        (void)device.exchange({-0.049});
+    }
+    EXPECT_EQ(device.handle_position(), 0.0);
+    for (int k = 0; k < 50; ++k) {
+        (void)device.exchange({-0.2});
+    }
+    EXPECT_GT(device.handle_velocity(), 0.0);
+    for (int k = 0; k < 5000; ++k) {
+        (void)device.exchange({0.0});
+        ASSERT_GE(device.handle_velocity(), 0.0);
+    }
+    EXPECT_EQ(device.handle_velocity(), 0.0);
+}
+
+TEST(SimulatedDevice, EncoderReportsWholeSteps) {
+    DeviceProfile profile;
+    profile.encoder_step = 0.01;
+    SimulatedDevice device{profile};
+    ASSERT_TRUE(device.open());
+    for (int k = 0; k < 2000; ++k) {
+        const Reading reading = device.exchange({});
+        EXPECT_NEAR(reading.position, 0.01 * std::round(reading.position / 0.01), 1e-15);
+        EXPECT_LE(std::abs(reading.position - device.handle_position()), 0.005 + 1e-12);
+    }
+}
+
+TEST(SimulatedDevice, DelaysLimitsAndRoundsTheForce) {
+    for (const int delay : {0, 1, 2, longest_delay_samples}) {
+        DeviceProfile profile;
+        profile.delay_samples = delay;
+        profile.force_step = 0.25;
+        SimulatedDevice device{profile, no_hand};
+        ASSERT_TRUE(device.open());
+        EXPECT_EQ(device.exchange({7.0}).applied, delay == 0 ? 5.0 : 0.0);
+        for (int k = 1; k <= 2 * longest_delay_samples; ++k) {
+            EXPECT_EQ(device.exchange({0.3}).applied, k < delay ? 0.0 : (k == delay ? 5.0 : 0.25)) << delay << " " << k;
+        }
+    }
+}
+
+TEST(SimulatedDevice, TakesAForceThatIsNoNumberAsZero) {
+    SimulatedDevice device{DeviceProfile{}, no_hand};
+    ASSERT_TRUE(device.open());
+    EXPECT_EQ(device.exchange({std::numeric_limits<double>::quiet_NaN()}).applied, 0.0);
+    EXPECT_EQ(device.exchange({std::numeric_limits<double>::infinity()}).applied, 0.0);
+}
+
+TEST(SimulatedDevice, CountsItsSamplesAndOpensAfresh) {
+    SimulatedDevice device{DeviceProfile{}};
+    ASSERT_TRUE(device.open());
+    for (std::uint64_t k = 1; k <= 5; ++k) {
+        const Reading reading = device.exchange({-1.0});
+        EXPECT_EQ(reading.sequence, k);
+        EXPECT_NEAR(reading.device_time, 1e-3 * static_cast<double>(k), 1e-12);
+        EXPECT_TRUE(std::isnan(reading.measured));
+    }
+    ASSERT_TRUE(device.open());
+    EXPECT_EQ(device.handle_position(), 0.0);
+    EXPECT_EQ(device.exchange({}).sequence, 1U);
+}
+
+TEST(DeviceProfile, RefusesImpossibleValuesByName) {
+    const auto refusal = [](auto change) -> std::string {
+        DeviceProfile profile;
+        change(profile);
+        try {
+            validate(profile);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "accepted";
+    };
+    EXPECT_EQ(refusal([](DeviceProfile&) {}), "accepted");
+    EXPECT_EQ(refusal([](DeviceProfile& p) { p.inertia = 0.0; }), "device profile: inertia is 0.000000, must be > 0");
+    EXPECT_EQ(refusal([](DeviceProfile& p) { p.delay_samples = 17; }),
+              "device profile: delay_samples is 17.000000, must be 0 to 16");
+    EXPECT_NE(refusal([](DeviceProfile& p) { p.period_s = std::nan(""); }), "accepted");
+    EXPECT_NE(refusal([](DeviceProfile& p) { p.viscous_damping = -1.0; }), "accepted");
+}
+
+/// A device whose readings the test writes down beforehand, to see what the controller makes of bad ones.
+class ScriptedDevice {
+  public:
+    Opened open() { return {}; }
+    Reading exchange(const Command& command) noexcept {
+        sent = command.force;
+        return next;
+    }
+    void close() noexcept {}
+
+    Reading next;
+    double sent = 0.0;
+};
+
+TEST(Controller, SendsZeroForceOnAnyReadingThatIsNotSound) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}}, ForceLimit{5.0}};
+    ASSERT_EQ(controller.start(), Status::Ok);
+    for (const Status bad : {Status::Timeout, Status::Lost, Status::Fault}) {
+        device.next.status = Status::Ok;
+        (void)controller.tick();
+        EXPECT_EQ(controller.tick().command.force, 2.0);
+        EXPECT_EQ(device.sent, 2.0);
+        device.next.status = bad;
+        (void)controller.tick();
+        EXPECT_EQ(controller.tick().status, bad);
+        EXPECT_EQ(device.sent, 0.0);
+    }
+    device.next = {};
+    device.next.position = std::numeric_limits<double>::quiet_NaN();
+    (void)controller.tick();
+    EXPECT_EQ(controller.tick().status, Status::NonFinite);
+    EXPECT_EQ(device.sent, 0.0);
+}
+
+TEST(Controller, ClipsToTheForceLimitAndSaysSo) {
+    ScriptedDevice device;
+    device.next.position = -3.0;
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}}, ForceLimit{5.0}};
+    (void)controller.start();
+    const Tick tick = controller.tick();
+    EXPECT_EQ(device.sent, -5.0);
+    EXPECT_EQ(tick.rendered.force, -30.0);
+    EXPECT_EQ(tick.status, Status::Limited);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/model/network.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::cases;
+using test::Random;
+using test::random_network;
+using test::uniform;
+using test::unit_domain;
+
+double force(const WaveletNetwork& network, double x) { return network.at(x, {}).force; }
+
+TEST(Network, SumsItsWavelets) {
+    const NetworkParameters parameters{1, {10.0, 3.0}, {0.2, 0.7}, {0.5, -2.0}, {1.5}, 0.25};
+    const WaveletNetwork network{parameters, unit_domain()};
+    for (double x = 0.0; x <= 1.0; x += 0.05) {
+        const double expected = 0.5 * mexican_hat(10.0 * (x - 0.2)).value - 2.0 * mexican_hat(3.0 * (x - 0.7)).value +
+                                1.5 * x + 0.25;
+        EXPECT_NEAR(force(network, x), expected, 1e-14);
+    }
+}
+
+TEST(Network, SlopeAndEnergyBelongToTheForceInsideAndOutside) {
+    Random random{1};
+    for (int k = 0; k < cases(200); ++k) {
+        const auto side = [&] { return uniform(random, 0.0, 1.0) < 0.5 ? Continuation::Linear : Continuation::Free; };
+        const WaveletNetwork network{random_network(random, static_cast<std::size_t>(k % 9)), unit_domain(side(), side())};
+        const double x = uniform(random, -0.5, 1.5);
+        constexpr double h = 1e-6;
+        const bool at_a_knot = std::abs(x) < 2 * h || std::abs(x - 1.0) < 2 * h ||
+                               std::abs(network.at(x + h, {}).slope - network.at(x - h, {}).slope) > 0.5;
+        if (at_a_knot) {
+            continue;
+        }
+        const double slope = (force(network, x + h) - force(network, x - h)) / (2.0 * h);
+        const double work = (network.at(x + h, {}).energy - network.at(x - h, {}).energy) / (2.0 * h);
+        EXPECT_NEAR(network.at(x, {}).slope, slope, 1e-4 * (1.0 + std::abs(slope))) << "case " << k << " x " << x;
+        EXPECT_NEAR(force(network, x), work, 1e-6 * (1.0 + std::abs(work))) << "case " << k << " x " << x;
+    }
+}
+
+TEST(Network, IsContinuousAtItsEdgesAndFlagsExtrapolation) {
+    Random random{2};
+    for (int k = 0; k < cases(200); ++k) {
+        const WaveletNetwork network{random_network(random, 5), unit_domain(Continuation::Free, Continuation::Linear)};
+        for (const double edge : {0.0, 1.0}) {
+            EXPECT_NEAR(force(network, edge - 1e-12), force(network, edge + 1e-12), 1e-8);
+        }
+        EXPECT_TRUE(network.at(-1e-9, {}).extrapolated);
+        EXPECT_TRUE(network.at(1.0 + 1e-9, {}).extrapolated);
+        EXPECT_FALSE(network.at(0.0, {}).extrapolated);
+        EXPECT_FALSE(network.at(1.0, {}).extrapolated);
+    }
+}
+
+TEST(Network, LinearContinuationNeverFallsAndKeepsTheEnergyBoundedBelow) {
+    Random random{3};
+    for (int k = 0; k < cases(200); ++k) {
+        const WaveletNetwork network{random_network(random, 6), unit_domain()};
+        const double cap = network.curve().extent().slope_cap;
+        const double gentle = network.curve().extent().largest_force;  // over a travel of 1
+        for (const double x : {-0.3, 1.3}) {
+            const double slope = network.at(x, {}).slope;
+            EXPECT_GE(slope, 0.0);
+            EXPECT_LE(slope, std::max(cap, gentle));
+        }
+        EXPECT_GE(network.at(1e4, {}).energy - network.at(1.0, {}).energy, -1e2 * gentle);
+        EXPECT_GE(network.at(-1e4, {}).energy - network.at(0.0, {}).energy, -1e2 * gentle);
+    }
+}
+
+TEST(Network, FreeContinuationLetsGo) {
+    const WaveletNetwork pushing{{1, {}, {}, {}, {2.0}, 0.1}, unit_domain(Continuation::Free)};
+    // The edge pushes the tool out, so the line falls with at least max|f| / travel = 2.1 rather than 2.
+    EXPECT_NEAR(force(pushing, -0.02), 0.1 - 0.02 * 2.1, 1e-15);
+    EXPECT_EQ(force(pushing, -0.05 - 1e-9), 0.0);
+    EXPECT_EQ(force(pushing, -10.0), 0.0);
+    const WaveletNetwork sticking{{1, {}, {}, {}, {2.0}, -0.1}, unit_domain(Continuation::Free)};
+    EXPECT_LT(force(sticking, -0.01), 0.0);
+    EXPECT_EQ(force(sticking, -1.0), 0.0);
+    const WaveletNetwork touching{{1, {}, {}, {}, {2.0}, 0.0}, unit_domain(Continuation::Free)};
+    EXPECT_EQ(force(touching, -1e-9), 0.0);
+}
+
+TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyGoesOn) {
+    Random random{4};
+    for (int k = 0; k < cases(100); ++k) {
+        Domain domain = unit_domain();
+        domain.period = 1.0;
+        const WaveletNetwork knob{random_network(random, 5), domain};
+        const double x = uniform(random, 0.0, 1.0);
+        for (const double turns : {-3.0, 1.0, 2.0}) {
+            EXPECT_NEAR(force(knob, x + turns), force(knob, x), 1e-9);
+            EXPECT_FALSE(knob.at(x + turns, {}).extrapolated);
+        }
+        EXPECT_NEAR(force(knob, 1.0 - 1e-10), force(knob, 1.0 + 1e-10), 1e-6);
+        constexpr double h = 1e-5;
+        for (const double at : {x - 2.0, x, x + 1.0}) {
+            const double work = (knob.at(at + h, {}).energy - knob.at(at - h, {}).energy) / (2.0 * h);
+            EXPECT_NEAR(work, force(knob, at), 1e-3) << at;
+            const double first =
+                (knob.curve().at(at + h).double_integral - knob.curve().at(at - h).double_integral) / (2.0 * h);
+            EXPECT_NEAR(first, knob.curve().at(at).integral, 1e-5) << at;
+        }
+    }
+}
+
+TEST(Network, GradientOfSeveralInputsAgreesWithDifferences) {
+    Random random{5};
+    for (int k = 0; k < cases(100); ++k) {
+        const WaveletNetwork network{random_network(random, 7, 3), {{0, 0, 0}, {1, 1, 1}, {}, {}, std::nullopt}};
+        std::array<double, 3> x{uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99)};
+        std::array<double, 3> gradient{};
+        network.gradient(x, gradient);
+        for (std::size_t j = 0; j < 3; ++j) {
+            constexpr double h = 1e-6;
+            auto up = x;
+            auto down = x;
+            up[j] += h;
+            down[j] -= h;
+            const double slope = (network.value(up) - network.value(down)) / (2.0 * h);
+            EXPECT_NEAR(gradient[j], slope, 1e-4 * (1.0 + std::abs(slope)));
+        }
+    }
+}
+
+TEST(Network, SeveralInputsGoOnFromTheBoxWithAClampedGradient) {
+    Random random{6};
+    for (int k = 0; k < cases(50); ++k) {
+        const WaveletNetwork network{random_network(random, 7, 2), {{0, 0}, {1, 1}, {}, {}, std::nullopt}};
+        const std::array<double, 2> edge{1.0, 0.4};
+        const std::array<double, 2> outside{1.5, 0.4};
+        std::array<double, 2> gradient{};
+        network.gradient(outside, gradient);
+        EXPECT_GE(gradient[0], 0.0);
+        EXPECT_NEAR(network.value(outside), network.value(edge) + 0.5 * gradient[0], 1e-12);
+        EXPECT_TRUE(network.extrapolated(outside));
+        EXPECT_FALSE(network.extrapolated(edge));
+    }
+}
+
+TEST(Network, NanInIsNanOut) {
+    const WaveletNetwork network{{1, {5.0}, {0.5}, {1.0}, {2.0}, 0.0}, unit_domain()};
+    EXPECT_TRUE(std::isnan(force(network, std::numeric_limits<double>::quiet_NaN())));
+}
+
+std::string refusal(NetworkParameters parameters, Domain domain) {
+    try {
+        const WaveletNetwork network{std::move(parameters), std::move(domain)};
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+TEST(Network, RefusesImpossibleNumbersByName) {
+    const NetworkParameters good{1, {5.0}, {0.5}, {1.0}, {2.0}, 0.0};
+    EXPECT_EQ(refusal(good, unit_domain()), "accepted");
+    auto bad = good;
+    bad.alpha = {-1.0};
+    EXPECT_EQ(refusal(bad, unit_domain()), "alpha[0][0] is -1.000000, must be > 0");
+    bad = good;
+    bad.beta = {0.5, 0.6};
+    EXPECT_EQ(refusal(bad, unit_domain()), "beta has 2 values, must have 1");
+    bad = good;
+    bad.weight = {std::numeric_limits<double>::quiet_NaN()};
+    EXPECT_EQ(refusal(bad, unit_domain()), "weight[0] is not a finite number");
+    EXPECT_EQ(refusal(good, {{1.0}, {1.0}, {}, {}, std::nullopt}),
+              "lower[0] is 1.000000, must be below upper 1.000000");
+    EXPECT_EQ(refusal(good, {{0.0}, {1.0}, {}, {}, 2.0}), "period is 2.000000, must equal upper - lower, 1.000000");
+}
+
+}  // namespace
+}  // namespace palpate

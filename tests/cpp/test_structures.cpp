@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "palpate/controller.hpp"
+#include "palpate/device/simulated.hpp"
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/explicit.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/simulation.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::ClickAndWall;
+using test::Spring;
+
+constexpr double period = 1e-3;
+constexpr VirtualCoupling coupling{100.0, 0.02};
+
+struct ForceError {
+    double at_end;      ///< of the tick that holds the force
+    double at_instant;  ///< of sampling
+};
+
+/// RMS of F_k - f(handle) over 4000 ticks of the scene of spec section 6.
+template <class S>
+ForceError force_error(S structure) {
+    SimulatedDevice device{DeviceProfile{}, Hand{}};
+    EXPECT_TRUE(device.open());
+    Controller<SimulatedDevice, S> controller{device, std::move(structure), ForceLimit{}};
+    EXPECT_EQ(controller.start(), Status::Ok);
+    const ClickAndWall object;
+    constexpr int ticks = 4000;
+    double end = 0.0;
+    double instant = 0.0;
+    for (int k = 0; k < ticks; ++k) {
+        const double sampled = device.handle_position();
+        const Tick tick = controller.tick();
+        EXPECT_EQ(tick.status, Status::Ok);
+        end += std::pow(tick.command.force - object.at(device.handle_position(), {}).force, 2);
+        instant += std::pow(tick.command.force - object.at(sampled, {}).force, 2);
+    }
+    return {std::sqrt(end / ticks), std::sqrt(instant / ticks)};
+}
+
+void expect_within_5_percent(ForceError measured, double at_end, double at_instant) {
+    EXPECT_NEAR(measured.at_end, at_end, 0.05 * at_end);
+    EXPECT_NEAR(measured.at_instant, at_instant, 0.05 * at_instant);
+}
+
+// spec section 6, the table: "direct | 0.00362 | 0.00037"
+TEST(Scene, Direct) { expect_within_5_percent(force_error(Direct{ClickAndWall{}}), 0.00362, 0.00037); }
+
+// spec section 6, the table: "massless, compensated | 0.00362 | 0.00037"
+TEST(Scene, MasslessCompensated) {
+    const VirtualCoupling softer_damper{coupling.stiffness, 0.005};
+    const Compensated<ClickAndWall> object{ClickAndWall{}, coupling.stiffness};
+    expect_within_5_percent(force_error(Massless{object, softer_damper, period}), 0.00362, 0.00037);
+}
+
+// spec section 6, the table: "massless | 0.1202 | 0.1202"
+TEST(Scene, Massless) {
+    expect_within_5_percent(force_error(Massless{ClickAndWall{}, coupling, period}), 0.1202, 0.1202);
+}
+
+// spec section 6, the table: "implicit, m = 0.001, B_o = 0 | 0.1231 | 0.1227"
+TEST(Scene, ImplicitUndamped) {
+    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}), 0.1231,
+                            0.1227);
+}
+
+// spec section 6, the table: "implicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
+TEST(Scene, ImplicitDamped) {
+    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}), 0.2530,
+                            0.2532);
+}
+
+// spec section 6, the table: "explicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
+TEST(Scene, ExplicitDamped) {
+    expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}), 0.2530,
+                            0.2532);
+}
+
+/// Largest |y| in the last tenth of a free motion that began away from equilibrium, over the first tenth's.
+template <class S>
+double growth(S structure, int ticks) {
+    structure.reset(0.0);
+    double first = 0.0;
+    double last = 0.0;
+    for (int k = 0; k < ticks; ++k) {
+        const double y = std::abs(structure.drive(k < 5 ? 1.0 : 0.0).environment_position);
+        if (k >= 5 && k < ticks / 10) {
+            first = std::max(first, y);
+        }
+        if (k >= ticks - ticks / 10) {
+            last = std::max(last, y);
+        }
+    }
+    return std::isfinite(last) ? last / first : std::numeric_limits<double>::infinity();
+}
+
+// spec section 5: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m: 3000 at
+// m = 0.001, B_o = 0.5"
+TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
+    const auto free_motion = [](double stiffness) {
+        return growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period}, 4000);
+    };
+    EXPECT_LT(free_motion(2990.0), 0.1);
+    EXPECT_GT(free_motion(3010.0), 10.0);
+}
+
+// spec section 5: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's oscillation)"
+TEST(ExplicitLimit, WithoutDampingTheOscillationNeitherDiesNorGrows) {
+    for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
+        const double ratio = growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, coupling, period}, 20'000);
+        EXPECT_NEAR(ratio, 1.0, 0.01) << stiffness;
+    }
+    EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, coupling, period}, 4000), 10.0);
+}
+
+// spec section 5: "with coupling, at a held device: K + K_c < (4m - 2(B_o + B_c)T)/T^2"
+TEST(ExplicitLimit, BehindTheCouplingTheCouplingCountsToo) {
+    const auto held = [](double stiffness) {
+        Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period};
+        double last = 0.0;
+        for (int k = 0; k < 6000; ++k) {
+            last = std::abs(structure.step(k < 5 ? 0.01 : 0.0).environment_position);
+        }
+        return last;
+    };
+    const double limit = (4.0 * 0.001 - 2.0 * (0.5 + coupling.damping) * period) / (period * period) - 100.0;
+    EXPECT_LT(held(0.99 * limit), 1e-3);
+    EXPECT_GT(held(1.01 * limit), 1.0);
+}
+
+// spec section 5: "the implicit scheme is stable for every K >= 0"
+TEST(Implicit, IsStableAtAMillion) {
+    for (const double stiffness : {0.1, 3000.0, 1e6}) {
+        for (const double damping : {0.0, 0.5}) {
+            const double ratio = growth(Implicit{Spring{stiffness}, Inertia{0.001, damping}, coupling, period}, 20'000);
+            EXPECT_LE(ratio, 1.0) << stiffness << " " << damping;
+        }
+    }
+}
+
+// The paper's section 4.3: x_k + (T^2/m) f(x_k) = 2 x_{k-1} - x_{k-2} + (T^2/m) F_k
+TEST(Implicit, SolvesThePapersEquation) {
+    const ClickAndWall object;
+    Implicit structure{object, Inertia{0.001, 0.0}, coupling, period};
+    double before = 0.0;
+    double last = 0.0;
+    const double scale = period * period / 0.001;
+    for (int k = 0; k < 500; ++k) {
+        const double force = 1.0 + std::sin(0.02 * k);
+        const double x = structure.drive(force).environment_position;
+        EXPECT_NEAR(x + scale * object.at(x, {}).force, 2.0 * last - before + scale * force, 1e-12);
+        before = last;
+        last = x;
+    }
+}
+
+TEST(Massless, BalancesTheCouplingAtEveryTick) {
+    const ClickAndWall object;
+    Massless structure{object, coupling, period};
+    double device = 0.0;
+    double position = 0.0;
+    for (int k = 0; k < 500; ++k) {
+        const double x = 0.2 * (1.0 - std::cos(0.01 * k));
+        const Rendered rendered = structure.step(x);
+        const double y = rendered.environment_position;
+        const double velocity_error = ((x - device) - (y - position)) / period;
+        EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
+        EXPECT_NEAR(rendered.force, object.at(y, {}).force, 1e-12);
+        device = x;
+        position = y;
+    }
+}
+
+// spec section 6: "f~ is the curve (x - f(x)/K_c, f(x))", of slope K_c f' / (K_c - f')
+TEST(Compensated, IsTheCurveWithTheSpringTakenOut) {
+    const ClickAndWall object;
+    const Compensated<ClickAndWall> compensated{object, 100.0};
+    for (double x = -0.1; x < 0.6; x += 0.003) {
+        const EnvironmentSample original = object.at(x, {});
+        const EnvironmentSample shifted = compensated.at(x - original.force / 100.0, {});
+        EXPECT_NEAR(shifted.force, original.force, 1e-9);
+        EXPECT_NEAR(shifted.slope, 100.0 * original.slope / (100.0 - original.slope),
+                    1e-6 * (1.0 + std::abs(shifted.slope)));
+    }
+}
+
+template <class S>
+void expect_zero_force_without_a_trace(S structure, const std::string& name) {
+    S untouched = structure;
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (int k = 0; k < 20; ++k) {
+        (void)structure.step(0.01 * k);
+        (void)untouched.step(0.01 * k);
+    }
+    const Rendered refused = structure.step(nan);
+    EXPECT_EQ(refused.force, 0.0) << name;
+    EXPECT_EQ(refused.status, Status::NonFinite) << name;
+    EXPECT_EQ(structure.step(std::numeric_limits<double>::infinity()).force, 0.0) << name;
+    EXPECT_EQ(structure.step(0.2).force, untouched.step(0.2).force) << name;
+}
+
+TEST(Structure, AnswersNanWithZeroForceAndGoesOn) {
+    const ClickAndWall object;
+    expect_zero_force_without_a_trace(Direct{object}, "direct");
+    expect_zero_force_without_a_trace(Massless{object, coupling, period}, "massless");
+    expect_zero_force_without_a_trace(Implicit{object, Inertia{}, coupling, period}, "implicit");
+    expect_zero_force_without_a_trace(Explicit{object, Inertia{}, coupling, period}, "explicit");
+}
+
+TEST(Structure, StartsAtRestWhereTheDeviceIs) {
+    const ClickAndWall object;
+    const auto expect_at_rest = [&](auto structure, const char* name) {
+        structure.reset(0.3);
+        const Rendered first = structure.step(0.3);
+        EXPECT_NEAR(first.environment_position, 0.3, 0.02) << name;
+        EXPECT_LE(std::abs(first.force), std::abs(object.at(0.3, {}).force) + 1e-9) << name;
+    };
+    expect_at_rest(Direct{object}, "direct");
+    expect_at_rest(Massless{object, coupling, period}, "massless");
+    expect_at_rest(Implicit{object, Inertia{}, coupling, period}, "implicit");
+    expect_at_rest(Explicit{object, Inertia{}, coupling, period}, "explicit");
+}
+
+ForceModel spring_model(double stiffness) {
+    return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
+}
+
+TEST(Scheme, SimulatesEveryStructureOfAModel) {
+    for (const std::string_view name : structure_names) {
+        Scheme scheme;
+        scheme.structure = structure_named(name);
+        const Trace trace = simulate(spring_model(5.0), scheme, DeviceProfile{}, Hand{}, 2000);
+        ASSERT_EQ(trace.force.size(), 2000U);
+        for (std::size_t k = 0; k < trace.force.size(); ++k) {
+            ASSERT_EQ(trace.status[k], Status::Ok) << name;
+            ASSERT_NEAR(trace.force[k], 5.0 * trace.handle_start[k], 0.8) << name << " tick " << k;
+        }
+    }
+}
+
+TEST(Scheme, RefusesWhatCannotBeRendered) {
+    Scheme scheme;
+    scheme.compensated = true;
+    EXPECT_THROW((void)simulate(spring_model(95.0), scheme, {}, {}, 10), std::invalid_argument);
+    EXPECT_NO_THROW((void)simulate(spring_model(80.0), scheme, {}, {}, 10));
+    scheme = {};
+    scheme.coupling.stiffness = 0.0;
+    EXPECT_THROW((void)simulate(spring_model(5.0), scheme, {}, {}, 10), std::invalid_argument);
+    scheme = {};
+    EXPECT_THROW((void)force_driven(spring_model(5.0), scheme, {}, period, 0.0), std::invalid_argument);
+    EXPECT_THROW((void)structure_named("implied"), std::invalid_argument);
+    const ForceModel loose{NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
+    EXPECT_THROW((void)simulate(loose, {}, {}, {}, 10), std::invalid_argument);
+}
+
+TEST(Scheme, RendersHysteresisWithItsPlayRadius) {
+    const ForceModel both{NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.2}, test::unit_domain(), {}};
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    scheme.play_radius = 0.005;
+    const std::array<double, 4> motion{0.1, 0.5, 0.499, 0.1};
+    const auto rendered = motion_driven(both, scheme, motion, period);
+    EXPECT_NEAR(rendered[0].force, 0.5, 1e-12);
+    EXPECT_NEAR(rendered[1].force, 2.5 + 0.2, 1e-12);
+    EXPECT_NEAR(rendered[2].force, 2.495 + 0.2 * (1.0 - 0.001 / 0.005), 1e-12);
+    EXPECT_NEAR(rendered[3].force, 0.5 - 0.2, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate
