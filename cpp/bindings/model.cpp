@@ -144,9 +144,16 @@ Array row(const std::vector<double>& values) {
     return Array(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
+/// Force at one row of X.
+double row_force(const ForceModel& model, const double* row) {
+    if (const RadialNetwork* radial = model.radial()) {
+        return radial->value({row, radial->dimension()});
+    }
+    return model.hysteresis() ? model.hysteresis()->sliding(row[0], row[1]).force : model.network()->at(row[0], {}).force;
+}
+
 py::array_t<double> predict(const ForceModel& model, const Array& x) {
-    const std::size_t dimension = model.parameters().dimension;
-    const std::size_t columns = dimension + (model.hysteresis() ? 1 : 0);
+    const std::size_t columns = model.parameters().dimension + (model.hysteresis() ? 1 : 0);
     if (x.ndim() != 2 || static_cast<std::size_t>(x.shape(1)) != columns) {
         throw std::invalid_argument("X has shape " + shape_of(x) + ", must be (n, " + std::to_string(columns) + ")" +
                                     (model.hysteresis() ? ": position and direction" : ""));
@@ -157,8 +164,7 @@ py::array_t<double> predict(const ForceModel& model, const Array& x) {
     const py::ssize_t rows = x.shape(0);
     const py::gil_scoped_release unlocked;
     for (py::ssize_t k = 0; k < rows; ++k, in += columns) {
-        out[k] = model.hysteresis() ? model.hysteresis()->sliding(in[0], in[1]).force
-                                    : model.network()->value({in, dimension});
+        out[k] = row_force(model, in);
     }
     return result;
 }
@@ -216,7 +222,12 @@ void bind_model(py::module_& module) {
     type.def("extrapolated", &extrapolated, "position"_a, "Whether a position lies outside the identified domain.");
     type.def("play", &play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
-    type.def("slope_range", &ForceModel::slope_range,
+    type.def(
+        "slope_range",
+        [](const ForceModel& model) {
+            require_one_input(model.parameters());
+            return model.slope_range();
+        },
              "Smallest and largest slope inside the domain, sliding either way: sampled, not proved.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });

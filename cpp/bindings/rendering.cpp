@@ -43,7 +43,7 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
                     "environment_position"_a = moved(std::move(trace.environment_position)),
                     "force"_a = moved(std::move(trace.force)), "applied"_a = moved(std::move(trace.applied)),
                     "evaluations"_a = moved(std::move(trace.evaluations)),
-                    "status"_a = moved(numbered(trace.status)), "extrapolated"_a = py::cast(trace.extrapolated));
+                    "status"_a = moved(numbered(trace.status)), "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
 
 py::dict rendered_arrays(const std::vector<Rendered>& rendered) {

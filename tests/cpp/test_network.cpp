@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/network.hpp"
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -113,40 +112,6 @@ TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyGoesOn) {
                 (knob.curve().at(at + h).double_integral - knob.curve().at(at - h).double_integral) / (2.0 * h);
             EXPECT_NEAR(first, knob.curve().at(at).integral, 1e-5) << at;
         }
-    }
-}
-
-TEST(Network, GradientOfSeveralInputsAgreesWithDifferences) {
-    Random random{5};
-    for (int k = 0; k < cases(100); ++k) {
-        const WaveletNetwork network{random_network(random, 7, 3), {{0, 0, 0}, {1, 1, 1}, {}, {}, std::nullopt}};
-        std::array<double, 3> x{uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99)};
-        std::array<double, 3> gradient{};
-        network.gradient(x, gradient);
-        for (std::size_t j = 0; j < 3; ++j) {
-            constexpr double h = 1e-6;
-            auto up = x;
-            auto down = x;
-            up[j] += h;
-            down[j] -= h;
-            const double slope = (network.value(up) - network.value(down)) / (2.0 * h);
-            EXPECT_NEAR(gradient[j], slope, 1e-4 * (1.0 + std::abs(slope)));
-        }
-    }
-}
-
-TEST(Network, SeveralInputsGoOnFromTheBoxWithAClampedGradient) {
-    Random random{6};
-    for (int k = 0; k < cases(50); ++k) {
-        const WaveletNetwork network{random_network(random, 7, 2), {{0, 0}, {1, 1}, {}, {}, std::nullopt}};
-        const std::array<double, 2> edge{1.0, 0.4};
-        const std::array<double, 2> outside{1.5, 0.4};
-        std::array<double, 2> gradient{};
-        network.gradient(outside, gradient);
-        EXPECT_GE(gradient[0], 0.0);
-        EXPECT_NEAR(network.value(outside), network.value(edge) + 0.5 * gradient[0], 1e-12);
-        EXPECT_TRUE(network.extrapolated(outside));
-        EXPECT_FALSE(network.extrapolated(edge));
     }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -24,7 +25,7 @@ struct Trace {
     std::vector<double> applied;               ///< what the device made of it
     std::vector<int> evaluations;
     std::vector<Status> status;
-    std::vector<bool> extrapolated;
+    std::vector<std::uint8_t> extrapolated;  ///< 1 where y lay outside the model's data
 };
 
 /// A model rendered on a simulated device, hand included, in virtual time: the same controller tick as in
@@ -50,7 +51,7 @@ struct Trace {
             trace.applied.push_back(device.applied_force());
             trace.evaluations.push_back(tick.rendered.evaluations);
             trace.status.push_back(tick.status);
-            trace.extrapolated.push_back(tick.rendered.extrapolated);
+            trace.extrapolated.push_back(static_cast<std::uint8_t>(tick.rendered.extrapolated));
         }
         return trace;
     });

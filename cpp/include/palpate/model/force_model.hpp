@@ -9,6 +9,7 @@
 
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/network.hpp"
+#include "palpate/model/radial_network.hpp"
 
 namespace palpate {
 
@@ -18,9 +19,9 @@ namespace palpate {
 /// choice of the rendering, made with `with_play_radius`.
 class ForceModel {
   public:
-    using Kind = std::variant<WaveletNetwork, HysteresisNetwork>;
+    using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork>;
 
-    ForceModel(NetworkParameters network, Domain domain) : kind_{WaveletNetwork{std::move(network), std::move(domain)}} {}
+    ForceModel(NetworkParameters network, Domain domain) : kind_{make_network(std::move(network), std::move(domain))} {}
 
     ForceModel(NetworkParameters network, LossParameters loss, Domain domain, std::optional<double> play_radius)
         : kind_{make_hysteresis(std::move(network), std::move(loss), std::move(domain), play_radius)},
@@ -31,6 +32,7 @@ class ForceModel {
     [[nodiscard]] const HysteresisNetwork* hysteresis() const noexcept {
         return std::get_if<HysteresisNetwork>(&kind_);
     }
+    [[nodiscard]] const RadialNetwork* radial() const noexcept { return std::get_if<RadialNetwork>(&kind_); }
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept {
@@ -68,6 +70,13 @@ class ForceModel {
     }
 
   private:
+    static Kind make_network(NetworkParameters network, Domain domain) {
+        if (network.dimension == 1) {
+            return WaveletNetwork{network, std::move(domain)};
+        }
+        return RadialNetwork{std::move(network), std::move(domain)};
+    }
+
     static HysteresisNetwork make_hysteresis(NetworkParameters network, LossParameters loss, Domain domain,
                                              std::optional<double> play_radius) {
         detail::require(domain.lower.size() == 1 && domain.upper.size() == 1, "a hysteresis network has one input");

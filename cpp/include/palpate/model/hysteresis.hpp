@@ -81,8 +81,7 @@ class HysteresisNetwork {
     static void check(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
                       double play_radius) {
         validate(network, domain);
-        detail::require(network.dimension == 1, "a hysteresis network has " + std::to_string(network.dimension) +
-                                                    " inputs, must have 1");
+        require_one_input(network);
         detail::require_size(loss.weight, network.weight.size(), "weight_hysteresis");
         detail::require_finite(loss.weight, "weight_hysteresis");
         detail::require(std::isfinite(loss.linear), "linear_hysteresis is not a finite number");

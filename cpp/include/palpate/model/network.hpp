@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <optional>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "palpate/model/continuation.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/network_curve.hpp"
 #include "palpate/model/parameters.hpp"
-#include "palpate/model/wavelet.hpp"
 
 namespace palpate {
 
@@ -26,155 +19,37 @@ namespace palpate {
     return curve;
 }
 
-/// A wavelet network with its domain (paper eq. 4),
+/// A wavelet network over one position with its domain (paper eq. 5),
 ///
-///     f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b,
+///     f(x) = sum_i w_i psi(alpha_i (x - beta_i)) + c x + b,
 ///
-/// psi the radial Mexican hat and o the product component by component. Outside the domain the network is
-/// not evaluated: with one input the continuations of `Domain` hold; with more, the value at the projection
-/// onto the box plus its gradient, each component clipped to [0, largest seen inside].
-///
-/// With one input it is an `Environment`.
+/// continued outside the domain as `Domain` says. (More inputs: `RadialNetwork`.)
 class WaveletNetwork {
   public:
     using State = Stateless;
 
-    WaveletNetwork(NetworkParameters network, Domain domain) : network_{std::move(network)}, domain_{std::move(domain)} {
-        validate(network_, domain_);
-        if (dimension() == 1) {
-            curve_.emplace(continued_force(network_, domain_));
-            network_ = curve_->parameters();
-        } else {
-            gradient_cap_ = largest_gradient();
-        }
-    }
+    WaveletNetwork(const NetworkParameters& network, Domain domain)
+        : domain_{std::move(domain)}, curve_{(check(network, domain_), continued_force(network, domain_))} {}
 
-    [[nodiscard]] const NetworkParameters& parameters() const noexcept { return network_; }
+    [[nodiscard]] const NetworkParameters& parameters() const noexcept { return curve_.parameters(); }
     [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
-    [[nodiscard]] std::size_t dimension() const noexcept { return network_.dimension; }
-    [[nodiscard]] std::size_t size() const noexcept { return network_.weight.size(); }
-
-    /// The force over position (d = 1 only).
-    [[nodiscard]] const NetworkCurve& curve() const noexcept { return *curve_; }
-
-    /// Whether x (d values) lies outside the data.
-    [[nodiscard]] bool extrapolated(std::span<const double> x) const noexcept {
-        if (dimension() == 1) {
-            return curve_->extrapolated(x[0]);
-        }
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            if (x[j] != projected(x, j)) {
-                return true;
-            }
-        }
-        return false;
-    }
+    [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
 
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
-        const Curve here = curve_->at(x);
-        return {here.value, here.slope, here.integral, curve_->extrapolated(x)};
+        const Curve here = curve_.at(x);
+        return {here.value, here.slope, here.integral, curve_.extrapolated(x)};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 
-    /// Value at x (d values), continuation included.
-    [[nodiscard]] double value(std::span<const double> x) const noexcept {
-        if (dimension() == 1) {
-            return curve_->at(x[0]).value;
-        }
-        double sum = network_.bias;
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            const double inside = projected(x, j);
-            sum += network_.linear[j] * inside;
-            if (x[j] != inside) {
-                sum += clamped_partial(x, j) * (x[j] - inside);
-            }
-        }
-        for (std::size_t i = 0; i < size(); ++i) {
-            sum += network_.weight[i] * radial(i, x).value;
-        }
-        return sum;
-    }
-
-    /// Gradient at x, written to `gradient` (d values each), continuation included.
-    void gradient(std::span<const double> x, std::span<double> gradient) const noexcept {
-        if (dimension() == 1) {
-            gradient[0] = curve_->at(x[0]).slope;
-            return;
-        }
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            gradient[j] = x[j] == projected(x, j) ? partial(x, j) : clamped_partial(x, j);
-        }
-    }
-
   private:
-    [[nodiscard]] double projected(std::span<const double> x, std::size_t j) const noexcept {
-        return std::clamp(x[j], domain_.lower[j], domain_.upper[j]);
+    static void check(const NetworkParameters& network, const Domain& domain) {
+        validate(network, domain);
+        require_one_input(network);
     }
 
-    [[nodiscard]] double scaled(std::size_t i, std::span<const double> x, std::size_t j) const noexcept {
-        const std::size_t k = i * dimension() + j;
-        return network_.alpha[k] * (projected(x, j) - network_.beta[k]);
-    }
-
-    [[nodiscard]] RadialMexicanHat radial(std::size_t i, std::span<const double> x) const noexcept {
-        double square = 0.0;
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            const double u = scaled(i, x, j);
-            square += u * u;
-        }
-        return radial_mexican_hat(square, static_cast<double>(dimension()));
-    }
-
-    /// df/dx_j at the projection of x.
-    [[nodiscard]] double partial(std::span<const double> x, std::size_t j) const noexcept {
-        double sum = network_.linear[j];
-        for (std::size_t i = 0; i < size(); ++i) {
-            sum += network_.weight[i] * network_.alpha[i * dimension() + j] * scaled(i, x, j) *
-                   radial(i, x).gradient_over_u;
-        }
-        return sum;
-    }
-
-    [[nodiscard]] double clamped_partial(std::span<const double> x, std::size_t j) const noexcept {
-        return std::clamp(partial(x, j), 0.0, gradient_cap_[j]);
-    }
-
-    /// Largest partial derivatives, at least 0, over the wavelets' centres and 1024 points of an additive
-    /// recurrence: multiples of the powers of 1/g, g^(d+1) = g + 1, spread evenly over the box.
-    [[nodiscard]] std::vector<double> largest_gradient() const {
-        const std::size_t d = dimension();
-        std::vector<double> cap(d, 0.0);
-        const auto visit = [&](std::span<const double> x) {
-            for (std::size_t j = 0; j < d; ++j) {
-                cap[j] = std::max(cap[j], partial(x, j));
-            }
-        };
-        for (std::size_t i = 0; i < size(); ++i) {
-            visit(std::span{network_.beta}.subspan(i * d, d));
-        }
-        double ratio = 1.5;
-        for (int iteration = 0; iteration < 32; ++iteration) {
-            ratio = std::pow(1.0 + ratio, 1.0 / static_cast<double>(d + 1));
-        }
-        std::vector<double> x(d);
-        constexpr int points = 1024;
-        for (int k = 1; k <= points; ++k) {
-            double step = 1.0;
-            for (std::size_t j = 0; j < d; ++j) {
-                step /= ratio;
-                const double fraction = k * step - std::floor(k * step);
-                x[j] = domain_.lower[j] + fraction * (domain_.upper[j] - domain_.lower[j]);
-            }
-            visit(x);
-        }
-        return cap;
-    }
-
-    NetworkParameters network_;
     Domain domain_;
-    std::optional<NetworkCurve> curve_;  ///< d = 1
-    std::vector<double> gradient_cap_;   ///< d > 1
+    NetworkCurve curve_;
 };
 
 static_assert(Environment<WaveletNetwork>);

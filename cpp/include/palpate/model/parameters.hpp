@@ -88,4 +88,10 @@ inline void validate(const NetworkParameters& network, const Domain& domain) {
     }
 }
 
+/// Throws unless the network is one over a single position.
+inline void require_one_input(const NetworkParameters& network) {
+    detail::require(network.dimension == 1,
+                    "the network has " + std::to_string(network.dimension) + " inputs, must have 1");
+}
+
 }  // namespace palpate

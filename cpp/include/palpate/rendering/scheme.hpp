@@ -51,9 +51,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     };
     const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
-    detail::require(model.parameters().dimension == 1,
-                    "the model has " + std::to_string(model.parameters().dimension) +
-                        " inputs; only a force over one position can be rendered");
+    require_one_input(model.parameters());
     if (scheme.structure != StructureKind::Direct) {
         require(positive(scheme.coupling.stiffness), "coupling_stiffness", scheme.coupling.stiffness, "> 0");
         require(not_negative(scheme.coupling.damping), "coupling_damping", scheme.coupling.damping, ">= 0");
@@ -108,15 +106,14 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
         }
         return visit(Explicit{environment, scheme.inertia, scheme.coupling, period_s});
     };
-    return std::visit(
-        [&](const auto& environment) {
-            if (scheme.compensated) {
-                // Its slope is above -K_c everywhere: the load line is unique.
-                return build(Compensated{environment, scheme.coupling.stiffness}, {}, {});
-            }
-            return build(environment, solver_for(model, coupling), solver_for(model, coupling + inertia));
-        },
-        model.kind());
+    const auto render = [&](const auto& environment) {
+        if (scheme.compensated) {
+            // Its slope is above -K_c everywhere: the load line is unique.
+            return build(Compensated{environment, scheme.coupling.stiffness}, {}, {});
+        }
+        return build(environment, solver_for(model, coupling), solver_for(model, coupling + inertia));
+    };
+    return model.hysteresis() ? render(*model.hysteresis()) : render(*model.network());
 }
 
 }  // namespace palpate

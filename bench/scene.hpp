@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "palpate/model/network.hpp"
+
+namespace palpate::bench {
+
+/// A spring that meets a wall: a soft line, a kink and a steep line, drawn with `size` wavelets around the kink
+/// at 0.4 rad. Its slope lies between about 2 and 60 N*m/rad.
+inline WaveletNetwork spring_and_wall(std::size_t size) {
+    NetworkParameters network;
+    network.linear = {20.0};
+    network.bias = -1.0;
+    for (std::size_t k = 0; k < size; ++k) {
+        const double fraction = (static_cast<double>(k) + 0.5) / static_cast<double>(size);
+        network.alpha.push_back(6.0 + 30.0 * fraction);
+        network.beta.push_back(0.1 + 0.4 * fraction);
+        network.weight.push_back(0.6 / static_cast<double>(size) * std::cos(3.0 * std::numbers::pi * fraction));
+    }
+    return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+}
+
+/// A hand pressing and letting go twice a second, sampled at 1 kHz: what a structure sees tick by tick.
+inline std::vector<double> hand_motion(std::size_t ticks) {
+    std::vector<double> position(ticks);
+    for (std::size_t k = 0; k < ticks; ++k) {
+        const double time = 1e-3 * static_cast<double>(k);
+        position[k] = 0.25 - 0.22 * std::cos(2.0 * std::numbers::pi * 0.5 * time) +
+                      0.01 * std::sin(2.0 * std::numbers::pi * 7.0 * time);
+    }
+    return position;
+}
+
+}  // namespace palpate::bench
