@@ -21,7 +21,7 @@ using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::arr
     for (pybind11::ssize_t k = 0; k < array.ndim(); ++k) {
         text += (k > 0 ? ", " : "") + std::to_string(array.shape(k));
     }
-    return text + ")";
+    return text + (array.ndim() == 1 ? ",)" : ")");
 }
 
 [[nodiscard]] inline std::span<const double> view(const Array& array) {

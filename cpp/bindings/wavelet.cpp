@@ -2,7 +2,10 @@
 #include "palpate/model/wavelet.hpp"
 
 #include <cstddef>
+#include <tuple>
 #include <vector>
+
+#include <pybind11/stl.h>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
@@ -57,12 +60,13 @@ struct Frame {
 };
 
 /// An (n, N) array stored column by column, as linear algebra wants it.
-[[nodiscard]] py::array_t<double, py::array::f_style> columns(std::size_t samples, std::size_t wavelets) {
-    return py::array_t<double, py::array::f_style>(
-        {static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
+using Columns = py::array_t<double, py::array::f_style>;
+
+[[nodiscard]] Columns columns(std::size_t samples, std::size_t wavelets) {
+    return Columns({static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
 }
 
-auto wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
+Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
     const Frame frame(x, alpha, beta);
     auto result = columns(frame.samples, frame.wavelets);
     double* out = result.mutable_data();
@@ -75,11 +79,12 @@ auto wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
     return result;
 }
 
-auto wavelet_jacobian(const Array& x, const Array& alpha, const Array& beta) {
+std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian(const Array& x, const Array& alpha,
+                                                                                 const Array& beta) {
     const Frame frame(x, alpha, beta);
     auto value = columns(frame.samples, frame.wavelets);
-    std::vector<py::array_t<double, py::array::f_style>> by_alpha;
-    std::vector<py::array_t<double, py::array::f_style>> by_beta;
+    std::vector<Columns> by_alpha;
+    std::vector<Columns> by_beta;
     std::vector<double*> alpha_out;
     std::vector<double*> beta_out;
     for (std::size_t j = 0; j < frame.dimension; ++j) {
@@ -105,12 +110,12 @@ auto wavelet_jacobian(const Array& x, const Array& alpha, const Array& beta) {
             }
         }
     }
-    return py::make_tuple(value, py::tuple(py::cast(by_alpha)), py::tuple(py::cast(by_beta)));
+    return {std::move(value), std::move(by_alpha), std::move(by_beta)};
 }
 
 /// One function of the one-dimensional wavelet on every (sample, wavelet) pair.
 template <class Function>
-auto one_dimensional_columns(const Array& x, const Array& alpha, const Array& beta, Function function) {
+Columns one_dimensional_columns(const Array& x, const Array& alpha, const Array& beta, Function function) {
     const Frame frame(x, alpha, beta);
     if (frame.dimension != 1) {
         throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,): this is for one input");
@@ -149,7 +154,7 @@ void bind_wavelet(py::module_& module) {
                "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
     module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
                "The wavelet columns and their derivatives by the dilations and the translations:\n"
-               "(value, by_alpha, by_beta), value (n, N), the others tuples of d arrays (n, N).");
+               "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
     module.def(
         "wavelet_slope_columns",
         [](const Array& x, const Array& alpha, const Array& beta) {
