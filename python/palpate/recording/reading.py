@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read a recording: choose its columns, check every row, convert to SI, and say what was done."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from .._typing import Float1D, Int8Vector
+from ..errors import InputError
+from .columns import Choice, Column, choose_columns
+from .csv_file import CsvFile
+from .files import require_file, sha256_of_file
+from .layout import Layout
+from .parquet_file import ParquetFile
+from .recording import UNSTATED, Recording, Source
+from .rows import RowCheck
+from .table import Cells, TableFile, parse_number, to_numbers
+from .units import COLUMN_SUFFIX
+
+MIN_ROWS = 10
+"""Fewer usable rows are no recording."""
+
+MIN_POSITIONS = 3
+"""Fewer distinct positions show no force over position."""
+
+FALLING = -0.3
+"""Correlation of force and position below which the force counts as falling over the whole file. A mirrored
+axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction stay between -0.3 and 0.2."""
+
+
+def read_recording(
+    path: str | os.PathLike[str],
+    *,
+    position: str | None = None,
+    force: str | None = None,
+    time: str | None = None,
+    direction: str | None = None,
+    inputs: Sequence[str] = (),
+    units: Mapping[str, str] | None = None,
+    torque_constant: float | None = None,
+    negate: Sequence[str] = (),
+    rows: tuple[int | None, int | None] | None = None,
+    invalid: Literal["refuse", "drop"] = "refuse",
+) -> Recording:
+    """Read a recording from CSV or Parquet.
+
+    CSV may begin with ``#`` lines of metadata (``# key: value``), then needs a header of ``stem_unit`` names
+    such as ``displacement_mm``; the unit is looked up in a closed table and values are converted to SI.
+
+    Parameters
+    ----------
+    path : path
+        A CSV file, a ``.part`` file (a recording cut off while it grew: a torn last line is left out and
+        counted), or a ``.parquet`` file (needs pyarrow).
+    position, force, time : str, optional
+        Column names. Without them the columns are chosen by name and unit; where that is ambiguous, the error
+        names the candidates.
+    direction : str, optional
+        Column with the direction of the stroke, in words (press, approach, load, loading, forward, +1;
+        release, retract, unload, unloading, back, -1; pause, hold, extra, 0). Without it a column called
+        ``direction``, or one called ``segment`` that holds words, is taken.
+    inputs : sequence of str
+        Further columns that the force depends on.
+    units : mapping of str to str, optional
+        Unit of a column, by its name or by "position", "force" or "time" where that column is named too; for
+        columns without a unit, or in one that the table does not know.
+    torque_constant : float, optional
+        Torque per current [N*m/A]: turns a force column in A into N*m. Without it current stays in A.
+    negate : sequence of str
+        "position", "force" or names of used columns whose sign is to be turned.
+    rows : (start, stop), optional
+        Half-open range of data rows to use, counted from 0; None for either end leaves it open.
+    invalid : {"refuse", "drop"}
+        What to do with a row that has no number where one is needed, an infinite one, or a time that repeats
+        or runs backward: refuse the file, naming the row, or drop the row and count it.
+
+    Returns
+    -------
+    Recording
+        SI arrays; its ``notes`` say what was chosen, dropped and noticed.
+
+    Raises
+    ------
+    InputError
+        One sentence that names the file, the line or column, and the value.
+    """
+    file = Path(path)
+    if invalid not in ("refuse", "drop"):
+        raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
+    require_file(file)
+    table: TableFile = ParquetFile(file) if file.suffix == ".parquet" else CsvFile(file)
+    metadata = dict(table.metadata)
+    layout = Layout.taken_from(str(file), metadata)
+    choice = choose_columns(
+        str(file),
+        table.names,
+        position=position or layout.roles.get("position"),
+        force=force or layout.roles.get("force"),
+        time=time or layout.roles.get("time"),
+        direction=direction or layout.roles.get("direction"),
+        inputs=tuple(inputs) or layout.inputs,
+        units=units,
+        unstated=layout.roles.values(),
+    )
+    numeric = [column for column in (choice.position, choice.force, choice.time, *choice.inputs) if column]
+    cells = table.read(
+        numbers=[column.name for column in numeric], text=[choice.direction] if choice.direction else []
+    )
+    stroke = choice.direction
+    if (
+        stroke == "segment"
+        and direction is None
+        and all(parse_number(word) is not None for word in cells[stroke])
+    ):
+        # Numbered segments say nothing about the stroke.
+        cells[stroke], stroke = to_numbers(cells[stroke]), None
+    notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
+    total = len(cells[choice.position.name])
+    start, stop = _row_range(file, rows, total)
+    if (start, stop) != (0, total):
+        notes.append(f"rows {start} to {stop - 1} of 0 to {total - 1} are used")
+        cells = {name: column[start:stop] for name, column in cells.items()}
+
+    check = RowCheck(str(file), table, start, stop - start, drop=invalid == "drop")
+    for column in numeric:
+        check.finite(column.name, cells[column.name])
+    words = None if stroke is None else check.directions(stroke, cells[stroke])
+    if choice.time is not None:
+        check.increasing(choice.time.name, cells[choice.time.name])
+    if not check.kept.all():
+        cells = {name: column[check.kept] for name, column in cells.items()}
+        words = None if words is None else words[check.kept]
+    notes += check.notes
+
+    _negate(file, choice, negate, cells)
+    x = _in_si(choice.position, cells)
+    f = _in_si(choice.force, cells)
+    force_unit = choice.force.unit.si if choice.force.unit else UNSTATED
+    if torque_constant is not None:
+        if force_unit != "A":
+            raise InputError(
+                f"{file}: --torque-constant-Nm-per-A turns a current into a torque, but the force is "
+                f"{choice.force.name}, which is not in A"
+            )
+        f, force_unit = f * torque_constant, "N*m"
+    _require_enough(file, choice.position, x)
+    inputs_si = [_in_si(column, cells) for column in choice.inputs]
+    used = {column.name for column in numeric} | {stroke}
+    source = Source(
+        files=(str(file),),
+        sha256=sha256_of_file(file),
+        rows=len(x),
+        columns=_source_columns(choice, stroke),
+    )
+    return Recording(
+        position=x,
+        force=f,
+        time=None if choice.time is None else _in_si(choice.time, cells),
+        direction=words,
+        inputs=np.column_stack(inputs_si) if inputs_si else np.empty((len(x), 0)),
+        input_names=tuple(map(_si_name, choice.inputs)),
+        columns={name: column for name, column in cells.items() if name not in used},
+        metadata=metadata,
+        units={
+            "position": choice.position.unit.si if choice.position.unit else UNSTATED,
+            "force": force_unit,
+        },
+        source=source,
+        notes=(_chosen(choice, stroke, torque_constant), *notes, *_noticed(x, f, words)),
+    )
+
+
+def _row_range(file: Path, rows: tuple[int | None, int | None] | None, total: int) -> tuple[int, int]:
+    first, last = rows or (None, None)
+    start, stop = first or 0, total if last is None else last
+    if not 0 <= start < stop <= total and rows is not None:
+        raise InputError(f"{file}: rows {start} to {stop} were asked for, but it has {total} rows")
+    return start, stop
+
+
+def _negate(file: Path, choice: Choice, negate: Sequence[str], cells: dict[str, Cells]) -> None:
+    by_role = {"position": choice.position.name, "force": choice.force.name}
+    used = {*by_role.values(), *(column.name for column in choice.inputs)}
+    for name in negate:
+        column = by_role.get(name, name)
+        if column not in used:
+            raise InputError(
+                f"{file}: --negate {name} names no column that is used ({', '.join(sorted(used))})"
+            )
+        cells[column] = -cells[column]
+
+
+def _in_si(column: Column, cells: dict[str, Cells]) -> Float1D:
+    values: Float1D = cells[column.name]
+    return values if column.unit is None else values * column.unit.factor
+
+
+def _si_name(column: Column) -> str:
+    """The name of an input after conversion, so that the name still tells the unit."""
+    return column.name if column.unit is None else f"{column.stem}_{COLUMN_SUFFIX[column.unit.si]}"
+
+
+def _source_columns(choice: Choice, stroke: str | None) -> dict[str, str]:
+    columns = {"position": choice.position.name, "force": choice.force.name}
+    if choice.time is not None:
+        columns["time"] = choice.time.name
+    if stroke is not None:
+        columns["direction"] = stroke
+    return columns | {_si_name(column): column.name for column in choice.inputs}
+
+
+def _require_enough(file: Path, position: Column, x: Float1D) -> None:
+    if len(x) < MIN_ROWS:
+        raise InputError(f"{file} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}")
+    distinct = len(np.unique(x))
+    if distinct < MIN_POSITIONS:
+        plural = "s" * (distinct > 1)
+        raise InputError(
+            f"{file}: column {position.name} holds {distinct} distinct value{plural}; "
+            f"force over position needs at least {MIN_POSITIONS}"
+        )
+
+
+def _chosen(choice: Choice, stroke: str | None, torque_constant: float | None) -> str:
+    parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
+    if torque_constant is not None:
+        parts[-1] += f" times {torque_constant:g} N*m/A"
+    elif choice.force.unit is not None and choice.force.unit.si == "A":
+        parts[-1] += " (a current; it stays in A)"
+    parts.append(f"time is {choice.time.name}" if choice.time else "there is no time")
+    parts.append(f"direction is {stroke}" if stroke else "there is no direction")
+    if choice.inputs:
+        parts.append(f"inputs are {', '.join(column.name for column in choice.inputs)}")
+    return ", ".join(parts)
+
+
+def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
+    """Say once what looks mirrored; nothing is ever flipped silently."""
+    signs = []
+    if np.ptp(f) > 0 and (correlation := float(np.corrcoef(x, f)[0, 1])) < FALLING:
+        signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
+    if words is not None and len(x) > 1:
+        step = np.diff(x) * words[1:]
+        if step.sum() < 0:
+            signs.append("the position falls where the direction goes into the object")
+    if not signs:
+        return []
+    return [
+        f"{' and '.join(signs)}: if the position grows out of the object give --negate position, "
+        "if the force is positive when pulling give --negate force"
+    ]

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recording: measured force over position in SI arrays, and where they came from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from .._typing import Float1D, Float2D, Int8Vector
+from ..errors import InputError
+from .table import Cells
+from .units import FORCE_UNITS, POSITION_UNITS
+
+UNSTATED = ""
+"""The unit of an array that was handed over without one: SI, but not said which."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where data came from: enough to find it again, and to tell whether other data is the same."""
+
+    files: tuple[str, ...]
+    sha256: str
+    """SHA-256 of each file (of the arrays, for data that never was a file), separated by spaces."""
+    rows: int
+    columns: Mapping[str, str]
+    """Role (position, force, time, direction, or an input's name) to the column's name in the file."""
+    held_out_every: int = 0
+    """k where the rows i with i mod k = k - 1 were separated from the others; 0: all rows are together."""
+    held_out: bool = False
+    """True for the rows that were held out, False for those that were kept."""
+
+    @staticmethod
+    def merged(sources: Iterable[Source]) -> Source:
+        """One source for data taken from several recordings."""
+        parts = list(sources)
+        first = parts[0]
+        return replace(
+            first,
+            files=tuple(file for part in parts for file in part.files),
+            sha256=" ".join(part.sha256 for part in parts),
+            rows=sum(part.rows for part in parts),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Measured (or simulated) force over position, in SI units.
+
+    Position grows into the object; force is what the object exerts against the tool, so pressing a spring
+    gives a positive force. Arrays are read-only.
+    """
+
+    position: Float1D
+    """(n,) [m, rad or count, see `units`]"""
+    force: Float1D
+    """(n,) [N, N*m, or A where the force is only known as a motor current]"""
+    time: Float1D | None
+    """(n,) [s], strictly increasing, or None"""
+    direction: Int8Vector | None
+    """(n,) +1 into the object, -1 out of it, 0 neither; None where the file does not say"""
+    inputs: Float2D
+    """(n, d) further inputs, SI where their names carry a unit"""
+    input_names: tuple[str, ...]
+    columns: Mapping[str, Cells]
+    """Every other column as it stands in the file: float64, or str objects for text"""
+    metadata: Mapping[str, str]
+    units: Mapping[str, str]
+    """"position": "rad" | "m" | "count" | "", "force": "N*m" | "N" | "A" | "" ("": SI, not said which)"""
+    source: Source
+    notes: tuple[str, ...] = field(default=())
+    """What was chosen, dropped and noticed while reading, in sentences"""
+
+    def __post_init__(self) -> None:
+        n = len(self.position)
+        for name in ("position", "force", "time", "direction"):
+            array = getattr(self, name)
+            if array is None:
+                continue
+            if array.shape != (n,):
+                raise InputError(f"{name} has shape {array.shape}, but position has {n} samples")
+            _freeze(array)
+        if self.inputs.shape != (n, len(self.input_names)):
+            raise InputError(
+                f"inputs have shape {self.inputs.shape}; {len(self.input_names)} names and {n} samples need "
+                f"({n}, {len(self.input_names)})"
+            )
+        _freeze(self.inputs)
+        for cells in self.columns.values():
+            _freeze(cells)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        position: npt.ArrayLike,
+        force: npt.ArrayLike,
+        time: npt.ArrayLike | None = None,
+        direction: npt.ArrayLike | None = None,
+        *,
+        units: Mapping[str, str] | None = None,
+        metadata: Mapping[str, str] | None = None,
+    ) -> Recording:
+        """Make a recording from arrays in SI units.
+
+        Parameters
+        ----------
+        position : (n,) array_like
+            Position [rad or m].
+        force : (n,) array_like
+            Force against the tool [N*m or N].
+        time : (n,) array_like, optional
+            Time [s], strictly increasing.
+        direction : (n,) array_like, optional
+            +1 into the object, -1 out of it, 0 neither.
+        units : mapping, optional
+            {"position": "rad", "force": "N*m"}; without it the data is SI, but not said which.
+        metadata : mapping, optional
+            What the data says about itself.
+
+        Raises
+        ------
+        InputError
+            Shapes differ, a value is not finite, time does not increase, a direction is not -1, 0 or +1, or a
+            unit is not one that recordings carry.
+        """
+        arrays: dict[str, Float1D] = {}
+        for name, values in (("position", position), ("force", force), ("time", time)):
+            if values is None:
+                continue
+            array = np.array(values, dtype=np.float64)
+            if array.ndim != 1:
+                raise InputError(f"{name} has shape {array.shape}; it must be one-dimensional")
+            bad = np.flatnonzero(~np.isfinite(array))
+            if bad.size:
+                raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}; it must be a finite number")
+            arrays[name] = array
+        if time is not None:
+            stuck = np.flatnonzero(np.diff(arrays["time"]) <= 0)
+            if stuck.size:
+                raise InputError(
+                    f"time[{stuck[0] + 1}] is not later than time[{stuck[0]}]; time must increase"
+                )
+        words: Int8Vector | None = None
+        if direction is not None:
+            given = np.asarray(direction)
+            if not np.isin(given, (-1, 0, 1)).all():
+                wrong = given[~np.isin(given, (-1, 0, 1))].flat[0]
+                raise InputError(f"direction holds {wrong}; it must be +1, -1 or 0")
+            words = given.astype(np.int8)
+        checked_units = {"position": UNSTATED, "force": UNSTATED, **(units or {})}
+        for role, allowed in (("position", POSITION_UNITS), ("force", FORCE_UNITS)):
+            if checked_units[role] not in (*allowed, UNSTATED):
+                raise InputError(
+                    f"units[{role!r}] is {checked_units[role]!r}; use one of {', '.join(allowed)}"
+                )
+        digest = hashlib.sha256()
+        for array_or_none in (*arrays.values(), words):
+            if array_or_none is not None:
+                digest.update(array_or_none.tobytes())
+        n = len(arrays["position"])
+        return cls(
+            position=arrays["position"],
+            force=arrays["force"],
+            time=arrays.get("time"),
+            direction=words,
+            inputs=np.empty((n, 0)),
+            input_names=(),
+            columns={},
+            metadata=dict(metadata or {}),
+            units=checked_units,
+            source=Source(files=(), sha256=digest.hexdigest(), rows=n, columns={}),
+        )
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def sample_period(self) -> float | None:
+        """The median step of time [s], or None without time."""
+        if self.time is None or len(self.time) < 2:
+            return None
+        return float(np.median(np.diff(self.time)))
+
+    def split(self, every: int = 5) -> tuple[Recording, Recording]:
+        """Hold out every `every`-th row: (train, test), test being the rows i with i mod every = every - 1.
+
+        Raises
+        ------
+        InputError
+            `every` is below 2, or so large that no row would be held out.
+        """
+        if not 2 <= every <= len(self):
+            raise InputError(
+                f"every is {every}; to hold out rows of {len(self)} it must be from 2 to {len(self)}"
+            )
+        held_out = np.arange(len(self)) % every == every - 1
+        return self._part(~held_out, every, False), self._part(held_out, every, True)
+
+    def _part(self, rows: npt.NDArray[np.bool_], every: int, held_out: bool) -> Recording:
+        return replace(
+            self,
+            position=self.position[rows],
+            force=self.force[rows],
+            time=None if self.time is None else self.time[rows],
+            direction=None if self.direction is None else self.direction[rows],
+            inputs=self.inputs[rows],
+            columns={name: cells[rows] for name, cells in self.columns.items()},
+            source=replace(
+                self.source, rows=int(np.count_nonzero(rows)), held_out_every=every, held_out=held_out
+            ),
+        )
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the recording as CSV that :func:`palpate.read_recording` reads back exactly, with no option.
+
+        The file appears under its name only when it is complete. Numbers are written so that they are read
+        back to the last bit; positions and forces are written in SI units.
+
+        Raises
+        ------
+        InputError
+            The folder does not exist or cannot be written, or the metadata cannot stand on one line.
+        """
+        from .writing import write_csv  # the writer needs this class
+
+        return write_csv(self, Path(path))
+
+
+def _freeze(array: Cells) -> None:
+    array.flags.writeable = False

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check every row of the chosen columns: refuse the file at the first bad one, or drop and count them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D, Int8Vector
+from ..errors import InputError
+from .direction import DIRECTION_WORDS, direction_of
+from .table import Cells, TableFile
+
+
+class RowCheck:
+    """Which rows can be used.
+
+    Parameters
+    ----------
+    file : str
+        The file's name, for the sentences.
+    table : TableFile
+        Where lines and cells are looked up when something is wrong.
+    first_row : int
+        Data row of the file that the arrays begin with.
+    rows : int
+        Number of rows.
+    drop : bool
+        Drop bad rows and count them; else refuse the file at the first one.
+    """
+
+    def __init__(self, file: str, table: TableFile, first_row: int, rows: int, drop: bool) -> None:
+        self._file, self._table, self._first_row, self._drop = file, table, first_row, drop
+        self.kept: NDArray[np.bool_] = np.ones(rows, dtype=bool)
+        self.notes: list[str] = []
+
+    def finite(self, name: str, values: Float1D) -> None:
+        """Every row needs a finite number in this column."""
+        bad = self.kept & ~np.isfinite(values)
+        self._settle(
+            bad, name, "holds {cell}, which is no finite number", "without a finite number in " + name
+        )
+
+    def directions(self, name: str, cells: Cells) -> Int8Vector:
+        """The direction that each row states. A word that is not known refuses the file in any case."""
+        words, codes = np.unique(cells.astype(str), return_inverse=True)
+        values = np.zeros(len(words), dtype=np.int8)
+        for index, word in enumerate(words):
+            value = direction_of(word)
+            rows = codes == index
+            if value is not None:
+                values[index] = value
+            elif word.strip():
+                known = ", ".join(DIRECTION_WORDS)
+                where = self._where(int(np.flatnonzero(rows)[0]))
+                raise InputError(
+                    f"{where}: column {name} holds {word!r}, which is no direction; known words are {known}"
+                )
+            else:
+                self._settle(self.kept & rows, name, "says no direction", "without a direction in " + name)
+        return values[codes]
+
+    def increasing(self, name: str, time: Float1D) -> None:
+        """Time must be later in every usable row than in all usable rows before it."""
+        rows = np.flatnonzero(self.kept)
+        usable = time[rows]
+        latest_before = np.maximum.accumulate(usable)[:-1]
+        stuck = np.zeros_like(self.kept)
+        stuck[rows[1:][usable[1:] <= latest_before]] = True
+        self._settle(
+            stuck,
+            name,
+            "holds {cell}, no later than the time before it",
+            "whose time repeats or runs backward",
+        )
+
+    def _settle(self, bad: NDArray[np.bool_], name: str, sentence: str, reason: str) -> None:
+        count = int(np.count_nonzero(bad))
+        if not count:
+            return
+        first = int(np.flatnonzero(bad)[0])
+        if not self._drop:
+            cell = self._table.cell(self._first_row + first, name)
+            told = sentence.format(cell=repr(cell) if cell else "nothing")
+            others = f" (and {count - 1} more such rows)" if count > 1 else ""
+            raise InputError(
+                f"{self._where(first)}: column {name} {told}{others}; correct the file or drop such rows "
+                "with --invalid drop"
+            )
+        place = self._table.place(self._first_row + first)
+        self.notes.append(f"dropped {count} row{'s' * (count > 1)} {reason} (first: {place})")
+        self.kept &= ~bad
+
+    def _where(self, row: int) -> str:
+        return f"{self._file}, {self._table.place(self._first_row + row)}"

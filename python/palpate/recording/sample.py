@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The product's own recording: simulated, never measured, and called so wherever it appears."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from .._typing import Float1D
+from ..errors import InputError
+from .recording import Recording
+
+STIFFNESS = 2.0
+"""Stiffness of the soft part [N*m/rad]."""
+WALL_STIFFNESS = 58.0
+"""Stiffness that the wall adds [N*m/rad]."""
+WALL_POSITION = 0.4
+"""Where the wall begins [rad]."""
+WALL_WIDTH = 0.01
+"""Over what length it begins [rad]."""
+LOWER, UPPER = -0.2, 0.469
+"""Range of the sweep [rad]."""
+FORCE_LIMIT = 5.0
+"""Largest force that the simulated device holds [N*m]."""
+ENCODER_STEP = 2 * np.pi / 65536
+"""16-bit encoder [rad]."""
+FORCE_NOISE = 0.02
+"""Standard deviation of the force sensor's noise [N*m]."""
+SAMPLE_PERIOD = 1e-3
+"""[s]"""
+SLOWEST_HZ, FASTEST_HZ = 0.2, 2.0
+"""Range over which the frequency of the hand's sweep wanders [Hz]."""
+WANDER_HZ = (0.031, 0.073, 0.127)
+"""Slow, incommensurate frequencies at which it wanders [Hz]."""
+
+
+def sample_force(x: npt.ArrayLike) -> Float1D:
+    """Force of the sample's object [N*m] at position `x` [rad]: a spring, and a wall that begins smoothly.
+
+    f(x) = 2 x + 58 * 0.01 softplus((x - 0.4) / 0.01), softplus(u) = ln(1 + e^u), limited to +-5 N*m.
+    """
+    position = np.asarray(x, dtype=np.float64)
+    wall = WALL_STIFFNESS * WALL_WIDTH * np.logaddexp(0.0, (position - WALL_POSITION) / WALL_WIDTH)
+    return np.clip(STIFFNESS * position + wall, -FORCE_LIMIT, FORCE_LIMIT)
+
+
+def sample_recording(seed: int, duration_s: float = 60.0) -> Recording:
+    """Simulate a recording of the sample's object: a hand that sweeps it at 0.2 to 2 Hz, sampled at 1 kHz.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the hand's motion and of the noise; seeds 1 and 2 are the sample to identify and a fresh one.
+    duration_s : float
+        Length [s].
+
+    Returns
+    -------
+    Recording
+        Position as a 16-bit encoder reads it [rad], force with 0.02 N*m of noise [N*m], time [s].
+    """
+    samples = round(duration_s / SAMPLE_PERIOD)
+    if samples < 1:
+        raise InputError(f"duration_s is {duration_s}; it must be at least one sample of {SAMPLE_PERIOD} s")
+    random = np.random.default_rng(seed)
+    time = np.arange(samples) * SAMPLE_PERIOD
+    phases = random.uniform(0.0, 2 * np.pi, len(WANDER_HZ))
+    wander = np.mean(
+        [np.sin(2 * np.pi * hz * time + phase) for hz, phase in zip(WANDER_HZ, phases, strict=True)], axis=0
+    )
+    frequency = SLOWEST_HZ * (FASTEST_HZ / SLOWEST_HZ) ** ((1 + wander) / 2)
+    phase = random.uniform(0.0, 2 * np.pi) + 2 * np.pi * SAMPLE_PERIOD * np.cumsum(frequency)
+    position = (LOWER + UPPER) / 2 + (UPPER - LOWER) / 2 * np.sin(phase)
+    force = sample_force(position) + random.normal(0.0, FORCE_NOISE, samples)
+    return Recording.from_arrays(
+        position=np.floor(position / ENCODER_STEP + 0.5) * ENCODER_STEP,
+        force=force,
+        time=time,
+        units={"position": "rad", "force": "N*m"},
+        metadata={
+            "simulated": "yes, by palpate; nothing here was measured",
+            "object": "f(x) = 2 x + 58*0.01 softplus((x - 0.4)/0.01) N*m, limited to +-5 N*m",
+            "seed": str(seed),
+        },
+    )

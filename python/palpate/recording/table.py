@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a file of columns gives before anything is chosen from it: names first, cells later."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Cells: TypeAlias = NDArray[Any]
+"""(n,) float64 for numbers (NaN where a cell holds none), (n,) object of str for text"""
+
+
+class TableFile(Protocol):
+    """A file with a header, read in two steps so that only the header is needed to choose columns."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The column names."""
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """What the file says about itself."""
+
+    @property
+    def torn(self) -> int:
+        """How many torn lines at the end are left out."""
+
+    def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
+        """All columns. Those in `numbers` become float64 whatever they hold, those in `text` become strings;
+        any other is numeric if every cell of it is."""
+
+    def place(self, row: int) -> str:
+        """Where a person finds a row: "line 12"."""
+
+    def cell(self, row: int, name: str) -> str:
+        """The text of one cell as it stands in the file."""
+
+
+def parse_number(text: str) -> float | None:
+    """The number that a cell holds, or None. NaN and infinity count as numbers here."""
+    try:
+        # float() would accept 1_000, which no other reader of the file does.
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None
+
+
+MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL", "null", "None")
+"""How a cell of a numeric column says that it has no value."""
+
+
+def to_numbers(cells: Cells) -> NDArray[np.float64]:
+    """Turn strings into numbers, with NaN where a cell holds none."""
+
+    def number(cell: Any) -> float:
+        value = parse_number(cell) if isinstance(cell, str) else cell
+        return np.nan if value is None else value
+
+    return np.fromiter(map(number, cells), dtype=np.float64, count=len(cells))
