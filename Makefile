@@ -3,7 +3,7 @@
 #
 #   make demo         identify, verify and render the sample scene; pictures in demo/
 #   make test         build, C++ tests, Python tests, lint                        (minutes)
-#   make test-full    the same tests with long counts, then under the sanitizers  (an hour)
+#   make test-full    the same tests with long counts, under the sanitizers, and as installed  (an hour)
 #   make bench        all benchmarks, JSON in build/bench/
 #   make lint | format | stubs | clean
 #
@@ -83,6 +83,7 @@ test-full: setup
 	tools/cpp_tests.sh release
 	tools/cpp_tests.sh asan
 	tools/cpp_tests.sh tsan
+	tools/install_tests.sh
 	$(python) -m pytest
 
 bench: setup

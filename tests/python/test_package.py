@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The package as it is installed: version, types, entry points."""
+
+import importlib.metadata
+import importlib.resources
+import re
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+import palpate
+from palpate import _core
+
+ROOT = Path(__file__).parents[2]
+
+
+def version_of_the_build() -> str:
+    match = re.search(
+        r"project\(\s*palpate\s+VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    )
+    assert match
+    return match[1]
+
+
+def test_one_version_is_told_everywhere() -> None:
+    version = version_of_the_build()
+    assert importlib.metadata.version("palpate") == version
+    assert palpate.__version__ == _core.__version__ == version
+    assert f"version: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_package_says_that_it_is_typed() -> None:
+    files = importlib.resources.files("palpate")
+    assert files.joinpath("py.typed").is_file()
+    assert files.joinpath("_core.pyi").is_file() or files.joinpath("_core", "__init__.pyi").is_file()
+
+
+@pytest.mark.parametrize("name", palpate.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(palpate, name) is not None
+
+
+@pytest.mark.parametrize("name", [name for name in palpate.__all__ if not name.startswith("_")])
+def test_every_public_name_is_documented(name: str) -> None:
+    assert (getattr(palpate, name).__doc__ or "").strip()
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'flavour'"):
+        palpate.flavour  # noqa: B018
+
+
+def command_lines() -> dict[str, list[str]]:
+    return {
+        "installed": [str(Path(sysconfig.get_path("scripts")) / "palpate")],
+        "python -m": [sys.executable, "-m", "palpate"],
+    }
+
+
+@pytest.mark.parametrize("way", command_lines())
+@pytest.mark.parametrize("verb", ["", "identify", "verify", "simulate", "show", "demo"])
+def test_the_command_explains_itself(way: str, verb: str) -> None:
+    command = [*command_lines()[way], *([verb] if verb else []), "--help"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.startswith("Usage:")
+    assert "xample" in answer.stdout
+
+
+def test_the_command_tells_its_version() -> None:
+    answer = subprocess.run(
+        [*command_lines()["installed"], "--version"], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == f"palpate {version_of_the_build()}\n"
