@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One tick of every structure along a hand's motion, state carried from tick to tick: explicit against implicit.
-// Beside the time stand the error of the rendered force against f at the handle and the evaluations a tick.
+// One tick of every structure along a hand's motion, state carried from tick to tick: explicit against
+// implicit. Beside the time stand the error of the rendered force against f at the handle and the evaluations
+// a tick.
 
 #include <cmath>
 #include <string>
@@ -22,7 +23,8 @@ constexpr palpate::Inertia inertia{0.001, 0.5};
 /// `allowed_error` is what the coupling and the damping of the structure leave; more means a wrong solver.
 template <class S>
 void tick(benchmark::State& state, const S& initial, double allowed_error) {
-    const palpate::WaveletNetwork object = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
+    const palpate::WaveletNetwork object =
+        palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     const std::vector<double> motion = palpate::bench::hand_motion(4000);
     S structure = initial;
     structure.reset(motion.front());

@@ -10,8 +10,8 @@
 
 namespace palpate::bench {
 
-/// A spring that meets a wall: a soft line, a kink and a steep line, drawn with `size` wavelets around the kink
-/// at 0.4 rad. Its slope lies between about 2 and 60 N*m/rad.
+/// A spring that meets a wall: a soft line, a kink and a steep line, drawn with `size` wavelets around the
+/// kink at 0.4 rad. Its slope lies between about 2 and 60 N*m/rad.
 inline WaveletNetwork spring_and_wall(std::size_t size) {
     NetworkParameters network;
     network.linear = {20.0};
@@ -20,7 +20,8 @@ inline WaveletNetwork spring_and_wall(std::size_t size) {
         const double fraction = (static_cast<double>(k) + 0.5) / static_cast<double>(size);
         network.alpha.push_back(6.0 + 30.0 * fraction);
         network.beta.push_back(0.1 + 0.4 * fraction);
-        network.weight.push_back(0.6 / static_cast<double>(size) * std::cos(3.0 * std::numbers::pi * fraction));
+        network.weight.push_back(0.6 / static_cast<double>(size) *
+                                 std::cos(3.0 * std::numbers::pi * fraction));
     }
     return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }

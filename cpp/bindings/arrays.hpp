@@ -46,7 +46,8 @@ template <class T>
     auto owner = std::make_unique<std::vector<T>>(std::move(values));
     const auto size = static_cast<pybind11::ssize_t>(owner->size());
     T* data = owner->data();
-    pybind11::capsule free(owner.release(), [](void* pointer) { delete static_cast<std::vector<T>*>(pointer); });
+    pybind11::capsule free(owner.release(),
+                           [](void* pointer) { delete static_cast<std::vector<T>*>(pointer); });
     return pybind11::array_t<T>(size, data, free);
 }
 

@@ -12,20 +12,23 @@ using namespace py::literals;
 
 void bind_device(py::module_& module) {
     const DeviceProfile profile;
-    py::class_<DeviceProfile>(module, "DeviceProfile",
-                              "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.")
+    py::class_<DeviceProfile>(
+        module, "DeviceProfile",
+        "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.")
         .def(py::init([](std::string id, double period_s, double inertia, double viscous_damping,
                          double coulomb_friction, double encoder_step, double force_step, int delay_samples,
                          double force_limit) {
-                 DeviceProfile made{std::move(id), period_s,   inertia,       viscous_damping, coulomb_friction,
-                                    encoder_step,  force_step, delay_samples, force_limit};
+                 DeviceProfile made{std::move(id),   period_s,         inertia,
+                                    viscous_damping, coulomb_friction, encoder_step,
+                                    force_step,      delay_samples,    force_limit};
                  validate(made);
                  return made;
              }),
-             py::kw_only(), "id"_a = profile.id, "period_s"_a = profile.period_s, "inertia"_a = profile.inertia,
-             "viscous_damping"_a = profile.viscous_damping, "coulomb_friction"_a = profile.coulomb_friction,
-             "encoder_step"_a = profile.encoder_step, "force_step"_a = profile.force_step,
-             "delay_samples"_a = profile.delay_samples, "force_limit"_a = profile.force_limit)
+             py::kw_only(), "id"_a = profile.id, "period_s"_a = profile.period_s,
+             "inertia"_a = profile.inertia, "viscous_damping"_a = profile.viscous_damping,
+             "coulomb_friction"_a = profile.coulomb_friction, "encoder_step"_a = profile.encoder_step,
+             "force_step"_a = profile.force_step, "delay_samples"_a = profile.delay_samples,
+             "force_limit"_a = profile.force_limit)
         .def_readonly("id", &DeviceProfile::id)
         .def_readonly("period_s", &DeviceProfile::period_s, "Longest time between two samples [s].")
         .def_readonly("inertia", &DeviceProfile::inertia, "[kg or kg*m^2]")
@@ -37,28 +40,32 @@ void bind_device(py::module_& module) {
         .def_readonly("force_limit", &DeviceProfile::force_limit, "[N or N*m]")
         .def("__repr__", [](const DeviceProfile& p) {
             return "DeviceProfile(id='" + p.id + "', period_s=" + std::to_string(p.period_s) +
-                   ", inertia=" + std::to_string(p.inertia) + ", viscous_damping=" + std::to_string(p.viscous_damping) +
+                   ", inertia=" + std::to_string(p.inertia) +
+                   ", viscous_damping=" + std::to_string(p.viscous_damping) +
                    ", coulomb_friction=" + std::to_string(p.coulomb_friction) +
-                   ", encoder_step=" + std::to_string(p.encoder_step) + ", force_step=" + std::to_string(p.force_step) +
+                   ", encoder_step=" + std::to_string(p.encoder_step) +
+                   ", force_step=" + std::to_string(p.force_step) +
                    ", delay_samples=" + std::to_string(p.delay_samples) +
                    ", force_limit=" + std::to_string(p.force_limit) + ")";
         });
 
     const Hand hand;
-    py::class_<Hand>(module, "Hand",
-                     "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.")
-        .def(py::init<double, double, double, double, double>(), py::kw_only(), "stiffness"_a = hand.stiffness,
-             "damping"_a = hand.damping, "lower"_a = hand.lower, "upper"_a = hand.upper,
-             "frequency_hz"_a = hand.frequency_hz)
+    py::class_<Hand>(
+        module, "Hand",
+        "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.")
+        .def(py::init<double, double, double, double, double>(), py::kw_only(),
+             "stiffness"_a = hand.stiffness, "damping"_a = hand.damping, "lower"_a = hand.lower,
+             "upper"_a = hand.upper, "frequency_hz"_a = hand.frequency_hz)
         .def_readonly("stiffness", &Hand::stiffness, "[N/m or N*m/rad]")
         .def_readonly("damping", &Hand::damping, "[N*s/m or N*m*s/rad]")
         .def_readonly("lower", &Hand::lower, "[m or rad]")
         .def_readonly("upper", &Hand::upper, "[m or rad]")
         .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]")
         .def("__repr__", [](const Hand& h) {
-            return "Hand(stiffness=" + std::to_string(h.stiffness) + ", damping=" + std::to_string(h.damping) +
-                   ", lower=" + std::to_string(h.lower) + ", upper=" + std::to_string(h.upper) +
-                   ", frequency_hz=" + std::to_string(h.frequency_hz) + ")";
+            return "Hand(stiffness=" + std::to_string(h.stiffness) +
+                   ", damping=" + std::to_string(h.damping) + ", lower=" + std::to_string(h.lower) +
+                   ", upper=" + std::to_string(h.upper) + ", frequency_hz=" + std::to_string(h.frequency_hz) +
+                   ")";
         });
 }
 

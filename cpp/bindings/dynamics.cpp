@@ -34,8 +34,9 @@ void bind_dynamics(py::module_& module) {
             },
             "input"_a, "The response to a signal (n,) from this state; the state itself is left as it is.");
 
-    py::class_<EnvironmentFilters>(module, "EnvironmentFilters",
-                                   "Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.")
+    py::class_<EnvironmentFilters>(
+        module, "EnvironmentFilters",
+        "Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.")
         .def_readonly("i1", &EnvironmentFilters::i1)
         .def_readonly("i2", &EnvironmentFilters::i2)
         .def_readonly("g1", &EnvironmentFilters::g1)
@@ -54,7 +55,8 @@ void bind_dynamics(py::module_& module) {
                                        design == "paper" ? FilterDesign::Paper : FilterDesign::Matched);
         },
         "pair"_a, "design"_a = "paper",
-        "The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.");
+        "The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low "
+        "frequency.");
 }
 
 }  // namespace palpate::bindings

@@ -21,7 +21,9 @@ Continuation continuation_named(const std::string& name, const char* field) {
     return name == "free" ? Continuation::Free : Continuation::Linear;
 }
 
-std::string name_of(Continuation continuation) { return continuation == Continuation::Free ? "free" : "linear"; }
+std::string name_of(Continuation continuation) {
+    return continuation == Continuation::Free ? "free" : "linear";
+}
 
 /// The element k of an optional argument that is one value for all samples or one for each.
 class Broadcast {
@@ -31,8 +33,8 @@ class Broadcast {
             return;
         }
         if (array->size() != 1 && array->size() != samples) {
-            throw std::invalid_argument(std::string(name) + " has shape " + shape_of(*array) + ", must have 1 or " +
-                                        std::to_string(samples) + " values");
+            throw std::invalid_argument(std::string(name) + " has shape " + shape_of(*array) +
+                                        ", must have 1 or " + std::to_string(samples) + " values");
         }
         values_ = array->data();
         stride_ = array->size() == 1 ? 0 : 1;
@@ -61,23 +63,26 @@ EnvironmentSample sample(const ForceModel& model, double x, std::optional<double
 }
 
 void require_inputs(const ForceModel& model, bool direction, bool play) {
-    detail::require(model.parameters().dimension == 1, "the model has " +
-                                                           std::to_string(model.parameters().dimension) +
-                                                           " inputs: call predict(X) with X of that many columns");
+    detail::require(model.parameters().dimension == 1,
+                    "the model has " + std::to_string(model.parameters().dimension) +
+                        " inputs: call predict(X) with X of that many columns");
     if (!model.hysteresis()) {
         return;
     }
-    detail::require(direction || play,
-                    "the model differs between press and release: give direction= (+1 pressing, -1 releasing) or play=");
-    detail::require(direction || model.play_radius().has_value(),
-                    "play= is given, but the model has no play radius: give direction= (+1 pressing, -1 releasing)");
+    detail::require(
+        direction || play,
+        "the model differs between press and release: give direction= (+1 pressing, -1 releasing) or play=");
+    detail::require(
+        direction || model.play_radius().has_value(),
+        "play= is given, but the model has no play radius: give direction= (+1 pressing, -1 releasing)");
 }
 
 using Member = double EnvironmentSample::*;
 
 template <Member member>
 double scalar(const ForceModel& model, double position, const py::object& /*velocity*/,
-              const py::object& /*acceleration*/, std::optional<double> direction, std::optional<double> play) {
+              const py::object& /*acceleration*/, std::optional<double> direction,
+              std::optional<double> play) {
     require_inputs(model, direction.has_value(), play.has_value());
     return sample(model, position, direction, play).*member;
 }
@@ -89,7 +94,8 @@ py::array_t<double> batch(const ForceModel& model, const Array& position, const 
     require_inputs(model, direction.has_value(), play.has_value());
     const Broadcast directions(direction, position.size(), "direction");
     const Broadcast plays(play, position.size(), "play");
-    py::array_t<double> result(std::vector<py::ssize_t>(position.shape(), position.shape() + position.ndim()));
+    py::array_t<double> result(
+        std::vector<py::ssize_t>(position.shape(), position.shape() + position.ndim()));
     const double* in = position.data();
     double* out = result.mutable_data();
     const py::ssize_t size = position.size();
@@ -103,26 +109,33 @@ py::array_t<double> batch(const ForceModel& model, const Array& position, const 
 /// One quantity of the model under one name: a number in, a number out; an array in, an array out.
 template <Member member>
 void bind_quantity(py::class_<ForceModel>& type, const char* name, const char* doc) {
-    type.def(name, &scalar<member>, doc, py::arg("position").noconvert(), py::kw_only(), "velocity"_a = py::none(),
-             "acceleration"_a = py::none(), "direction"_a = py::none(), "play"_a = py::none());
-    type.def(name, &batch<member>, "The same for an array of positions, of any shape.", "position"_a, py::kw_only(),
+    type.def(name, &scalar<member>, doc, py::arg("position").noconvert(), py::kw_only(),
              "velocity"_a = py::none(), "acceleration"_a = py::none(), "direction"_a = py::none(),
              "play"_a = py::none());
+    type.def(name, &batch<member>, "The same for an array of positions, of any shape.", "position"_a,
+             py::kw_only(), "velocity"_a = py::none(), "acceleration"_a = py::none(),
+             "direction"_a = py::none(), "play"_a = py::none());
 }
 
-ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight, const Array& linear, double bias,
-                      const std::optional<Array>& weight_hysteresis, const std::optional<Array>& linear_hysteresis,
-                      std::optional<double> bias_hysteresis, const Array& lower, const Array& upper,
-                      const std::string& below, const std::string& above, std::optional<double> period,
+ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight, const Array& linear,
+                      double bias, const std::optional<Array>& weight_hysteresis,
+                      const std::optional<Array>& linear_hysteresis, std::optional<double> bias_hysteresis,
+                      const Array& lower, const Array& upper, const std::string& below,
+                      const std::string& above, std::optional<double> period,
                       std::optional<double> play_radius) {
-    NetworkParameters network{static_cast<std::size_t>(lower.size()), copied(alpha), copied(beta),
-                              copied(weight),                         copied(linear), bias};
+    NetworkParameters network{static_cast<std::size_t>(lower.size()),
+                              copied(alpha),
+                              copied(beta),
+                              copied(weight),
+                              copied(linear),
+                              bias};
     Domain domain{copied(lower), copied(upper), continuation_named(below, "below"),
                   continuation_named(above, "above"), period};
     const int given = int{weight_hysteresis.has_value()} + int{linear_hysteresis.has_value()} +
                       int{bias_hysteresis.has_value()};
-    detail::require(given == 0 || given == 3,
-                    "weight_hysteresis, linear_hysteresis and bias_hysteresis must be given together or not at all");
+    detail::require(
+        given == 0 || given == 3,
+        "weight_hysteresis, linear_hysteresis and bias_hysteresis must be given together or not at all");
     if (given == 0) {
         detail::require(!play_radius, "play_radius is given for a model without hysteresis");
         return {std::move(network), std::move(domain)};
@@ -149,13 +162,15 @@ double row_force(const ForceModel& model, const double* row) {
     if (const RadialNetwork* radial = model.radial()) {
         return radial->value({row, radial->dimension()});
     }
-    return model.hysteresis() ? model.hysteresis()->sliding(row[0], row[1]).force : model.network()->at(row[0], {}).force;
+    return model.hysteresis() ? model.hysteresis()->sliding(row[0], row[1]).force
+                              : model.network()->at(row[0], {}).force;
 }
 
 py::array_t<double> predict(const ForceModel& model, const Array& x) {
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() ? 1 : 0);
     if (x.ndim() != 2 || static_cast<std::size_t>(x.shape(1)) != columns) {
-        throw std::invalid_argument("X has shape " + shape_of(x) + ", must be (n, " + std::to_string(columns) + ")" +
+        throw std::invalid_argument("X has shape " + shape_of(x) + ", must be (n, " +
+                                    std::to_string(columns) + ")" +
                                     (model.hysteresis() ? ": position and direction" : ""));
     }
     py::array_t<double> result(x.shape(0));
@@ -174,7 +189,8 @@ py::array_t<double> play_states(const ForceModel& model, const Array& position, 
     detail::require(model.hysteresis() != nullptr && model.play_radius().has_value(),
                     "the model has no play radius, so a motion has no play state");
     py::array_t<double> result(position.size());
-    HysteresisNetwork::State state = model.hysteresis()->start(start.value_or(position.size() > 0 ? position.data()[0] : 0.0));
+    HysteresisNetwork::State state =
+        model.hysteresis()->start(start.value_or(position.size() > 0 ? position.data()[0] : 0.0));
     for (py::ssize_t k = 0; k < position.size(); ++k) {
         model.hysteresis()->advance(position.data()[k], state);
         result.mutable_data()[k] = state.play;
@@ -199,27 +215,32 @@ py::object extrapolated(const ForceModel& model, const Array& position) {
 }  // namespace
 
 void bind_model(py::module_& module) {
-    py::class_<ForceModel> type(module, "ForceModel",
-                                "A force identified over d inputs, with its domain and continuations.\n\n"
-                                "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis\n"
-                                "f(x, s) = g(x) + s h(x), h with weights of its own on the same wavelets.");
+    py::class_<ForceModel> type(
+        module, "ForceModel",
+        "A force identified over d inputs, with its domain and continuations.\n\n"
+        "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis\n"
+        "f(x, s) = g(x) + s h(x), h with weights of its own on the same wavelets.");
     type.def(py::init(&make_model), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
-             "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(), "bias_hysteresis"_a = py::none(),
-             "lower"_a, "upper"_a, "below"_a = "linear", "above"_a = "linear", "period"_a = py::none(),
-             "play_radius"_a = py::none(),
-             "alpha, beta (N, d); weight (N,); linear, lower, upper (d,). ValueError names the field that is wrong.");
+             "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
+             "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear",
+             "above"_a = "linear", "period"_a = py::none(), "play_radius"_a = py::none(),
+             "alpha, beta (N, d); weight (N,); linear, lower, upper (d,). ValueError names the field that is "
+             "wrong.");
 
-    bind_quantity<&EnvironmentSample::force>(
-        type, "force",
-        "Force of the object against the tool [N or N*m]; a number in, a number out, an array in, an array out.\n\n"
-        "A hysteresis model needs direction (+1 pressing, -1 releasing) or, where it has a play radius, play, the\n"
-        "state of the play operator. Inputs that the model does not use are ignored; ValueError names one it misses.");
+    bind_quantity<&EnvironmentSample::force>(type, "force",
+                                             "Force of the object against the tool [N or N*m]; a number in, "
+                                             "a number out, an array in, an array out.\n\n"
+                                             "A hysteresis model needs direction (+1 pressing, -1 releasing) "
+                                             "or, where it has a play radius, play, the\n"
+                                             "state of the play operator. Inputs that the model does not use "
+                                             "are ignored; ValueError names one it misses.");
     bind_quantity<&EnvironmentSample::slope>(type, "slope", "Local stiffness df/dx; arguments as for force.");
     bind_quantity<&EnvironmentSample::energy>(type, "energy",
                                               "Stored energy [J] up to a constant; arguments as for force.");
     type.def("predict", &predict, "X"_a,
              "Force at X (n, d), (n,); a hysteresis model takes the direction as one more column.");
-    type.def("extrapolated", &extrapolated, "position"_a, "Whether a position lies outside the identified domain.");
+    type.def("extrapolated", &extrapolated, "position"_a,
+             "Whether a position lies outside the identified domain.");
     type.def("play", &play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
@@ -228,12 +249,15 @@ void bind_model(py::module_& module) {
             require_one_input(model.parameters());
             return model.slope_range();
         },
-             "Smallest and largest slope inside the domain, sliding either way: sampled, not proved.");
+        "Smallest and largest slope inside the domain, sliding either way: sampled, not proved.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
-    type.def_property_readonly("n_wavelets", [](const ForceModel& m) { return m.parameters().weight.size(); });
-    type.def_property_readonly("alpha", [](const ForceModel& m) { return table(m.parameters().alpha, m.parameters().dimension); });
-    type.def_property_readonly("beta", [](const ForceModel& m) { return table(m.parameters().beta, m.parameters().dimension); });
+    type.def_property_readonly("n_wavelets",
+                               [](const ForceModel& m) { return m.parameters().weight.size(); });
+    type.def_property_readonly(
+        "alpha", [](const ForceModel& m) { return table(m.parameters().alpha, m.parameters().dimension); });
+    type.def_property_readonly(
+        "beta", [](const ForceModel& m) { return table(m.parameters().beta, m.parameters().dimension); });
     type.def_property_readonly("weight", [](const ForceModel& m) { return row(m.parameters().weight); });
     type.def_property_readonly("linear", [](const ForceModel& m) { return row(m.parameters().linear); });
     type.def_property_readonly("bias", [](const ForceModel& m) { return m.parameters().bias; });

@@ -36,14 +36,15 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
         const py::gil_scoped_release unlocked;
         trace = simulate(model, scheme, device, hand, ticks, substeps);
     }
-    return py::dict("time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
-                    "velocity"_a = moved(std::move(trace.velocity)),
-                    "handle_start"_a = moved(std::move(trace.handle_start)),
-                    "handle_end"_a = moved(std::move(trace.handle_end)),
-                    "environment_position"_a = moved(std::move(trace.environment_position)),
-                    "force"_a = moved(std::move(trace.force)), "applied"_a = moved(std::move(trace.applied)),
-                    "evaluations"_a = moved(std::move(trace.evaluations)),
-                    "status"_a = moved(numbered(trace.status)), "extrapolated"_a = moved(std::move(trace.extrapolated)));
+    return py::dict(
+        "time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
+        "velocity"_a = moved(std::move(trace.velocity)),
+        "handle_start"_a = moved(std::move(trace.handle_start)),
+        "handle_end"_a = moved(std::move(trace.handle_end)),
+        "environment_position"_a = moved(std::move(trace.environment_position)),
+        "force"_a = moved(std::move(trace.force)), "applied"_a = moved(std::move(trace.applied)),
+        "evaluations"_a = moved(std::move(trace.evaluations)), "status"_a = moved(numbered(trace.status)),
+        "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
 
 py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
@@ -57,7 +58,8 @@ py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
         evaluations.push_back(tick.evaluations);
         status.push_back(tick.status);
     }
-    return py::dict("force"_a = moved(std::move(force)), "environment_position"_a = moved(std::move(position)),
+    return py::dict("force"_a = moved(std::move(force)),
+                    "environment_position"_a = moved(std::move(position)),
                     "evaluations"_a = moved(std::move(evaluations)), "status"_a = moved(numbered(status)));
 }
 
@@ -73,8 +75,8 @@ void bind_rendering(py::module_& module) {
     const std::string structure{structure_names[static_cast<std::size_t>(scheme.structure)]};
     module.attr("structure_names") = py::make_tuple("direct", "massless", "implicit", "explicit");
     py::class_<Scheme>(module, "Scheme", "How a model is rendered: the structure and its numbers, SI units.")
-        .def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping, double mass,
-                         double damping, bool compensated, double play_radius) {
+        .def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
+                         double mass, double damping, bool compensated, double play_radius) {
                  return Scheme{structure_named(name),
                                {coupling_stiffness, coupling_damping},
                                {mass, damping},
@@ -85,9 +87,10 @@ void bind_rendering(py::module_& module) {
              "coupling_damping"_a = scheme.coupling.damping, "mass"_a = scheme.inertia.mass,
              "damping"_a = scheme.inertia.damping, "compensated"_a = scheme.compensated,
              "play_radius"_a = scheme.play_radius)
-        .def_property_readonly(
-            "structure",
-            [](const Scheme& s) { return std::string(structure_names[static_cast<std::size_t>(s.structure)]); })
+        .def_property_readonly("structure",
+                               [](const Scheme& s) {
+                                   return std::string(structure_names[static_cast<std::size_t>(s.structure)]);
+                               })
         .def_property_readonly("coupling_stiffness", [](const Scheme& s) { return s.coupling.stiffness; })
         .def_property_readonly("coupling_damping", [](const Scheme& s) { return s.coupling.damping; })
         .def_property_readonly("mass", [](const Scheme& s) { return s.inertia.mass; })
@@ -98,20 +101,23 @@ void bind_rendering(py::module_& module) {
             "validate", [](const Scheme& s, const ForceModel& model) { validate(s, model); }, "model"_a,
             "ValueError names the field, its value and what would be right for this model.")
         .def("__repr__", [](const Scheme& s) {
-            return "Scheme(structure='" + std::string(structure_names[static_cast<std::size_t>(s.structure)]) +
+            return "Scheme(structure='" +
+                   std::string(structure_names[static_cast<std::size_t>(s.structure)]) +
                    "', coupling_stiffness=" + std::to_string(s.coupling.stiffness) +
                    ", coupling_damping=" + std::to_string(s.coupling.damping) +
-                   ", mass=" + std::to_string(s.inertia.mass) + ", damping=" + std::to_string(s.inertia.damping) +
+                   ", mass=" + std::to_string(s.inertia.mass) +
+                   ", damping=" + std::to_string(s.inertia.damping) +
                    ", compensated=" + (s.compensated ? "True" : "False") +
                    ", play_radius=" + std::to_string(s.play_radius) + ")";
         });
 
-    module.def("simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-               "substeps"_a = 20,
-               "The model rendered on a simulated device held by a simulated hand, in virtual time.\n\n"
-               "Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true\n"
-               "handle when sampled and at the end of the tick that holds the force), environment_position, force\n"
-               "(commanded), applied, evaluations, status, extrapolated.");
+    module.def(
+        "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
+        "substeps"_a = 20,
+        "The model rendered on a simulated device held by a simulated hand, in virtual time.\n\n"
+        "Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true\n"
+        "handle when sampled and at the end of the tick that holds the force), environment_position, force\n"
+        "(commanded), applied, evaluations, status, extrapolated.");
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
@@ -129,7 +135,8 @@ void bind_rendering(py::module_& module) {
         "Arrays (n,) by name: force, environment_position, evaluations, status.");
     module.def(
         "force_driven",
-        [](const ForceModel& model, const Scheme& s, const Array& force, double period_s, double start_position) {
+        [](const ForceModel& model, const Scheme& s, const Array& force, double period_s,
+           double start_position) {
             require_vector(force, "force");
             require_period(period_s);
             std::vector<Rendered> rendered;

@@ -34,8 +34,8 @@ struct Frame {
         if (columns(alpha_array, "alpha") != dimension || columns(beta_array, "beta") != dimension ||
             alpha_array.size() != beta_array.size()) {
             throw std::invalid_argument("alpha has shape " + shape_of(alpha_array) + " and beta " +
-                                        shape_of(beta_array) + ", both must be (N, " + std::to_string(dimension) +
-                                        ") for x of shape " + shape_of(x_array));
+                                        shape_of(beta_array) + ", both must be (N, " +
+                                        std::to_string(dimension) + ") for x of shape " + shape_of(x_array));
         }
         samples = static_cast<std::size_t>(x_array.shape(0));
         wavelets = static_cast<std::size_t>(alpha_array.shape(0));
@@ -79,7 +79,8 @@ Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
     return result;
 }
 
-std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian(const Array& x, const Array& alpha,
+std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian(const Array& x,
+                                                                                 const Array& alpha,
                                                                                  const Array& beta) {
     const Frame frame(x, alpha, beta);
     auto value = columns(frame.samples, frame.wavelets);
@@ -104,7 +105,8 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
                 for (std::size_t j = 0; j < frame.dimension; ++j) {
                     const double dilation = frame.alpha[i * frame.dimension + j];
                     const double by_u = psi.gradient_over_u * frame.scaled(i, k, j);
-                    alpha_out[j][at] = by_u * (frame.x[k * frame.dimension + j] - frame.beta[i * frame.dimension + j]);
+                    alpha_out[j][at] =
+                        by_u * (frame.x[k * frame.dimension + j] - frame.beta[i * frame.dimension + j]);
                     beta_out[j][at] = -dilation * by_u;
                 }
             }
@@ -142,16 +144,17 @@ void bind_wavelet(py::module_& module) {
                "The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.");
     module.def("mexican_hat_slope", py::vectorize([](double u) { return mexican_hat(u).slope; }), "u"_a,
                "psi'(u) = (3u - u^3) exp(-u^2 / 2).");
-    module.def("mexican_hat_curvature", py::vectorize([](double u) { return mexican_hat_curvature(u); }), "u"_a,
-               "psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).");
+    module.def("mexican_hat_curvature", py::vectorize([](double u) { return mexican_hat_curvature(u); }),
+               "u"_a, "psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).");
     module.def("mexican_hat_jerk", py::vectorize([](double u) { return mexican_hat_jerk(u); }), "u"_a,
                "psi'''(u) = (-u^5 + 10u^3 - 15u) exp(-u^2 / 2).");
     module.def("mexican_hat_integral", py::vectorize([](double u) { return mexican_hat(u).integral; }), "u"_a,
                "An antiderivative of psi: -u exp(-u^2 / 2).");
 
-    module.def("wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
-               "psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.\n\n"
-               "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
+    module.def(
+        "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
+        "psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.\n\n"
+        "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
     module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
                "The wavelet columns and their derivatives by the dilations and the translations:\n"
                "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
@@ -165,10 +168,12 @@ void bind_wavelet(py::module_& module) {
     module.def(
         "wavelet_integral_columns",
         [](const Array& x, const Array& alpha, const Array& beta) {
-            return one_dimensional_columns(
-                x, alpha, beta, [](const MexicanHat& psi, double dilation) { return psi.integral / dilation; });
+            return one_dimensional_columns(x, alpha, beta, [](const MexicanHat& psi, double dilation) {
+                return psi.integral / dilation;
+            });
         },
-        "x"_a, "alpha"_a, "beta"_a, "An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).");
+        "x"_a, "alpha"_a, "beta"_a,
+        "An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).");
 }
 
 }  // namespace palpate::bindings

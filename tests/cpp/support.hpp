@@ -47,7 +47,8 @@ inline NetworkParameters random_network(Random& random, std::size_t size, std::s
     return network;
 }
 
-inline Domain unit_domain(Continuation below = Continuation::Linear, Continuation above = Continuation::Linear) {
+inline Domain unit_domain(Continuation below = Continuation::Linear,
+                          Continuation above = Continuation::Linear) {
     return {{0.0}, {1.0}, below, above, std::nullopt};
 }
 
@@ -74,7 +75,8 @@ struct ClickAndWall {
         const double z = (x - 0.4) / 0.004;
         const double softplus = std::max(z, 0.0) + std::log1p(std::exp(-std::abs(z)));
         const double wall_slope = 60.0 / (1.0 + std::exp(-z));
-        return {2.0 * x + click + 60.0 * 0.004 * softplus, 2.0 - 2.0 * u / 0.03 * click + wall_slope, 0.0, false};
+        return {2.0 * x + click + 60.0 * 0.004 * softplus, 2.0 - 2.0 * u / 0.03 * click + wall_slope, 0.0,
+                false};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }

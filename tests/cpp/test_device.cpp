@@ -8,6 +8,7 @@
 #include "palpate/controller.hpp"
 #include "palpate/device/simulated.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/implicit.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -85,7 +86,8 @@ TEST(SimulatedDevice, DelaysLimitsAndRoundsTheForce) {
         ASSERT_TRUE(device.open());
         EXPECT_EQ(device.exchange({7.0}).applied, delay == 0 ? 5.0 : 0.0);
         for (int k = 1; k <= 2 * longest_delay_samples; ++k) {
-            EXPECT_EQ(device.exchange({0.3}).applied, k < delay ? 0.0 : (k == delay ? 5.0 : 0.25)) << delay << " " << k;
+            EXPECT_EQ(device.exchange({0.3}).applied, k < delay ? 0.0 : (k == delay ? 5.0 : 0.25))
+                << delay << " " << k;
         }
     }
 }
@@ -123,7 +125,8 @@ TEST(DeviceProfile, RefusesImpossibleValuesByName) {
         return "accepted";
     };
     EXPECT_EQ(refusal([](DeviceProfile&) {}), "accepted");
-    EXPECT_EQ(refusal([](DeviceProfile& p) { p.inertia = 0.0; }), "device profile: inertia is 0.000000, must be > 0");
+    EXPECT_EQ(refusal([](DeviceProfile& p) { p.inertia = 0.0; }),
+              "device profile: inertia is 0.000000, must be > 0");
     EXPECT_EQ(refusal([](DeviceProfile& p) { p.delay_samples = 17; }),
               "device profile: delay_samples is 17.000000, must be 0 to 16");
     EXPECT_NE(refusal([](DeviceProfile& p) { p.period_s = std::nan(""); }), "accepted");
@@ -147,7 +150,8 @@ class ScriptedDevice {
 TEST(Controller, SendsZeroForceOnAnyReadingThatIsNotSound) {
     ScriptedDevice device;
     device.next.position = 0.2;
-    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}}, ForceLimit{5.0}};
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
+                                                                ForceLimit{5.0}};
     ASSERT_EQ(controller.start(), Status::Ok);
     for (const Status bad : {Status::Timeout, Status::Lost, Status::Fault}) {
         device.next.status = Status::Ok;
@@ -166,10 +170,23 @@ TEST(Controller, SendsZeroForceOnAnyReadingThatIsNotSound) {
     EXPECT_EQ(device.sent, 0.0);
 }
 
+TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
+    const VirtualCoupling coupling;
+    Implicit expected{test::Spring{10.0}, Inertia{}, coupling, 1e-3};
+    expected.reset(0.2);
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice, Implicit<test::Spring>> controller{
+        device, Implicit{test::Spring{10.0}, Inertia{}, coupling, 1e-3}, ForceLimit{5.0}};
+    (void)controller.start();
+    EXPECT_EQ(controller.tick().command.force, expected.step(0.2).force);
+}
+
 TEST(Controller, ClipsToTheForceLimitAndSaysSo) {
     ScriptedDevice device;
     device.next.position = -3.0;
-    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}}, ForceLimit{5.0}};
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
+                                                                ForceLimit{5.0}};
     (void)controller.start();
     const Tick tick = controller.tick();
     EXPECT_EQ(device.sent, -5.0);

@@ -10,14 +10,18 @@
 namespace palpate {
 namespace {
 
-std::complex<double> unit(double omega) { return std::polar(1.0, omega * paper_sample_time); }
+std::complex<double> unit(double omega) {
+    return std::polar(1.0, omega * paper_sample_time);
+}
 
 std::complex<double> product(FilterPair pair, FilterDesign design, double omega) {
     const EnvironmentFilters filters = environment_filters(pair, design);
     return filters.g1.at(unit(omega)) * filters.i1.at(unit(omega));
 }
 
-double degrees(std::complex<double> value) { return std::arg(value) * 180.0 / std::numbers::pi; }
+double degrees(std::complex<double> value) {
+    return std::arg(value) * 180.0 / std::numbers::pi;
+}
 
 // spec section 4: "poles 0.836 and 0.819 (179 and 199 rad/s)"
 TEST(Filters, DifferentiatorsRollOffWhereThePaperPutThem) {
@@ -38,12 +42,14 @@ TEST(Filters, LowFrequencyGainOfThePaperIsSlightlyOff) {
 
 TEST(Filters, MatchedGainIsExactAtLowFrequency) {
     constexpr double low = 1e-3;
-    EXPECT_NEAR(environment_filters(FilterPair::Explicit, FilterDesign::Matched).g1.numerator()[1], 29.58, 5e-3);
+    EXPECT_NEAR(environment_filters(FilterPair::Explicit, FilterDesign::Matched).g1.numerator()[1], 29.58,
+                5e-3);
     EXPECT_NEAR(std::abs(product(FilterPair::Explicit, FilterDesign::Matched, low)), 1.0, 1e-9);
     EXPECT_NEAR(std::abs(product(FilterPair::Implicit, FilterDesign::Matched, low)), 1.0, 1e-9);
 }
 
-// spec section 4: "at 100 rad/s |G I| is 0.78 with -53 degrees (implicit pair), 0.82 with -62 degrees (explicit)"
+// spec section 4: "at 100 rad/s |G I| is 0.78 with -53 degrees (implicit pair), 0.82 with -62 degrees
+// (explicit)"
 TEST(Filters, AtHundredRadiansPerSecondTheMatchIsGone) {
     const auto implicit = product(FilterPair::Implicit, FilterDesign::Paper, 100.0);
     EXPECT_NEAR(std::abs(implicit), 0.78, 5e-3);

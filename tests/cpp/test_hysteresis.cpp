@@ -28,7 +28,9 @@ HysteresisNetwork random_hysteresis(Random& random) {
     }
     loss.linear = uniform(random, 0.0, 0.5);
     loss.bias = deepest;
-    const auto side = [&] { return uniform(random, 0.0, 1.0) < 0.5 ? Continuation::Linear : Continuation::Free; };
+    const auto side = [&] {
+        return uniform(random, 0.0, 1.0) < 0.5 ? Continuation::Linear : Continuation::Free;
+    };
     return {network, loss, test::unit_domain(side(), side()), std::exp(uniform(random, -6.0, -1.0))};
 }
 
@@ -72,7 +74,8 @@ TEST(Hysteresis, IsLosslessWhileItSticks) {
         const double target = x + uniform(random, -0.9, 0.9) * std::min(object.play_radius(), 0.3);
         const double before = object.at(x, state).energy;
         const double done = work(object, state, x, target);
-        EXPECT_NEAR(done, object.at(target, state).energy - before, 1e-4 * (1.0 + std::abs(done))) << "case " << k;
+        EXPECT_NEAR(done, object.at(target, state).energy - before, 1e-4 * (1.0 + std::abs(done)))
+            << "case " << k;
     }
 }
 
@@ -111,7 +114,8 @@ TEST(Hysteresis, SlopeBelongsToTheForceInStickAndSlide) {
         const HysteresisNetwork::State state{uniform(random, 0.3, 0.6)};
         for (const double offset : {-2.0, -0.5, 0.5, 2.0}) {
             const double x = state.play + offset * std::min(object.play_radius(), 0.1);
-            if (x < 0.01 || x > 0.99 || std::abs(std::abs(x - state.play) / object.play_radius() - 1.0) < 1e-3) {
+            if (x < 0.01 || x > 0.99 ||
+                std::abs(std::abs(x - state.play) / object.play_radius() - 1.0) < 1e-3) {
                 continue;
             }
             constexpr double h = 1e-7;
@@ -119,6 +123,17 @@ TEST(Hysteresis, SlopeBelongsToTheForceInStickAndSlide) {
             EXPECT_NEAR(object.at(x, state).slope, slope, 1e-4 * (1.0 + std::abs(slope)));
         }
     }
+}
+
+TEST(Hysteresis, LossDiesOutWithTheForceWhereContactIsLost) {
+    // g(0) = 0.1 falls with max|g| / travel = 2.1 and is zero at -1/21; h goes with it.
+    const HysteresisNetwork object{
+        {1, {}, {}, {}, {2.0}, 0.1}, {{}, 0.0, 0.05}, test::unit_domain(Continuation::Free), 0.01};
+    EXPECT_NEAR(object.loss().at(-0.5 / 21.0).value, 0.025, 1e-12);
+    EXPECT_NEAR(object.sliding(-0.5 / 21.0, -1.0).force, 0.025, 1e-12);
+    EXPECT_NEAR(object.loss().at(-1.0 / 21.0 + 1e-9).value, 0.0, 1e-8);
+    EXPECT_EQ(object.loss().at(-0.1).value, 0.0);
+    EXPECT_EQ(object.loss().at(1.5).value, 0.05);
 }
 
 TEST(Hysteresis, RefusesAPlayRadiusOfZero) {

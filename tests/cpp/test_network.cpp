@@ -18,14 +18,16 @@ using test::random_network;
 using test::uniform;
 using test::unit_domain;
 
-double force(const WaveletNetwork& network, double x) { return network.at(x, {}).force; }
+double force(const WaveletNetwork& network, double x) {
+    return network.at(x, {}).force;
+}
 
 TEST(Network, SumsItsWavelets) {
     const NetworkParameters parameters{1, {10.0, 3.0}, {0.2, 0.7}, {0.5, -2.0}, {1.5}, 0.25};
     const WaveletNetwork network{parameters, unit_domain()};
     for (double x = 0.0; x <= 1.0; x += 0.05) {
-        const double expected = 0.5 * mexican_hat(10.0 * (x - 0.2)).value - 2.0 * mexican_hat(3.0 * (x - 0.7)).value +
-                                1.5 * x + 0.25;
+        const double expected = 0.5 * mexican_hat(10.0 * (x - 0.2)).value -
+                                2.0 * mexican_hat(3.0 * (x - 0.7)).value + 1.5 * x + 0.25;
         EXPECT_NEAR(force(network, x), expected, 1e-14);
     }
 }
@@ -33,8 +35,11 @@ TEST(Network, SumsItsWavelets) {
 TEST(Network, SlopeAndEnergyBelongToTheForceInsideAndOutside) {
     Random random{1};
     for (int k = 0; k < cases(200); ++k) {
-        const auto side = [&] { return uniform(random, 0.0, 1.0) < 0.5 ? Continuation::Linear : Continuation::Free; };
-        const WaveletNetwork network{random_network(random, static_cast<std::size_t>(k % 9)), unit_domain(side(), side())};
+        const auto side = [&] {
+            return uniform(random, 0.0, 1.0) < 0.5 ? Continuation::Linear : Continuation::Free;
+        };
+        const WaveletNetwork network{random_network(random, static_cast<std::size_t>(k % 9)),
+                                     unit_domain(side(), side())};
         const double x = uniform(random, -0.5, 1.5);
         constexpr double h = 1e-6;
         const bool at_a_knot = std::abs(x) < 2 * h || std::abs(x - 1.0) < 2 * h ||
@@ -44,7 +49,8 @@ TEST(Network, SlopeAndEnergyBelongToTheForceInsideAndOutside) {
         }
         const double slope = (force(network, x + h) - force(network, x - h)) / (2.0 * h);
         const double work = (network.at(x + h, {}).energy - network.at(x - h, {}).energy) / (2.0 * h);
-        EXPECT_NEAR(network.at(x, {}).slope, slope, 1e-4 * (1.0 + std::abs(slope))) << "case " << k << " x " << x;
+        EXPECT_NEAR(network.at(x, {}).slope, slope, 1e-4 * (1.0 + std::abs(slope)))
+            << "case " << k << " x " << x;
         EXPECT_NEAR(force(network, x), work, 1e-6 * (1.0 + std::abs(work))) << "case " << k << " x " << x;
     }
 }
@@ -52,7 +58,8 @@ TEST(Network, SlopeAndEnergyBelongToTheForceInsideAndOutside) {
 TEST(Network, IsContinuousAtItsEdgesAndFlagsExtrapolation) {
     Random random{2};
     for (int k = 0; k < cases(200); ++k) {
-        const WaveletNetwork network{random_network(random, 5), unit_domain(Continuation::Free, Continuation::Linear)};
+        const WaveletNetwork network{random_network(random, 5),
+                                     unit_domain(Continuation::Free, Continuation::Linear)};
         for (const double edge : {0.0, 1.0}) {
             EXPECT_NEAR(force(network, edge - 1e-12), force(network, edge + 1e-12), 1e-8);
         }
@@ -104,15 +111,31 @@ TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyGoesOn) {
             EXPECT_FALSE(knob.at(x + turns, {}).extrapolated);
         }
         EXPECT_NEAR(force(knob, 1.0 - 1e-10), force(knob, 1.0 + 1e-10), 1e-6);
+        for (const double seam : {-2.0, -1.0, 0.0, 1.0, 2.0, 3.0}) {
+            const Curve before = knob.curve().at(seam - 1e-10);
+            const Curve after = knob.curve().at(seam + 1e-10);
+            EXPECT_NEAR(before.integral, after.integral, 1e-6) << seam;
+            EXPECT_NEAR(before.double_integral, after.double_integral, 1e-6) << seam;
+        }
         constexpr double h = 1e-5;
         for (const double at : {x - 2.0, x, x + 1.0}) {
             const double work = (knob.at(at + h, {}).energy - knob.at(at - h, {}).energy) / (2.0 * h);
             EXPECT_NEAR(work, force(knob, at), 1e-3) << at;
             const double first =
-                (knob.curve().at(at + h).double_integral - knob.curve().at(at - h).double_integral) / (2.0 * h);
+                (knob.curve().at(at + h).double_integral - knob.curve().at(at - h).double_integral) /
+                (2.0 * h);
             EXPECT_NEAR(first, knob.curve().at(at).integral, 1e-5) << at;
         }
     }
+}
+
+TEST(Network, ClosingTheSeamLeavesTheMiddleOfThePeriod) {
+    Random random{8};
+    const NetworkParameters parameters = random_network(random, 5);
+    Domain domain{{0.2}, {1.2}, {}, {}, 1.0};
+    const WaveletNetwork knob{parameters, domain};
+    domain.period.reset();
+    EXPECT_NEAR(force(knob, 0.7), force(WaveletNetwork{parameters, domain}, 0.7), 1e-12);
 }
 
 TEST(Network, NanInIsNanOut) {
@@ -143,7 +166,8 @@ TEST(Network, RefusesImpossibleNumbersByName) {
     EXPECT_EQ(refusal(bad, unit_domain()), "weight[0] is not a finite number");
     EXPECT_EQ(refusal(good, {{1.0}, {1.0}, {}, {}, std::nullopt}),
               "lower[0] is 1.000000, must be below upper 1.000000");
-    EXPECT_EQ(refusal(good, {{0.0}, {1.0}, {}, {}, 2.0}), "period is 2.000000, must equal upper - lower, 1.000000");
+    EXPECT_EQ(refusal(good, {{0.0}, {1.0}, {}, {}, 2.0}),
+              "period is 2.000000, must equal upper - lower, 1.000000");
 }
 
 }  // namespace

@@ -19,8 +19,10 @@ using test::uniform;
 TEST(RadialNetwork, GradientAgreesWithDifferences) {
     Random random{5};
     for (int k = 0; k < cases(100); ++k) {
-        const RadialNetwork network{random_network(random, 7, 3), {{0, 0, 0}, {1, 1, 1}, {}, {}, std::nullopt}};
-        std::array<double, 3> x{uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99)};
+        const RadialNetwork network{random_network(random, 7, 3),
+                                    {{0, 0, 0}, {1, 1, 1}, {}, {}, std::nullopt}};
+        std::array<double, 3> x{uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99),
+                                uniform(random, 0.01, 0.99)};
         std::array<double, 3> gradient{};
         network.gradient(x, gradient);
         for (std::size_t j = 0; j < 3; ++j) {

@@ -21,7 +21,8 @@ TEST(LoadLineSolver, SolvesAnyUniqueLoadLineOfRandomNetworks) {
     for (int k = 0; k < cases(2000); ++k) {
         const WaveletNetwork network{test::random_network(random, static_cast<std::size_t>(k % 12)),
                                      test::unit_domain(Continuation::Free)};
-        const double lowest = std::min(network.curve().slope_range().first, -network.curve().extent().largest_force);
+        const double lowest =
+            std::min(network.curve().slope_range().first, -network.curve().extent().largest_force);
         const double p = -lowest + std::exp(uniform(random, -2.0, 8.0));
         const double q = uniform(random, -2.0, 2.0) * p;
         const Solution solution = LoadLineSolver{}.solve(network, {}, {p, q}, uniform(random, -2.0, 3.0));
@@ -60,26 +61,55 @@ TEST(LoadLineSolver, SaysWhyItStopped) {
     EXPECT_EQ(hasty.solve(network, {}, {100.0, 50.0}, 0.0).status, Status::MaxIterations);
 }
 
+TEST(LoadLineSolver, SaysWhenItStandsWhereTheEnvironmentFallsFaster) {
+    // f(y) + p y rises by -2 + 1 a unit: 0 is a solution, but no motion would rest there.
+    const Solution solution = LoadLineSolver{}.solve(test::Spring{-2.0}, {}, {1.0, 0.0}, 0.0);
+    EXPECT_EQ(solution.status, Status::NotUnique);
+}
+
+TEST(LoadLineSolver, FindsARootWhateverTheSlopesInItsBracket) {
+    const test::ClickAndWall object;
+    Random random{23};
+    for (int k = 0; k < cases(2000); ++k) {
+        const LoadLine line{uniform(random, 0.5, 14.0), uniform(random, 0.0, 3.0)};
+        const Solution solution = LoadLineSolver{}.solve(object, {}, line, uniform(random, -0.5, 0.7));
+        const double residual =
+            object.at(solution.position, {}).force + line.slope * solution.position - line.intercept;
+        ASSERT_EQ(solution.status, Status::Ok) << line.slope << " " << line.intercept;
+        ASSERT_NEAR(residual, 0.0, 1e-9) << line.slope << " " << line.intercept;
+    }
+}
+
 // spec section 5: "from the previous solution, the first root met in the direction of -residual"
-TEST(LoadLineSolver, FollowsTheBranchThatASlowMotionWould) {
-    // A snap-through whose falling flank (-15) is steeper than the load line rises (5): three roots in between.
+TEST(LoadLineSolver, EndsOnTheFirstRootInTheDirectionOfTheResidual) {
+    // A snap-through whose falling flank (-15) is steeper than the load line rises (5): up to three roots.
     const test::ClickAndWall object;
     const double p = 5.0;
     LoadLineSolver solver;
     solver.longest_step = 0.005;
-    double last = 0.0;
-    double jump = 0.0;
-    for (double q = 0.0; q <= 2.2; q += 1e-3) {
-        const Solution solution = solver.solve(object, {}, {p, q}, last);
-        ASSERT_EQ(solution.status, Status::Ok) << q;
-        // The first root above the last solution: no sign change of the residual in between.
-        for (double x = last + 1e-4; x < solution.position - 1e-4; x += 1e-4) {
-            ASSERT_LT(object.at(x, {}).force + p * x - q, 1e-6) << "a root was stepped over at " << x;
+    solver.max_evaluations = 200;
+    const auto residual = [&](double x, double q) { return object.at(x, {}).force + p * x - q; };
+    Random random{22};
+    int several = 0;
+    for (int k = 0; k < cases(300); ++k) {
+        const double start = uniform(random, 0.0, 0.4);
+        const double q = uniform(random, 0.3, 2.2);
+        const Solution solution = solver.solve(object, {}, {p, q}, start);
+        ASSERT_EQ(solution.status, Status::Ok) << start << " " << q;
+        const double direction = residual(start, q) < 0.0 ? 1.0 : -1.0;
+        const double distance = direction * (solution.position - start);
+        ASSERT_GE(distance, 0.0) << start << " " << q;
+        for (double along = 0.0; along < distance - 1e-3; along += 1e-3) {
+            ASSERT_LT(direction * residual(start + direction * along, q), 1e-9)
+                << "a root was stepped over from " << start << " at q = " << q;
         }
-        jump = std::max(jump, solution.position - last);
-        last = solution.position;
+        int roots = 0;
+        for (double x = -0.5; x < 1.0; x += 1e-3) {
+            roots += residual(x, q) < 0.0 && residual(x + 1e-3, q) >= 0.0 ? 1 : 0;
+        }
+        several += roots > 1 ? 1 : 0;
     }
-    EXPECT_GT(jump, 0.01) << "the load line must have snapped through";
+    EXPECT_GT(several, 20) << "the case is about lines with several roots";
 }
 
 }  // namespace

@@ -59,7 +59,9 @@ void expect_within_5_percent(ForceError measured, double at_end, double at_insta
 }
 
 // spec section 6, the table: "direct | 0.00362 | 0.00037"
-TEST(Scene, Direct) { expect_within_5_percent(force_error(Direct{ClickAndWall{}}), 0.00362, 0.00037); }
+TEST(Scene, Direct) {
+    expect_within_5_percent(force_error(Direct{ClickAndWall{}}), 0.00362, 0.00037);
+}
 
 // spec section 6, the table: "massless, compensated | 0.00362 | 0.00037"
 TEST(Scene, MasslessCompensated) {
@@ -75,20 +77,20 @@ TEST(Scene, Massless) {
 
 // spec section 6, the table: "implicit, m = 0.001, B_o = 0 | 0.1231 | 0.1227"
 TEST(Scene, ImplicitUndamped) {
-    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}), 0.1231,
-                            0.1227);
+    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}),
+                            0.1231, 0.1227);
 }
 
 // spec section 6, the table: "implicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
 TEST(Scene, ImplicitDamped) {
-    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}), 0.2530,
-                            0.2532);
+    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
+                            0.2530, 0.2532);
 }
 
 // spec section 6, the table: "explicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
 TEST(Scene, ExplicitDamped) {
-    expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}), 0.2530,
-                            0.2532);
+    expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
+                            0.2530, 0.2532);
 }
 
 /// Largest |y| in the last tenth of a free motion that began away from equilibrium, over the first tenth's.
@@ -119,10 +121,12 @@ TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
     EXPECT_GT(free_motion(3010.0), 10.0);
 }
 
-// spec section 5: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's oscillation)"
+// spec section 5: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's
+// oscillation)"
 TEST(ExplicitLimit, WithoutDampingTheOscillationNeitherDiesNorGrows) {
     for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
-        const double ratio = growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, coupling, period}, 20'000);
+        const double ratio =
+            growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, coupling, period}, 20'000);
         EXPECT_NEAR(ratio, 1.0, 0.01) << stiffness;
     }
     EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, coupling, period}, 4000), 10.0);
@@ -147,7 +151,8 @@ TEST(ExplicitLimit, BehindTheCouplingTheCouplingCountsToo) {
 TEST(Implicit, IsStableAtAMillion) {
     for (const double stiffness : {0.1, 3000.0, 1e6}) {
         for (const double damping : {0.0, 0.5}) {
-            const double ratio = growth(Implicit{Spring{stiffness}, Inertia{0.001, damping}, coupling, period}, 20'000);
+            const double ratio =
+                growth(Implicit{Spring{stiffness}, Inertia{0.001, damping}, coupling, period}, 20'000);
             EXPECT_LE(ratio, 1.0) << stiffness << " " << damping;
         }
     }
@@ -264,12 +269,14 @@ TEST(Scheme, RefusesWhatCannotBeRendered) {
     scheme = {};
     EXPECT_THROW((void)force_driven(spring_model(5.0), scheme, {}, period, 0.0), std::invalid_argument);
     EXPECT_THROW((void)structure_named("implied"), std::invalid_argument);
-    const ForceModel loose{NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
+    const ForceModel loose{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
     EXPECT_THROW((void)simulate(loose, {}, {}, {}, 10), std::invalid_argument);
 }
 
 TEST(Scheme, RendersHysteresisWithItsPlayRadius) {
-    const ForceModel both{NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.2}, test::unit_domain(), {}};
+    const ForceModel both{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.2}, test::unit_domain(), {}};
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
     scheme.play_radius = 0.005;

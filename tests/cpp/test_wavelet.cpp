@@ -9,7 +9,9 @@
 namespace palpate {
 namespace {
 
-double psi(double u) { return mexican_hat(u).value; }
+double psi(double u) {
+    return mexican_hat(u).value;
+}
 
 // spec section 1: "|psi| < 9e-5 at 5, < 6e-7 at 6, < 1.5e-14 at 8.5, < 3e-15 at 8.7"
 TEST(Wavelet, IsNegligibleFarFromItsCentre) {
@@ -24,7 +26,9 @@ TEST(Wavelet, IsNegligibleFarFromItsCentre) {
 }
 
 // spec section 1: "the slope needs a wider support (1.2e-13 alpha at 8.5)"
-TEST(Wavelet, SlopeNeedsAWiderSupport) { EXPECT_NEAR(std::abs(mexican_hat(8.5).slope), 1.2e-13, 0.05e-13); }
+TEST(Wavelet, SlopeNeedsAWiderSupport) {
+    EXPECT_NEAR(std::abs(mexican_hat(8.5).slope), 1.2e-13, 0.05e-13);
+}
 
 // spec section 1: "|psi'| <= 1.38012 (1.3801190461 at |u| = sqrt(3 - sqrt 6) = 0.741964)"
 TEST(Wavelet, SlopeHasItsBoundAtTheSteepestPoint) {
@@ -70,7 +74,8 @@ TEST(Wavelet, DerivativesAndAntiderivativesAgreeWithDifferences) {
         EXPECT_NEAR(slope_of([](double v) { return mexican_hat(v).slope; }), mexican_hat_curvature(u), 1e-9);
         EXPECT_NEAR(slope_of(mexican_hat_curvature), mexican_hat_jerk(u), 1e-9);
         EXPECT_NEAR(slope_of([](double v) { return mexican_hat(v).integral; }), mexican_hat(u).value, 1e-9);
-        EXPECT_NEAR(slope_of([](double v) { return mexican_hat(v).double_integral; }), mexican_hat(u).integral, 1e-9);
+        EXPECT_NEAR(slope_of([](double v) { return mexican_hat(v).double_integral; }),
+                    mexican_hat(u).integral, 1e-9);
     }
 }
 

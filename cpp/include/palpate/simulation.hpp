@@ -30,8 +30,9 @@ struct Trace {
 
 /// A model rendered on a simulated device, hand included, in virtual time: the same controller tick as in
 /// real time, as fast as it goes.
-[[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
-                                    const Hand& hand, std::size_t ticks, int substeps = 20) {
+[[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
+                                    const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
+                                    int substeps = 20) {
     return with_structure(model, scheme, profile.period_s, [&](auto structure) {
         SimulatedDevice device{profile, hand, substeps};
         (void)device.open();
@@ -87,9 +88,9 @@ struct Trace {
             }
             return rendered;
         } else {
-            throw std::invalid_argument("structure is " +
-                                        std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
-                                        ", must be implicit or explicit: only an inertia turns force into motion");
+            throw std::invalid_argument(
+                "structure is " + std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
+                ", must be implicit or explicit: only an inertia turns force into motion");
         }
     });
 }

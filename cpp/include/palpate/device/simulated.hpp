@@ -49,7 +49,8 @@ class SimulatedDevice {
         const double measured = encoded(position_);
         const double velocity = (measured - last_reading_) / profile_.period_s;
         last_reading_ = measured;
-        return {measured, velocity, applied_, std::numeric_limits<double>::quiet_NaN(), time(), tick_, Status::Ok};
+        return {measured, velocity, applied_,  std::numeric_limits<double>::quiet_NaN(),
+                time(),   tick_,    Status::Ok};
     }
 
     void close() noexcept { applied_ = 0.0; }

@@ -37,7 +37,8 @@ class TransferFunction {
 
     /// H(z) at any z, for instance e^{j omega T}.
     [[nodiscard]] std::complex<double> at(std::complex<double> z) const noexcept {
-        return ((numerator_[0] * z + numerator_[1]) * z + numerator_[2]) / ((z + denominator_[1]) * z + denominator_[2]);
+        return ((numerator_[0] * z + numerator_[1]) * z + numerator_[2]) /
+               ((z + denominator_[1]) * z + denominator_[2]);
     }
 
     /// The roots of the denominator.

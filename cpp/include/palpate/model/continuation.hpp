@@ -26,8 +26,8 @@ enum class Continuation : std::uint8_t {
 /// A curve beyond one edge of its domain: a line through the edge, cut off `reach` away from it.
 /// The force is continuous at the edge and at the cut; the slope jumps.
 struct EdgeLine {
-    double edge = 0.0;                                        ///< position of the edge
-    Curve at_edge;                                            ///< the curve there; its slope is the line's
+    double edge = 0.0;                                       ///< position of the edge
+    Curve at_edge;                                           ///< the curve there; its slope is the line's
     double reach = std::numeric_limits<double>::infinity();  ///< distance after which the force is zero
 
     [[nodiscard]] Curve at(double x) const noexcept {

@@ -22,11 +22,11 @@ struct Stateless {};
 /// changes nothing; `advance` commits the position that was rendered; `start` is the state of an object
 /// that has rested at x.
 template <class E>
-concept Environment =
-    requires(const E& environment, double x, const typename E::State& state, typename E::State& mutable_state) {
-        { environment.at(x, state) } noexcept -> std::same_as<EnvironmentSample>;
-        { environment.advance(x, mutable_state) } noexcept;
-        { environment.start(x) } noexcept -> std::same_as<typename E::State>;
-    };
+concept Environment = requires(const E& environment, double x, const typename E::State& state,
+                               typename E::State& mutable_state) {
+    { environment.at(x, state) } noexcept -> std::same_as<EnvironmentSample>;
+    { environment.advance(x, mutable_state) } noexcept;
+    { environment.start(x) } noexcept -> std::same_as<typename E::State>;
+};
 
 }  // namespace palpate

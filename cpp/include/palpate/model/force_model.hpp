@@ -21,14 +21,18 @@ class ForceModel {
   public:
     using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork>;
 
-    ForceModel(NetworkParameters network, Domain domain) : kind_{make_network(std::move(network), std::move(domain))} {}
+    ForceModel(NetworkParameters network, Domain domain)
+        : kind_{make_network(std::move(network), std::move(domain))} {}
 
-    ForceModel(NetworkParameters network, LossParameters loss, Domain domain, std::optional<double> play_radius)
+    ForceModel(NetworkParameters network, LossParameters loss, Domain domain,
+               std::optional<double> play_radius)
         : kind_{make_hysteresis(std::move(network), std::move(loss), std::move(domain), play_radius)},
           play_radius_{play_radius} {}
 
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
-    [[nodiscard]] const WaveletNetwork* network() const noexcept { return std::get_if<WaveletNetwork>(&kind_); }
+    [[nodiscard]] const WaveletNetwork* network() const noexcept {
+        return std::get_if<WaveletNetwork>(&kind_);
+    }
     [[nodiscard]] const HysteresisNetwork* hysteresis() const noexcept {
         return std::get_if<HysteresisNetwork>(&kind_);
     }
@@ -36,7 +40,8 @@ class ForceModel {
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept {
-        return std::visit([](const auto& kind) -> const NetworkParameters& { return kind.parameters(); }, kind_);
+        return std::visit([](const auto& kind) -> const NetworkParameters& { return kind.parameters(); },
+                          kind_);
     }
     [[nodiscard]] const Domain& domain() const noexcept {
         return std::visit([](const auto& kind) -> const Domain& { return kind.domain(); }, kind_);
@@ -79,7 +84,8 @@ class ForceModel {
 
     static HysteresisNetwork make_hysteresis(NetworkParameters network, LossParameters loss, Domain domain,
                                              std::optional<double> play_radius) {
-        detail::require(domain.lower.size() == 1 && domain.upper.size() == 1, "a hysteresis network has one input");
+        detail::require(domain.lower.size() == 1 && domain.upper.size() == 1,
+                        "a hysteresis network has one input");
         const double radius = play_radius.value_or(0.01 * std::abs(domain.upper[0] - domain.lower[0]));
         return {std::move(network), std::move(loss), std::move(domain), radius};
     }

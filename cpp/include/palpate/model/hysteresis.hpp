@@ -90,7 +90,8 @@ class HysteresisNetwork {
                         "play_radius is " + std::to_string(play_radius) + ", must be > 0");
     }
 
-    [[nodiscard]] NetworkCurve continued_loss(const NetworkParameters& network, const LossParameters& loss) const {
+    [[nodiscard]] NetworkCurve continued_loss(const NetworkParameters& network,
+                                              const LossParameters& loss) const {
         NetworkParameters h = network;
         h.weight = loss.weight;
         h.linear = {loss.linear};
@@ -98,8 +99,10 @@ class HysteresisNetwork {
         NetworkCurve curve{h, domain_};
         const double travel = domain_.upper[0] - domain_.lower[0];
         // h dies out together with g, but never over less than 2 % of the travel: no jump, no steep flank.
-        const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward, Continuation continuation) {
-            return continue_loss(edge.edge, edge.at_edge, outward, continuation, std::max(g.reach, 0.02 * travel));
+        const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
+                              Continuation continuation) {
+            return continue_loss(edge.edge, edge.at_edge, outward, continuation,
+                                 std::max(g.reach, 0.02 * travel));
         };
         curve.continue_with(line(force_.below(), curve.below(), -1.0, domain_.below),
                             line(force_.above(), curve.above(), +1.0, domain_.above));

@@ -50,7 +50,9 @@ class NetworkCurve {
         return inside(x);
     }
 
-    [[nodiscard]] bool extrapolated(double x) const noexcept { return !periodic_ && (x < lower_ || x > upper_); }
+    [[nodiscard]] bool extrapolated(double x) const noexcept {
+        return !periodic_ && (x < lower_ || x > upper_);
+    }
 
     /// Eq. 4 and nothing else: value, slope and antiderivatives from one exponential a wavelet.
     [[nodiscard]] Curve inside(double x) const noexcept {
@@ -89,12 +91,15 @@ class NetworkCurve {
     }
 
     /// Smallest and largest slope inside the domain: sampled densely, not proved.
-    [[nodiscard]] std::pair<double, double> slope_range() const noexcept { return slope_range(lower_, upper_); }
+    [[nodiscard]] std::pair<double, double> slope_range() const noexcept {
+        return slope_range(lower_, upper_);
+    }
 
     [[nodiscard]] CurveExtent extent() const noexcept {
         CurveExtent extent{upper_ - lower_, 0.0, 0.0};
-        visit(lower_, upper_,
-              [&](double x) { extent.largest_force = std::max(extent.largest_force, std::abs(inside(x).value)); });
+        visit(lower_, upper_, [&](double x) {
+            extent.largest_force = std::max(extent.largest_force, std::abs(inside(x).value));
+        });
         // The outer 2 % are left out: a fit is least sure of its slope at the ends of its data.
         const double margin = 0.02 * extent.travel;
         extent.slope_cap = std::max(0.0, slope_range(lower_ + margin, upper_ - margin).second);

@@ -41,7 +41,8 @@ inline void require(bool holds, const std::string& sentence) {
 
 inline void require_finite(const std::vector<double>& values, const char* field) {
     for (std::size_t i = 0; i < values.size(); ++i) {
-        require(std::isfinite(values[i]), std::string(field) + "[" + std::to_string(i) + "] is not a finite number");
+        require(std::isfinite(values[i]),
+                std::string(field) + "[" + std::to_string(i) + "] is not a finite number");
     }
 }
 
@@ -71,20 +72,20 @@ inline void validate(const NetworkParameters& network, const Domain& domain) {
     detail::require_finite(domain.lower, "lower");
     detail::require_finite(domain.upper, "upper");
     for (std::size_t i = 0; i < network.alpha.size(); ++i) {
-        require(network.alpha[i] > 0.0, "alpha[" + std::to_string(i / d) + "][" + std::to_string(i % d) + "] is " +
-                                            std::to_string(network.alpha[i]) + ", must be > 0");
+        require(network.alpha[i] > 0.0, "alpha[" + std::to_string(i / d) + "][" + std::to_string(i % d) +
+                                            "] is " + std::to_string(network.alpha[i]) + ", must be > 0");
     }
     for (std::size_t j = 0; j < d; ++j) {
-        require(domain.lower[j] < domain.upper[j], "lower[" + std::to_string(j) + "] is " +
-                                                       std::to_string(domain.lower[j]) + ", must be below upper " +
-                                                       std::to_string(domain.upper[j]));
+        require(domain.lower[j] < domain.upper[j],
+                "lower[" + std::to_string(j) + "] is " + std::to_string(domain.lower[j]) +
+                    ", must be below upper " + std::to_string(domain.upper[j]));
     }
     if (domain.period) {
         const double travel = domain.upper[0] - domain.lower[0];
         require(d == 1, "period is set, but the network has " + std::to_string(d) + " inputs, must have 1");
-        require(std::abs(*domain.period - travel) <= 1e-9 * travel, "period is " + std::to_string(*domain.period) +
-                                                                        ", must equal upper - lower, " +
-                                                                        std::to_string(travel));
+        require(std::abs(*domain.period - travel) <= 1e-9 * travel,
+                "period is " + std::to_string(*domain.period) + ", must equal upper - lower, " +
+                    std::to_string(travel));
     }
 }
 

@@ -47,8 +47,8 @@ struct MexicanHat {
 
 /// The radial Mexican hat of d inputs, psi(u) = (|u|^2 - d) e^{-|u|^2/2}, as functions of r^2 = |u|^2.
 struct RadialMexicanHat {
-    double value;             ///< (r^2 - d) E
-    double gradient_over_u;   ///< (d + 2 - r^2) E; the gradient is this times u
+    double value;            ///< (r^2 - d) E
+    double gradient_over_u;  ///< (d + 2 - r^2) E; the gradient is this times u
 };
 
 [[nodiscard]] inline RadialMexicanHat radial_mexican_hat(double square, double dimension) noexcept {

@@ -52,7 +52,8 @@ class Compensated {
     };
 
     [[nodiscard]] Solution solve(double shifted, const State& state) const noexcept {
-        return LoadLineSolver{}.solve(Negated{environment_}, state, {stiffness_, stiffness_ * shifted}, shifted);
+        return LoadLineSolver{}.solve(Negated{environment_}, state, {stiffness_, stiffness_ * shifted},
+                                      shifted);
     }
 
     E environment_;

@@ -22,7 +22,8 @@ namespace palpate {
 template <Environment E>
 class Implicit {
   public:
-    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, LoadLineSolver solver = {})
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period,
+             LoadLineSolver solver = {})
         : environment_{std::move(environment)},
           inertia_{inertia},
           coupling_{coupling},

@@ -23,7 +23,8 @@ namespace palpate {
 
 enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit };
 
-inline constexpr std::array<std::string_view, 4> structure_names{"direct", "massless", "implicit", "explicit"};
+inline constexpr std::array<std::string_view, 4> structure_names{"direct", "massless", "implicit",
+                                                                 "explicit"};
 
 [[nodiscard]] inline StructureKind structure_named(std::string_view name) {
     for (std::size_t k = 0; k < structure_names.size(); ++k) {
@@ -35,7 +36,8 @@ inline constexpr std::array<std::string_view, 4> structure_names{"direct", "mass
                                 "', must be direct, massless, implicit or explicit");
 }
 
-/// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are ignored.
+/// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are
+/// ignored.
 struct Scheme {
     StructureKind structure = StructureKind::Massless;
     VirtualCoupling coupling;
@@ -66,8 +68,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     if (scheme.compensated) {
         detail::require(scheme.structure != StructureKind::Direct,
                         "compensated is set for the direct structure, which has no coupling to compensate");
-        detail::require(!model.hysteresis(),
-                        "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
+        detail::require(
+            !model.hysteresis(),
+            "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
         const double steepest = std::max(model.slope_range().second, 0.0);
         detail::require(steepest <= 0.9 * scheme.coupling.stiffness,
                         "coupling_stiffness is " + std::to_string(scheme.coupling.stiffness) +
@@ -93,7 +96,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const double coupling = scheme.coupling.stiffness + scheme.coupling.damping / period_s;
     const double inertia = (scheme.inertia.mass / period_s + scheme.inertia.damping) / period_s;
-    const auto build = [&](const auto& environment, const LoadLineSolver& massless, const LoadLineSolver& implicit) {
+    const auto build = [&](const auto& environment, const LoadLineSolver& massless,
+                           const LoadLineSolver& implicit) {
         switch (scheme.structure) {
             case StructureKind::Direct:
                 return visit(Direct{environment});

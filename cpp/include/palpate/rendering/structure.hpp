@@ -11,11 +11,11 @@ namespace palpate {
 
 /// What one tick of a structure yields.
 struct Rendered {
-    double force = 0.0;                  ///< on the device, pushing it out of the object [N or N*m]
-    double environment_position = 0.0;   ///< y, where the virtual object was evaluated
-    int evaluations = 0;                 ///< of the environment
+    double force = 0.0;                 ///< on the device, pushing it out of the object [N or N*m]
+    double environment_position = 0.0;  ///< y, where the virtual object was evaluated
+    int evaluations = 0;                ///< of the environment
     Status status = Status::Ok;
-    bool extrapolated = false;           ///< y lies outside the model's data
+    bool extrapolated = false;  ///< y lies outside the model's data
 };
 
 /// A way to turn the measured position of the device into a force, once a tick. `reset` puts the object at

@@ -26,7 +26,7 @@ struct Solution {
 /// which is the branch a slow motion would follow.
 struct LoadLineSolver {
     int max_evaluations = 64;
-    double tolerance = 1e-13;                                      ///< on |residual / slope|, times 1 + |y|
+    double tolerance = 1e-13;                                       ///< on |residual / slope|, times 1 + |y|
     double longest_step = std::numeric_limits<double>::infinity();  ///< while searching the bracket
 
     template <Environment E>
