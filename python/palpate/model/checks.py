@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check what a model file holds, and name the first field that is wrong."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import InputError
+from .schema import VERSION, ModelFile
+
+_PERIOD_TOLERANCE = 1e-9
+"""How far, as a share of the travel, the period may be from upper - lower."""
+
+_SHOWN = 40
+"""Characters of a wrong value that an error shows."""
+
+
+def checked(content: Any) -> ModelFile:
+    """Check the parsed content of a model file.
+
+    Raises
+    ------
+    InputError
+        ``network.alpha[0][0] is -1.0: must be > 0`` and the like: field path, value, what would be right.
+    """
+    if not isinstance(content, dict):
+        raise InputError(f"the file holds {_shown(content)}: must be an object")
+    _require_known_version(content)
+    _require_finite(content, "")
+    try:
+        file = ModelFile.model_validate(content)
+    except ValidationError as error:
+        raise InputError(_sentence(error.errors()[0])) from None
+    _check_network(file)
+    _check_domain(file)
+    _check_rest(file)
+    return file
+
+
+def _require_known_version(content: dict[str, Any]) -> None:
+    """Before anything else: a file of another version may differ in every other field."""
+    version = content.get("version")
+    if type(version) is int and version != VERSION:
+        raise InputError(f"version is {version}: must be {VERSION}, the version that this palpate reads")
+
+
+def _require_finite(value: Any, path: str) -> None:
+    """NaN and Infinity are no JSON, but Python's parser lets them in, and reads 1e999 as infinity."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{path} is {value}: must be a finite number")
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _require_finite(item, f"{path}.{key}" if path else str(key))
+    if isinstance(value, list):
+        for index, item in enumerate(value):
+            _require_finite(item, f"{path}[{index}]")
+
+
+def _sentence(error: Any) -> str:
+    path = ""
+    for part in error["loc"]:
+        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
+    context = error.get("ctx", {})
+    kind = error["type"]
+    if kind == "missing":
+        return f"{path} is missing"
+    if kind == "extra_forbidden":
+        return f"{path} is not a key of this format (free keys go under notes)"
+    right = {
+        "greater_than": f"> {context.get('gt', 0):g}",
+        "greater_than_equal": f">= {context.get('ge', 0):g}",
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "string_type": "text",
+        "list_type": "a list",
+        "dict_type": "an object",
+        "model_type": "an object",
+        "literal_error": context.get("expected", ""),
+    }.get(kind, error["msg"])
+    return f"{path} is {_shown(error['input'])}: must be {right}"
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
+
+
+def _require(holds: bool, path: str, found: Any, right: str) -> None:
+    if not holds:
+        raise InputError(f"{path} is {_shown(found)}: must be {right}")
+
+
+def _require_length(values: list[Any], length: int, path: str, meaning: str) -> None:
+    if len(values) != length:
+        raise InputError(f"{path} has {len(values)} values: must have {length}, {meaning}")
+
+
+def _check_network(file: ModelFile) -> None:
+    network, d, n = file.network, file.network.dimension, len(file.network.alpha)
+    one_each, one_per_input = "one for each wavelet of alpha", "one for each dimension"
+    for name, rows in (("alpha", network.alpha), ("beta", network.beta)):
+        _require_length(rows, n, f"network.{name}", one_each)
+        for index, row in enumerate(rows):
+            _require_length(row, d, f"network.{name}[{index}]", one_per_input)
+    _require_length(network.weight, n, "network.weight", one_each)
+    _require_length(network.linear, d, "network.linear", one_per_input)
+    hysteretic = network.weight_hysteresis is not None
+    for name in ("linear_hysteresis", "bias_hysteresis"):
+        value = getattr(network, name)
+        right = "given, because weight_hysteresis is" if hysteretic else "null, because weight_hysteresis is"
+        _require((value is not None) == hysteretic, f"network.{name}", value, right)
+    if network.weight_hysteresis is not None and network.linear_hysteresis is not None:
+        _require(d == 1, "network.dimension", d, "1 in a model with hysteresis")
+        _require_length(network.weight_hysteresis, n, "network.weight_hysteresis", one_each)
+        _require_length(network.linear_hysteresis, d, "network.linear_hysteresis", one_per_input)
+    _require(
+        file.kind != "hysteresis" or hysteretic, "kind", file.kind, "another kind: weight_hysteresis is null"
+    )
+    _require(
+        file.kind != "position" or not hysteretic, "kind", file.kind, "hysteresis: weight_hysteresis is given"
+    )
+    _require_length(file.inputs, d, "inputs", one_per_input)
+    if not hysteretic:
+        _require(
+            file.play_radius is None, "play_radius", file.play_radius, "null in a model without hysteresis"
+        )
+
+
+def _check_domain(file: ModelFile) -> None:
+    d, domain, period = file.network.dimension, file.domain, file.continuation.period
+    for name in ("lower", "upper"):
+        _require_length(getattr(domain, name), d, f"domain.{name}", "one for each dimension")
+    for index, (low, high) in enumerate(zip(domain.lower, domain.upper, strict=True)):
+        _require(low < high, f"domain.lower[{index}]", low, f"below domain.upper[{index}] = {high}")
+    if period is not None:
+        travel = domain.upper[0] - domain.lower[0]
+        _require(d == 1, "continuation.period", period, "null in a model of several inputs")
+        _require(
+            abs(period - travel) <= _PERIOD_TOLERANCE * travel,
+            "continuation.period",
+            period,
+            f"domain.upper - domain.lower = {travel}",
+        )
+
+
+def _check_rest(file: ModelFile) -> None:
+    n = len(file.network.alpha)
+    bounds = file.slope_bounds
+    if bounds is not None:
+        _require(
+            bounds.min <= bounds.max,
+            "slope_bounds.min",
+            bounds.min,
+            f"at most slope_bounds.max = {bounds.max}",
+        )
+    _require(
+        file.fit.n_wavelets == n, "fit.n_wavelets", file.fit.n_wavelets, f"{n}, the wavelets of the network"
+    )

@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model: an identified environment, with everything that says where it came from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .._core import ForceModel, __version__
+from .._typing import Float1D
+from ..errors import InputError
+from ..recording import Source
+from .checks import checked
+from .fit import Fit, PathStep
+from .jsontext import read_json, write_json
+from .schema import VERSION, ModelFile, Network
+from .text import describe
+
+_HELD_OUT = "held_out_every"
+"""Note under which a file says that every k-th row of the data was not used."""
+
+
+class Model(ForceModel):
+    """A force identified from a recording (paper eq. 4), with its domain, units, data and history.
+
+    ``force``, ``slope``, ``energy``, ``predict``, ``play`` and ``extrapolated`` are those of the compiled
+    :class:`palpate._core.ForceModel`, as are the network's arrays.
+
+    Parameters
+    ----------
+    kind : {"position", "hysteresis", "position_velocity", "general"}
+        "hysteresis": f(x, s) = g(x) + s h(x).
+    inputs : sequence of str
+        One name for each dimension of the network, such as ("position",); the direction of a hysteresis model
+        is none of them.
+    units : mapping
+        {"position": "rad" | "m" | "count" | "", "force": "N*m" | "N" | "A" | ""}.
+    alpha, beta : (N, d) array_like
+        Dilations and translations; N may be 0.
+    weight : (N,) array_like
+    linear : (d,) array_like
+    bias : float
+    weight_hysteresis, linear_hysteresis, bias_hysteresis : optional
+        (N,), (d,) and a number: h, on the wavelets of g; all three or none.
+    lower, upper : (d,) array_like
+        Domain: the box that the data covered.
+    below, above : {"linear", "free"}
+        Continuation outside the domain.
+    period : float, optional
+        Period of a model that repeats.
+    play_radius : float, optional
+        Play radius of the hysteresis [m or rad], where it is known.
+    fit : Fit
+        How the identification ended.
+    data : Source
+        What it was identified on.
+    mass, damping : float, optional
+        Mass and viscous damping that were fitted beside the force.
+    slope_bounds : (min, max), optional
+        Of df/dx over the domain; measured when not given (d = 1).
+    plan, certificate : mapping, optional
+        How the model is to be rendered, and what was proved of that.
+    notes : mapping, optional
+        Anything else worth keeping in the file.
+    created_by : str, optional
+        Who wrote the file; this palpate when not given.
+
+    Raises
+    ------
+    ValueError
+        A shape or value is wrong; the message names the field.
+    """
+
+    def __init__(
+        self,
+        *,
+        kind: str,
+        inputs: Sequence[str],
+        units: Mapping[str, str],
+        alpha: npt.ArrayLike,
+        beta: npt.ArrayLike,
+        weight: npt.ArrayLike,
+        linear: npt.ArrayLike,
+        bias: float,
+        weight_hysteresis: npt.ArrayLike | None = None,
+        linear_hysteresis: npt.ArrayLike | None = None,
+        bias_hysteresis: float | None = None,
+        lower: npt.ArrayLike,
+        upper: npt.ArrayLike,
+        below: str = "linear",
+        above: str = "linear",
+        period: float | None = None,
+        play_radius: float | None = None,
+        fit: Fit,
+        data: Source,
+        mass: float | None = None,
+        damping: float | None = None,
+        slope_bounds: tuple[float, float] | None = None,
+        plan: Mapping[str, Any] | None = None,
+        certificate: Mapping[str, Any] | None = None,
+        notes: Mapping[str, Any] | None = None,
+        created_by: str | None = None,
+    ) -> None:
+        super().__init__(
+            alpha=alpha,
+            beta=beta,
+            weight=weight,
+            linear=linear,
+            bias=bias,
+            weight_hysteresis=weight_hysteresis,
+            linear_hysteresis=linear_hysteresis,
+            bias_hysteresis=bias_hysteresis,
+            lower=lower,
+            upper=upper,
+            below=below,
+            above=above,
+            period=period,
+            play_radius=play_radius,
+        )
+        self.kind = kind
+        self.inputs = tuple(inputs)
+        self.units = dict(units)
+        self.fit = fit
+        self.data = data
+        self.mass = mass
+        self.damping = damping
+        if slope_bounds is None and self.dimension == 1:
+            slope_bounds = self.slope_range()
+        self.slope_bounds = slope_bounds
+        self.plan = None if plan is None else dict(plan)
+        self.certificate = None if certificate is None else dict(certificate)
+        self.notes = dict(notes or {})
+        self.created_by = created_by or f"palpate {__version__}"
+        checked(self.to_dict())
+
+    @property
+    def n_parameters(self) -> int:
+        """Every fitted real number, dilations and translations included."""
+        return self.fit.n_parameters
+
+    @property
+    def stop_reason(self) -> str:
+        """Why identification stopped adding wavelets."""
+        return self.fit.stop_reason
+
+    @property
+    def path(self) -> Sequence[PathStep]:
+        """What identification considered: number of wavelets against error and criterion."""
+        return self.fit.path
+
+    @property
+    def domain(self) -> tuple[Float1D, Float1D]:
+        """(lower, upper), each (d,)."""
+        return self.lower, self.upper
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of a model file."""
+        notes = dict(self.notes)
+        if self.data.held_out_every:
+            notes[_HELD_OUT] = self.data.held_out_every
+        losses = self.weight_hysteresis, self.linear_hysteresis
+        bounds = self.slope_bounds
+        return {
+            "format": "palpate-model",
+            "version": VERSION,
+            "created_by": self.created_by,
+            "kind": self.kind,
+            "units": self.units,
+            "inputs": list(self.inputs),
+            "network": {
+                "dimension": self.dimension,
+                "alpha": self.alpha.tolist(),
+                "beta": self.beta.tolist(),
+                "weight": self.weight.tolist(),
+                "weight_hysteresis": None if losses[0] is None else losses[0].tolist(),
+                "linear": self.linear.tolist(),
+                "bias": self.bias,
+                "linear_hysteresis": None if losses[1] is None else losses[1].tolist(),
+                "bias_hysteresis": self.bias_hysteresis,
+            },
+            "play_radius": self.play_radius,
+            "mass": self.mass,
+            "damping": self.damping,
+            "domain": {"lower": self.lower.tolist(), "upper": self.upper.tolist()},
+            "continuation": {"below": self.below, "above": self.above, "period": self.period},
+            "slope_bounds": None if bounds is None else {"min": bounds[0], "max": bounds[1]},
+            "data": {
+                "sha256": self.data.sha256,
+                "files": list(self.data.files),
+                "rows": self.data.rows,
+                "columns": dict(self.data.columns),
+            },
+            "fit": _fit_record(self.fit),
+            "plan": self.plan,
+            "certificate": self.certificate,
+            "notes": notes,
+        }
+
+    @classmethod
+    def from_dict(cls, content: Any) -> Model:
+        """A model from the content of a model file.
+
+        Raises
+        ------
+        InputError
+            A field is missing, unknown or wrong; the message gives its path and value.
+        """
+        file: ModelFile = checked(content)
+        held_out_every = file.notes.get(_HELD_OUT, 0)
+        bounds = file.slope_bounds
+        return cls(
+            kind=file.kind,
+            inputs=file.inputs,
+            units=file.units.model_dump(),
+            **_network(file.network),
+            lower=file.domain.lower,
+            upper=file.domain.upper,
+            **file.continuation.model_dump(),
+            play_radius=file.play_radius,
+            fit=Fit(**file.fit.model_dump()),
+            data=Source(
+                files=tuple(file.data.files),
+                sha256=file.data.sha256,
+                rows=file.data.rows,
+                columns=file.data.columns,
+                held_out_every=held_out_every if type(held_out_every) is int else 0,
+            ),
+            mass=file.mass,
+            damping=file.damping,
+            slope_bounds=None if bounds is None else (bounds.min, bounds.max),
+            plan=file.plan,
+            certificate=file.certificate,
+            notes=file.notes,
+            created_by=file.created_by,
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model file; it appears under its name only when it is complete.
+
+        Raises
+        ------
+        InputError
+            The folder does not exist or cannot be written, or a field holds what a model file cannot.
+        """
+        content = self.to_dict()
+        checked(content)
+        return write_json(Path(path), content)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Model.from_dict, (self.to_dict(),)
+
+    def __str__(self) -> str:
+        return describe(self)
+
+    def __repr__(self) -> str:
+        return f"<palpate.Model: {self.kind}, {self.n_wavelets} wavelets, {self.n_parameters} parameters>"
+
+
+def _fit_record(fit: Fit) -> dict[str, Any]:
+    """The record of a fit, with NumPy's numbers turned into Python's."""
+    return {
+        "rung": fit.rung,
+        "stop_reason": fit.stop_reason,
+        "nrmse": float(fit.nrmse),
+        "n_wavelets": int(fit.n_wavelets),
+        "n_parameters": int(fit.n_parameters),
+        "path": [
+            {
+                "n_wavelets": int(step["n_wavelets"]),
+                "rmse": float(step["rmse"]),
+                "criterion": None if step["criterion"] is None else float(step["criterion"]),
+                "rung": step["rung"],
+            }
+            for step in fit.path
+        ],
+    }
+
+
+def _network(network: Network) -> dict[str, Any]:
+    arrays = network.model_dump(exclude={"dimension"})
+    for name in ("alpha", "beta"):
+        # An empty list has lost its second dimension.
+        arrays[name] = np.reshape(arrays[name], (-1, network.dimension))
+    return arrays
+
+
+def load_model(path: str | os.PathLike[str]) -> Model:
+    """Read a model file.
+
+    Raises
+    ------
+    InputError
+        The file is not there or not JSON, or a field is missing, unknown or wrong: one sentence with the
+        file's name, the field's path and the value.
+    """
+    file = Path(path)
+    content = read_json(file)
+    try:
+        return Model.from_dict(content)
+    except ValueError as error:
+        raise InputError(f"{file}: {error}") from None

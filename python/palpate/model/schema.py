@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The model file, version 1: its fields, what each may hold, and the JSON schema published from them.
+
+``python -m palpate.model.schema`` prints the JSON schema.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+VERSION = 1
+"""Version of the file format that is read and written."""
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class _Part(BaseModel):
+    """Strict types, and no key that is not listed."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Units(_Part):
+    """SI units; "" where the data was handed over in SI without saying in which unit."""
+
+    position: Literal["rad", "m", "count", ""]
+    force: Literal["N*m", "N", "A", ""]
+
+
+class Network(_Part):
+    """f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b; with hysteresis f(x, s) = g(x) + s h(x)."""
+
+    dimension: Annotated[int, Field(ge=1)]
+    """Number of inputs d"""
+    alpha: list[list[Positive]]
+    """(N, d) dilations"""
+    beta: list[list[Number]]
+    """(N, d) translations"""
+    weight: list[Number]
+    """(N,)"""
+    weight_hysteresis: list[Number] | None
+    """(N,) weights of h, or null"""
+    linear: list[Number]
+    """(d,)"""
+    bias: Number
+    linear_hysteresis: list[Number] | None
+    """(d,) or null"""
+    bias_hysteresis: Number | None
+
+
+class Domain(_Part):
+    """The box that the data covered."""
+
+    lower: list[Number]
+    """(d,)"""
+    upper: list[Number]
+    """(d,)"""
+
+
+class Continuation(_Part):
+    """What the force is outside the domain: a line, a line that never pulls, or a period."""
+
+    below: Literal["linear", "free"]
+    above: Literal["linear", "free"]
+    period: Positive | None
+
+
+class SlopeBounds(_Part):
+    """Smallest and largest df/dx measured over the domain."""
+
+    min: Number
+    max: Number
+
+
+class Data(_Part):
+    """What the model was identified on."""
+
+    sha256: str
+    """SHA-256 of each file, separated by spaces"""
+    files: list[str]
+    rows: Count
+    columns: dict[str, str]
+
+
+class Step(_Part):
+    """One model that identification considered."""
+
+    n_wavelets: Count
+    rmse: NotNegative
+    criterion: Number | None
+    rung: str
+
+
+class FitRecord(_Part):
+    """How the identification ended."""
+
+    rung: str
+    stop_reason: str
+    nrmse: NotNegative
+    n_wavelets: Count
+    n_parameters: Count
+    path: list[Step]
+
+
+class ModelFile(_Part):
+    """A model of a force, identified by palpate. SI units."""
+
+    format: Literal["palpate-model"]
+    version: Literal[1]
+    created_by: str
+    kind: Literal["position", "hysteresis", "position_velocity", "general"]
+    units: Units
+    inputs: list[str]
+    """One name for each dimension of the network"""
+    network: Network
+    play_radius: Positive | None
+    mass: NotNegative | None
+    damping: NotNegative | None
+    domain: Domain
+    continuation: Continuation
+    slope_bounds: SlopeBounds | None
+    data: Data
+    fit: FitRecord
+    plan: dict[str, Any] | None
+    certificate: dict[str, Any] | None
+    notes: dict[str, Any] = {}
+    """Anything; the only place where keys are free"""
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of a model file (draft 2020-12). Shapes that depend on each other are not in it."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **ModelFile.model_json_schema(),
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=2))
