@@ -141,7 +141,7 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
         return {std::move(network), std::move(domain)};
     }
     detail::require_size(copied(*linear_hysteresis), 1, "linear_hysteresis");
-    return {std::move(network),
+    return {network,
             {copied(*weight_hysteresis), linear_hysteresis->data()[0], *bias_hysteresis},
             std::move(domain),
             play_radius};

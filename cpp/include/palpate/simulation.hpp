@@ -61,7 +61,7 @@ struct Trace {
 /// A recorded motion moves the device: what force would have been rendered?
 [[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
                                                          std::span<const double> position, double period_s) {
-    return with_structure(model, scheme, period_s, [&](auto structure) {
+    return with_structure(model, scheme, period_s, [&](auto&& structure) {
         std::vector<Rendered> rendered;
         rendered.reserve(position.size());
         if (!position.empty()) {
@@ -78,7 +78,7 @@ struct Trace {
 [[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
                                                         std::span<const double> force, double period_s,
                                                         double start_position) {
-    return with_structure(model, scheme, period_s, [&](auto structure) -> std::vector<Rendered> {
+    return with_structure(model, scheme, period_s, [&](auto&& structure) -> std::vector<Rendered> {
         if constexpr (requires { structure.drive(0.0); }) {
             std::vector<Rendered> rendered;
             rendered.reserve(force.size());

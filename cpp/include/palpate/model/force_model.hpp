@@ -24,10 +24,9 @@ class ForceModel {
     ForceModel(NetworkParameters network, Domain domain)
         : kind_{make_network(std::move(network), std::move(domain))} {}
 
-    ForceModel(NetworkParameters network, LossParameters loss, Domain domain,
+    ForceModel(const NetworkParameters& network, const LossParameters& loss, Domain domain,
                std::optional<double> play_radius)
-        : kind_{make_hysteresis(std::move(network), std::move(loss), std::move(domain), play_radius)},
-          play_radius_{play_radius} {}
+        : kind_{make_hysteresis(network, loss, std::move(domain), play_radius)}, play_radius_{play_radius} {}
 
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
     [[nodiscard]] const WaveletNetwork* network() const noexcept {
@@ -40,11 +39,16 @@ class ForceModel {
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept {
-        return std::visit([](const auto& kind) -> const NetworkParameters& { return kind.parameters(); },
-                          kind_);
+        if (const WaveletNetwork* single = network()) {
+            return single->parameters();
+        }
+        return hysteresis() != nullptr ? hysteresis()->parameters() : radial()->parameters();
     }
     [[nodiscard]] const Domain& domain() const noexcept {
-        return std::visit([](const auto& kind) -> const Domain& { return kind.domain(); }, kind_);
+        if (const WaveletNetwork* single = network()) {
+            return single->domain();
+        }
+        return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
     /// Smallest and largest slope inside the domain (d = 1), sliding either way: sampled, not proved.
@@ -82,12 +86,12 @@ class ForceModel {
         return RadialNetwork{std::move(network), std::move(domain)};
     }
 
-    static HysteresisNetwork make_hysteresis(NetworkParameters network, LossParameters loss, Domain domain,
-                                             std::optional<double> play_radius) {
+    static HysteresisNetwork make_hysteresis(const NetworkParameters& network, const LossParameters& loss,
+                                             Domain domain, std::optional<double> play_radius) {
         detail::require(domain.lower.size() == 1 && domain.upper.size() == 1,
                         "a hysteresis network has one input");
         const double radius = play_radius.value_or(0.01 * std::abs(domain.upper[0] - domain.lower[0]));
-        return {std::move(network), std::move(loss), std::move(domain), radius};
+        return {network, loss, std::move(domain), radius};
     }
 
     Kind kind_;

@@ -34,7 +34,8 @@ class HysteresisNetwork {
         double play = 0.0;  ///< the play operator's position
     };
 
-    HysteresisNetwork(NetworkParameters network, LossParameters loss, Domain domain, double play_radius)
+    HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, Domain domain,
+                      double play_radius)
         : domain_{std::move(domain)},
           play_radius_{play_radius},
           force_{(check(network, loss, domain_, play_radius), continued_force(network, domain_))},
