@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a recorded force over position to a force that is rendered.
+
+    recording = palpate.read_recording("press.csv")
+    model = palpate.identify(recording)
+    print(palpate.verify(model, palpate.read_recording("fresh.csv")).nrmse)
+    model.save("press.json")
+
+Names are loaded when they are first used, so that the command line answers at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._core import DeviceProfile, Hand, Scheme, __version__
+    from .errors import InputError
+    from .identification import IdentifyOptions, frame_bounds, identify
+    from .model import Model, load_model
+    from .planning import Plan, simulate
+    from .recording import Recording, read_recording
+    from .verification import Verification, verify
+
+_HOME = {
+    "DeviceProfile": "_core",
+    "Hand": "_core",
+    "Scheme": "_core",
+    "__version__": "_core",
+    "InputError": "errors",
+    "IdentifyOptions": "identification",
+    "frame_bounds": "identification",
+    "identify": "identification",
+    "Model": "model",
+    "load_model": "model",
+    "Plan": "planning",
+    "simulate": "planning",
+    "Recording": "recording",
+    "read_recording": "recording",
+    "Verification": "verification",
+    "verify": "verification",
+}
+"""Where each public name lives."""
+
+__all__ = [
+    "DeviceProfile",
+    "Hand",
+    "IdentifyOptions",
+    "InputError",
+    "Model",
+    "Plan",
+    "Recording",
+    "Scheme",
+    "Verification",
+    "__version__",
+    "frame_bounds",
+    "identify",
+    "load_model",
+    "read_recording",
+    "simulate",
+    "verify",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'palpate' has no attribute {name!r}")
+    try:
+        home = import_module(f".{_HOME[name]}", __name__)
+    except ModuleNotFoundError as missing:
+        if missing.name == "palpate._core":
+            raise ImportError(
+                "palpate._core is not built: run `pip install .` or `make test` first"
+            ) from missing
+        raise
+    return getattr(home, name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The entry point: find the verb, run it, turn every ending into an exit code and at most one sentence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+from .ending import ending_of
+
+_VERBS = {
+    "identify": "Identify a model from recordings.",
+    "verify": "Compare a model with a recording.",
+    "simulate": "Render a model on a simulated device.",
+    "show": "Print a model for a person.",
+    "demo": "Identify, verify and render a simulated sample.",
+}
+"""Every verb with its line in the help; its file is imported only when it is used."""
+
+
+class _Verbs(click.Group):
+    """A group whose commands live in the module of their name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _VERBS:
+            return None
+        command = getattr(import_module(f".{cmd_name}", __package__), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Verbs"):
+            formatter.write_dl(list(_VERBS.items()))
+
+
+def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from .._core import __version__
+
+        click.echo(f"palpate {__version__}")
+        ctx.exit()
+
+
+@click.group(
+    cls=_Verbs,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+    epilog="Example: palpate identify press.csv -o press.json",
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    show_default=False,
+    callback=_print_version,
+    help="Print the version.",
+)
+def palpate() -> None:
+    """From a recorded force over position to a force that is rendered."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    0 done; 1 the work failed; 2 bad usage or bad input; 130 Ctrl-C, and the output does not exist. A failure
+    is one sentence on standard error, or with --json {"error": "..."} on standard output.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        with palpate.make_context("palpate", given) as context:
+            palpate.invoke(context)
+        sys.stdout.flush()
+    except BaseException as error:
+        ending = ending_of(error)
+        ending.tell(as_json="--json" in given)
+        return ending.code
+    return 0

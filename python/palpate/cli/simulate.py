@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate simulate: a model rendered on a simulated device."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .._core import Scheme, structure_names
+from .arguments import PATH, json_option, plot_option
+from .ending import WorkError
+from .figures import figure_file, require_figure_name
+from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
+
+if TYPE_CHECKING:
+    from ..planning import Plan
+    from ..recording import Recording
+
+_DEFAULT = Scheme()
+
+
+@click.command(
+    no_args_is_help=True,
+    epilog="Example: palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv",
+)
+@click.argument("model_file", metavar="MODEL.json", type=PATH)
+@click.option(
+    "--structure",
+    type=click.Choice(structure_names),
+    default=_DEFAULT.structure,
+    help="How the force is computed.",
+)
+@click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model.")
+@click.option(
+    "--coupling-stiffness",
+    type=float,
+    show_default=f"{_DEFAULT.coupling_stiffness:g} N*m/rad, scaled to the model",
+    help="K_c, in force per position of the model's units.",
+)
+@click.option(
+    "--coupling-damping",
+    type=float,
+    show_default=f"{_DEFAULT.coupling_damping:g} N*m*s/rad, scaled",
+    help="B_c, in force per velocity.",
+)
+@click.option(
+    "--mass",
+    type=float,
+    show_default=f"{_DEFAULT.mass:g} kg*m^2, scaled",
+    help="m of implicit and explicit, in force per acceleration.",
+)
+@click.option(
+    "--damping",
+    type=float,
+    show_default=f"{_DEFAULT.damping:g} N*m*s/rad, scaled",
+    help="B_o of implicit and explicit, in force per velocity.",
+)
+@click.option(
+    "--play-radius",
+    type=float,
+    show_default="the model's, or 1 % of its travel",
+    help="r of a model with hysteresis, in its position unit.",
+)
+@click.option("--duration-s", type=float, default=4.0, help="Simulated time.")
+@click.option("-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Write what was rendered.")
+@plot_option("rendered force beside the model's, differences beneath")
+@json_option
+def simulate(
+    model_file: Path, duration_s: float, output: Path | None, plot: Path | None, as_json: bool, **scheme: Any
+) -> None:
+    """Render a model in closed loop with a simulated device and a simulated hand.
+
+    The hand sweeps through the model's domain twice in four seconds. An angle is rendered on a knob with a
+    16-bit encoder at 1 kHz; for other units the knob is scaled to the model's travel and force. Nothing is
+    certified: this shows what happens, and proves nothing.
+    """
+    from ..model import load_model
+    from ..planning import Plan, bench_for, force_error
+    from ..planning import simulate as render
+
+    if plot is not None:
+        require_figure_name(plot)
+    for target in filter(None, (output, plot)):
+        require_writable(target, inputs=(model_file,))
+    require_distinct(output, plot)
+    model = load_model(model_file)
+    bench = bench_for(model)
+    plan = Plan(model, bench.scheme(model, **scheme))
+    talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated")
+    rendered = render(plan, bench.device, bench.hand, duration_s)
+    error = force_error(plan, rendered)
+    endings = Counter(rendered.columns["status"])
+    if endings["NonFinite"]:
+        raise WorkError(
+            f"the rendering ran away: {endings['NonFinite']} of {len(rendered)} ticks had no finite force"
+        )
+    extrapolated = float(rendered.columns["extrapolated"].mean())
+    result = {
+        "structure": plan.structure,
+        "duration_s": duration_s,
+        "ticks": len(rendered),
+        "force_error_end": error.end,
+        "force_error_instant": error.instant,
+        "extrapolated": extrapolated,
+        "status": dict(endings),
+    }
+    with finishing():
+        if output is not None:
+            rendered.write(output)
+        if plot is not None:
+            _draw(plot, plan, rendered)
+        if as_json:
+            print_json(result)
+            return
+        unit = rendered.units["force"]
+        print_numbers(
+            {
+                "structure": plan.structure,
+                "duration": f"{number(duration_s)} s",
+                "force error, end of tick": f"{number(error.end)} {unit} RMS",
+                "force error, sampled": f"{number(error.instant)} {unit} RMS",
+                "extrapolated": f"{100 * extrapolated:.3g} %",
+                "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
+            }
+        )
+
+
+def _draw(path: Path, plan: Plan, rendered: Recording) -> None:
+    from ..planning import force_at
+    from ..plotting import draw_measured_and_modelled
+
+    modelled = force_at(plan, rendered.position)
+    with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
+        draw_measured_and_modelled(
+            force, residual, rendered, modelled, one_curve=not plan.model.hysteretic, seen="rendered"
+        )

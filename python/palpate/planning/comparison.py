@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same model through every structure, on the same bench."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._core import DeviceProfile, Hand, Scheme
+from ..errors import InputError
+from ..model import Model
+from ..recording import Recording
+from .bench import Bench
+from .plan import Plan
+from .simulation import ForceError, describe, force_error, simulate
+
+_COMPENSATED_DAMPING = 0.25
+"""Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One structure of the comparison: what it rendered, or why it was refused."""
+
+    scheme: Scheme
+    recording: Recording | None
+    error: ForceError | None
+    refused: str | None
+    """One sentence, or None"""
+
+    @property
+    def name(self) -> str:
+        return describe(self.scheme)
+
+
+def compare_structures(model: Model, bench: Bench, duration: float) -> tuple[Comparison, ...]:
+    """Render a model with each structure and measure its force error.
+
+    The order is that of what they lose: direct; massless behind a coupling, with the coupling's spring taken
+    out of the model; massless; implicit with mass alone, then with the damping that the explicit structure
+    needs; explicit. A structure that the model or the device rules out is refused with its reason.
+
+    Parameters
+    ----------
+    model : Model
+        A model of one position.
+    bench : Bench
+        Device, hand and coupling, from :func:`bench_for`.
+    duration : float
+        Simulated time of each rendering [s].
+    """
+    quarter = _COMPENSATED_DAMPING * bench.scheme(model).coupling_damping
+    schemes = (
+        bench.scheme(model, structure="direct"),
+        bench.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
+        bench.scheme(model, structure="massless"),
+        bench.scheme(model, structure="implicit", damping=0.0),
+        bench.scheme(model, structure="implicit"),
+        bench.scheme(model, structure="explicit"),
+    )
+    return tuple(_render(model, scheme, bench.device, bench.hand, duration) for scheme in schemes)
+
+
+def _render(model: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, duration: float) -> Comparison:
+    try:
+        plan = Plan(model, scheme)
+        recording = simulate(plan, device, hand, duration)
+    except InputError as error:
+        return Comparison(scheme, None, None, str(error))
+    return Comparison(scheme, recording, force_error(plan, recording), None)

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Render a plan on a simulated device, and say how far the rendered force is from the model's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import _core
+from .._core import DeviceProfile, Hand, Scheme, Status
+from .._typing import Float1D
+from ..errors import InputError
+from ..recording import Recording
+from ..recording.units import COLUMN_SUFFIX
+from .plan import Plan
+
+START = "handle_start"
+END = "handle_end"
+"""Stems of the columns with the true handle position when the encoder was read, and when the force ended."""
+
+_NAMES = {int(value): name for name, value in Status.__members__.items()}
+
+
+def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> Recording:
+    """Render a plan in closed loop, in virtual time: device, hand and controller are simulated.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is rendered.
+    device : DeviceProfile
+        The simulated device.
+    hand : Hand
+        The simulated hand that moves it.
+    duration : float
+        Simulated time [s].
+
+    Returns
+    -------
+    Recording
+        Position as the encoder reads it and force as the device applies it, with time, so that what was
+        rendered can be identified and verified like anything else. Further columns: the handle's true
+        position at the start and the end of each tick, the environment's position, the commanded force, the
+        number of evaluations, the status as a word, and whether the model was extrapolated (1) or not (0).
+
+    Raises
+    ------
+    InputError
+        The structure is sure to diverge on this device, or a number is out of range.
+    """
+    plan.check_for(device)
+    try:
+        trace = _core.simulate(plan.model, plan.scheme, device, hand, duration)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    recording = Recording.from_arrays(
+        trace["position"],
+        trace["applied"],
+        trace["time_s"],
+        units=plan.model.units,
+        metadata={
+            "simulated": "yes: device, hand and controller; nothing here was measured",
+            "structure": describe(plan.scheme),
+            "device": repr(device),
+            "hand": repr(hand),
+        },
+    )
+    position, force = (_suffix(plan.model.units[role]) for role in ("position", "force"))
+    return replace(
+        recording,
+        columns={
+            f"{START}{position}": trace["handle_start"],
+            f"{END}{position}": trace["handle_end"],
+            f"environment_position{position}": trace["environment_position"],
+            f"commanded{force}": trace["force"],
+            "evaluations": trace["evaluations"].astype(np.float64),
+            "extrapolated": np.asarray(trace["extrapolated"], dtype=np.float64),
+            "status": np.array([_NAMES[value] for value in trace["status"]], dtype=object),
+        },
+    )
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """RMS of rendered force minus the model's force at the handle, over all ticks [N*m or N]."""
+
+    end: float
+    """at the end of the tick that holds the force: what is felt, the hold included"""
+    instant: float
+    """at its sampling instant: what the structure and the encoder cost"""
+
+
+def force_error(plan: Plan, rendered: Recording) -> ForceError:
+    """How far a simulated rendering is from the model, felt at the handle's true position.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was rendered.
+    rendered : Recording
+        From :func:`simulate`.
+    """
+    suffix = _suffix(plan.model.units["position"])
+    start, end = rendered.columns[f"{START}{suffix}"], rendered.columns[f"{END}{suffix}"]
+    period = rendered.sample_period
+    if period is None:
+        raise InputError("a rendering of one tick has no force error; simulate a longer time")
+    at_end = force_at(plan, np.concatenate([start[:1], end]))[1:]
+    return ForceError(end=_rms(rendered.force - at_end), instant=_rms(rendered.force - force_at(plan, start)))
+
+
+def force_at(plan: Plan, position: Float1D) -> Float1D:
+    """The model's own force along a motion, without structure or coupling, its play state included.
+
+    Parameters
+    ----------
+    plan : Plan
+        Model and play radius.
+    position : (n,) array
+        A motion, in order [rad or m].
+
+    Returns
+    -------
+    (n,) array
+        Force [N*m or N].
+    """
+    exact = Scheme(structure="direct", play_radius=plan.scheme.play_radius)
+    # Without a coupling nothing depends on the period.
+    force: Float1D = _core.motion_driven(plan.model, exact, position, 1.0)["force"]
+    return force
+
+
+def describe(scheme: Scheme) -> str:
+    """A scheme in the words of the comparison: "implicit, m = 0.001, B_o = 0.5"."""
+    words = [scheme.structure]
+    if scheme.compensated:
+        words.append("compensated")
+    if scheme.structure in ("implicit", "explicit"):
+        words += [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"]
+    return ", ".join(words)
+
+
+def _suffix(unit: str) -> str:
+    return f"_{COLUMN_SUFFIX[unit]}" if unit else ""
+
+
+def _rms(values: Float1D) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures: one function each, drawing on axes that the caller made. A leaf: only the command line needs it."""
+
+from .measured_and_modelled import draw_measured_and_modelled
+from .real_against_rendered import draw_real_against_rendered
+from .structures import draw_structures
+
+__all__ = ["draw_measured_and_modelled", "draw_real_against_rendered", "draw_structures"]

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Does the model fit? Force over position, measured and modelled, and what is left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from .._typing import Float1D
+from ..recording import Recording
+from .look import label, label_force, label_position, strokes, thinned
+
+_LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
+
+
+def draw_measured_and_modelled(
+    force_axes: Axes,
+    residual_axes: Axes,
+    recording: Recording,
+    modelled: Float1D,
+    *,
+    one_curve: bool = True,
+    seen: str = "measured",
+) -> None:
+    """Measured and modelled force over position, residuals beneath; press and release told apart.
+
+    Parameters
+    ----------
+    force_axes, residual_axes : matplotlib.axes.Axes
+        Where to draw; they should share their position axis.
+    recording : Recording
+        What was measured.
+    modelled : (n,) array
+        The model's force at each row of the recording [N*m or N].
+    one_curve : bool
+        The model's force is one curve for each stroke, drawn over increasing position; False where it depends
+        on the motion before, and is drawn in the order of the recording.
+    seen : str
+        What the recording's force is called.
+    """
+    residual = recording.force - modelled
+    told_apart = strokes(recording.direction, len(recording))
+    for name, rows in told_apart:
+        suffix = f", {name}" if name else ""
+        position, force, rest = thinned(recording.position[rows], recording.force[rows], residual[rows])
+        dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
+        if name == "release":
+            dots |= {"marker": "o", "markerfacecolor": "none", "markeredgewidth": 0.4}
+        force_axes.plot(position, force, **dots, color="0.65", markersize=2.2, label=f"{seen}{suffix}")
+        residual_axes.plot(
+            position, rest, **dots, color="0.45" if name != "release" else "0.7", markersize=2.0
+        )
+    for name, rows in told_apart:
+        suffix = f", {name}" if name else ""
+        position, curve = recording.position[rows], modelled[rows]
+        if one_curve:
+            order = np.argsort(position, kind="stable")
+            position, curve = position[order], curve[order]
+        force_axes.plot(
+            *thinned(position, curve),
+            color="black",
+            linewidth=1.1,
+            linestyle=_LINES[name],
+            label=f"model{suffix}",
+        )
+    label_force(force_axes, recording.units)
+    force_axes.legend(frameon=False)
+    residual_axes.axhline(0.0, color="black", linewidth=0.6)
+    label_position(residual_axes, recording.units)
+    residual_axes.set_ylabel(label("residual", recording.units["force"]))

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each rendering structure costs: its force error, felt and sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from .look import label
+
+
+def draw_structures(
+    axes: Axes, names: Sequence[str], end: Sequence[float], instant: Sequence[float], force_unit: str
+) -> None:
+    """RMS force error of each structure, at the end of the tick and at its sampling instant, on a log axis.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where to draw.
+    names : sequence of str
+        The structures, best first; drawn from top to bottom.
+    end, instant : sequence of float
+        Their force errors [N*m or N].
+    force_unit : str
+        The unit of both.
+    """
+    place = np.arange(len(names), dtype=np.float64)
+    axes.plot(end, place - 0.12, linestyle="none", marker="o", color="black", label="end of tick")
+    axes.plot(
+        instant,
+        place + 0.12,
+        linestyle="none",
+        marker="o",
+        color="black",
+        markerfacecolor="white",
+        label="sampling instant",
+    )
+    axes.set_xscale("log")
+    axes.set_yticks(place, [name.replace(", ", ",\n", 1) for name in names])
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.grid(axis="x", color="0.85", linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.set_xlabel(label("force error, RMS", force_unit))
+    axes.figure.legend(frameon=False, loc="outside upper center", ncols=2)
