@@ -55,7 +55,8 @@ def main() -> int:
     if stale:
         print("The stubs do not describe the compiled module: run `make stubs`.", file=sys.stderr)
         return 1
-    if check:
+    # The stubs of NumPy, on which ours build, are complete from Python 3.11 on.
+    if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOWED)]
         return subprocess.run(command, check=False).returncode
     return 0
