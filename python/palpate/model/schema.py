@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The model file, version 1: its fields, what each may hold, and the JSON schema published from them.
 
-``python -m palpate.model.schema`` prints the JSON schema.
+``python -m palpate.model`` prints the JSON schema.
 """
 
 from __future__ import annotations
 
-import json
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -139,7 +138,3 @@ def json_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **ModelFile.model_json_schema(),
     }
-
-
-if __name__ == "__main__":
-    print(json.dumps(json_schema(), indent=2))

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Closed-loop verification: a recorded motion moves the device, or a recorded force the environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from .. import _core
+from .._core import Scheme, Status, paper_sample_time_s
+from .._typing import Float1D
+from ..errors import InputError
+from ..model import Model
+from ..recording import Recording
+from .metrics import normalised, root_mean_square
+from .prediction import require_same_units
+from .timing import even_motion
+
+PLAY_SHARE_OF_TRAVEL = 0.01
+"""Play radius over travel where neither model nor scheme gives one: recorded strokes do not tell it."""
+
+_STIFFNESS_SAMPLES = 1001
+"""Positions at which the loss of a hysteresis model is looked at for its steepest slope."""
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """A recording beside what the closed loop made of it, on an even time grid."""
+
+    view: Literal["motion-driven", "force-driven"]
+    scheme: Scheme
+    """What was rendered, as it was in the end"""
+    period_s: float
+    assumed_speed: float | None
+    """[position unit per second]: the recording has no time, its speed is assumed; None: time is recorded"""
+    time: Float1D
+    """(k,) [s]"""
+    recorded_position: Float1D
+    recorded_force: Float1D
+    rendered_position: Float1D
+    """Motion-driven: the recorded one. Force-driven: where the recorded force moves the environment to."""
+    rendered_force: Float1D
+    """Motion-driven: the force that is rendered. Force-driven: the recorded one."""
+    environment_position: Float1D
+    rmse: float
+    """Motion-driven: of the force. Force-driven: of the position."""
+    nrmse: float
+    """rmse over the population standard deviation of what was recorded"""
+    status: Mapping[str, int]
+    """How many ticks ended with which status"""
+    units: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def motion_driven(
+    model: Model,
+    recording: Recording,
+    scheme: Scheme | None = None,
+    *,
+    period_s: float = paper_sample_time_s,
+    stroke_speed: float | None = None,
+) -> ClosedLoop:
+    """The recorded motion moves the device: the rendered force against the recorded one.
+
+    Parameters
+    ----------
+    model : Model
+        What is rendered, of one position.
+    recording : Recording
+        Its motion is resampled every `period_s`; without a time it is followed at `stroke_speed`.
+    scheme : Scheme, optional
+        Structure and coupling; the direct structure when not given.
+    period_s : float
+        Sample time [s].
+    stroke_speed : float, optional
+        Assumed speed [position unit per second] for a recording without time; the range of positions in one
+        second when not given.
+
+    Raises
+    ------
+    InputError
+        The model and the recording, or the model and the scheme, do not fit.
+    """
+    scheme = scheme or Scheme(structure="direct", play_radius=_play_radius(model, 0.0))
+
+    def run(position: Float1D, _force: Float1D) -> dict[str, Any]:
+        rendered: dict[str, Any] = _core.motion_driven(model, scheme, position, period_s)
+        return rendered
+
+    return _closed_loop("motion-driven", model, recording, scheme, period_s, stroke_speed, run, ())
+
+
+def force_driven(
+    model: Model,
+    recording: Recording,
+    scheme: Scheme | None = None,
+    *,
+    period_s: float = paper_sample_time_s,
+    stroke_speed: float | None = None,
+) -> ClosedLoop:
+    """The recorded force drives the environment alone (paper figure 14).
+
+    Force over the resulting position is the paper's figure 15.
+
+    Parameters
+    ----------
+    model : Model
+        What is driven, of one position.
+    recording : Recording
+        Its force is resampled every `period_s`; without a time its motion is taken at `stroke_speed`.
+    scheme : Scheme, optional
+        Structure ("explicit" or "implicit"), mass and damping; the paper's explicit environment with its mass
+        and damping when not given. An explicit environment that would be unstable for the model's steepest
+        slope, which must be below (4 m - 2 B_o T) / T^2, is replaced by the implicit one, and the notes say
+        so.
+    period_s, stroke_speed
+        As for :func:`motion_driven`.
+
+    Raises
+    ------
+    InputError
+        The model and the recording, or the model and the scheme, do not fit.
+    """
+    default = scheme or Scheme(structure="explicit")
+    if default.structure not in ("explicit", "implicit"):
+        raise InputError(
+            f"structure is {default.structure}; a recorded force drives an explicit or an implicit "
+            "environment"
+        )
+    scheme = _with(default, play_radius=_play_radius(model, default.play_radius))
+    notes: tuple[str, ...] = ()
+    steepest = _steepest_slope(model, scheme)
+    limit = (4 * scheme.mass - 2 * scheme.damping * period_s) / period_s**2
+    if scheme.structure == "explicit" and not steepest < limit:
+        scheme = _with(scheme, structure="implicit")
+        notes = (
+            f"the implicit environment is used: with mass {scheme.mass:g} and damping {scheme.damping:g} the "
+            f"explicit one is stable below a slope of {limit:.4g}, and the model reaches {steepest:.4g}",
+        )
+
+    def run(_position: Float1D, force: Float1D) -> dict[str, Any]:
+        start = float(recording.position[0])
+        driven: dict[str, Any] = _core.force_driven(model, scheme, force, period_s, start)
+        return driven
+
+    return _closed_loop("force-driven", model, recording, scheme, period_s, stroke_speed, run, notes)
+
+
+def _closed_loop(
+    view: Literal["motion-driven", "force-driven"],
+    model: Model,
+    recording: Recording,
+    scheme: Scheme,
+    period_s: float,
+    stroke_speed: float | None,
+    run: Callable[[Float1D, Float1D], dict[str, Any]],
+    notes: tuple[str, ...],
+) -> ClosedLoop:
+    require_same_units(model, recording.units)
+    motion = even_motion(recording, period_s, stroke_speed)
+    if motion.assumed_speed is not None:
+        unit = recording.units["position"] or "SI"
+        notes += (
+            f"the recording has no time: a stroke speed of {motion.assumed_speed:.4g} {unit}/s is assumed",
+        )
+    try:
+        result = run(motion.position, motion.force)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    moved = view == "motion-driven"
+    rendered_position = motion.position if moved else result["environment_position"]
+    rendered_force = result["force"] if moved else motion.force
+    recorded = motion.force if moved else motion.position
+    rmse = root_mean_square((rendered_force if moved else rendered_position) - recorded)
+    return ClosedLoop(
+        view=view,
+        scheme=scheme,
+        period_s=period_s,
+        assumed_speed=motion.assumed_speed,
+        time=motion.time,
+        recorded_position=motion.position,
+        recorded_force=motion.force,
+        rendered_position=rendered_position,
+        rendered_force=rendered_force,
+        environment_position=result["environment_position"],
+        rmse=rmse,
+        nrmse=normalised(rmse, recorded),
+        status=_counted(result["status"]),
+        units=dict(recording.units),
+        notes=notes,
+    )
+
+
+def _play_radius(model: Model, given: float) -> float:
+    """0 where the model has one of its own or needs none."""
+    if given > 0 or not model.hysteretic or model.play_radius is not None:
+        return given
+    return PLAY_SHARE_OF_TRAVEL * (float(model.upper[0]) - float(model.lower[0]))
+
+
+def _steepest_slope(model: Model, scheme: Scheme) -> float:
+    """Largest slope that the environment can meet; while a hysteresis model sticks, h/r is part of it."""
+    steepest = max(0.0, float(model.slope_range()[1]))
+    if not model.hysteretic:
+        return steepest
+    x = np.linspace(model.lower[0], model.upper[0], _STIFFNESS_SAMPLES)
+    loss = (model.force(x, direction=np.ones_like(x)) - model.force(x, direction=-np.ones_like(x))) / 2
+    radius = float(scheme.play_radius or model.play_radius)
+    return steepest + float(np.abs(loss).max()) / radius
+
+
+def _with(scheme: Scheme, **changes: Any) -> Scheme:
+    fields = (
+        "structure",
+        "coupling_stiffness",
+        "coupling_damping",
+        "mass",
+        "damping",
+        "compensated",
+        "play_radius",
+    )
+    return Scheme(**{name: getattr(scheme, name) for name in fields} | changes)
+
+
+def _counted(status: Any) -> dict[str, int]:
+    names = {int(member): name for name, member in Status.__members__.items()}
+    values, counts = np.unique(status, return_counts=True)
+    return {names[int(value)]: int(count) for value, count in zip(values, counts, strict=True)}

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Verification: a model beside a recording, best one that it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D
+from ..errors import InputError
+from ..model import Model
+from ..recording import Recording, Source
+from .metrics import durbin_watson, lag_one_autocorrelation, normalised, root_mean_square
+from .perception import force_floor, share_within_force_jnd, share_within_stiffness_jnd
+from .prediction import predict
+
+
+@dataclass(frozen=True)
+class Verification:
+    """How far a model is from a recording. Forces are in the recording's unit (`units`)."""
+
+    nrmse: float
+    """RMSE over the population standard deviation of the recorded force, on the evaluated rows"""
+    rmse: float
+    mse: float
+    r2: float
+    """1 - nrmse^2"""
+    worst: float
+    """Largest absolute error"""
+    within_jnd: float
+    """Share of samples within 7 % of the local force, or within `jnd_floor`"""
+    jnd_floor: float
+    """1 % of the largest |force| of the evaluated rows"""
+    stiffness_within_jnd: float | None
+    """Share of position cells whose stiffness is within 23 %; None where no cell holds enough rows"""
+    whiteness: float
+    """Lag-1 autocorrelation of the residuals in recorded order: 0 is white"""
+    durbin_watson: float
+    """2 is white"""
+    n: int
+    """Evaluated rows"""
+    fresh: bool
+    """The model was not identified on this data"""
+    extrapolated: int
+    """Evaluated rows outside the model's domain"""
+    units: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+    rows: NDArray[np.bool_] = field(repr=False, compare=False, kw_only=True)
+    """(rows of the recording,) which of them were evaluated"""
+    force: Float1D = field(repr=False, compare=False, kw_only=True)
+    """(n,) the model's force at the evaluated rows"""
+    residual: Float1D = field(repr=False, compare=False, kw_only=True)
+    """(n,) the model's force minus the recorded one"""
+
+
+def verify(model: Model, recording: Recording) -> Verification:
+    """Compare a model with a recording, row by row.
+
+    Parameters
+    ----------
+    model : Model
+        What was identified.
+    recording : Recording
+        What it is compared with; ``fresh`` in the result says whether the model has seen it.
+
+    Returns
+    -------
+    Verification
+        Errors, the share that a hand would not feel, residual whiteness, freshness.
+
+    Raises
+    ------
+    InputError
+        The recording lacks an input or a direction that the model needs, or is in other units.
+    """
+    prediction = predict(model, recording)
+    rows = prediction.rows
+    reference = recording.force[rows]
+    residual = prediction.force - reference
+    if not np.isfinite(residual).all():
+        raise InputError("the model's force is not a finite number at every row of the recording")
+    rmse = root_mean_square(residual)
+    nrmse = normalised(rmse, reference)
+    fresh = is_fresh(model.data, recording.source)
+    notes = prediction.notes
+    if not fresh:
+        notes += ("the model was identified on this data: this is not a fresh recording",)
+    return Verification(
+        nrmse=nrmse,
+        rmse=rmse,
+        mse=rmse**2,
+        r2=1 - nrmse**2,
+        worst=float(np.abs(residual).max()),
+        within_jnd=share_within_force_jnd(reference, residual),
+        jnd_floor=force_floor(reference),
+        stiffness_within_jnd=_stiffness_share(recording, rows, residual),
+        whiteness=lag_one_autocorrelation(residual),
+        durbin_watson=durbin_watson(residual),
+        n=len(residual),
+        fresh=fresh,
+        extrapolated=prediction.extrapolated,
+        units=dict(recording.units),
+        notes=notes,
+        rows=rows,
+        force=prediction.force,
+        residual=residual,
+    )
+
+
+def is_fresh(identified_on: Source, data: Source) -> bool:
+    """Whether a model has not seen the data: another file, or the rows held out of the same one."""
+    same_file = not set(data.sha256.split()).isdisjoint(identified_on.sha256.split())
+    held_out = data.held_out and data.held_out_every == identified_on.held_out_every
+    return not same_file or held_out
+
+
+def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Float1D) -> float | None:
+    """Mean of the strokes' shares, each stroke having a stiffness of its own."""
+    position, reference = recording.position[rows], recording.force[rows]
+    strokes = np.zeros(len(position)) if recording.direction is None else recording.direction[rows]
+    shares = [
+        share_within_stiffness_jnd(position[strokes == s], reference[strokes == s], residual[strokes == s])
+        for s in np.unique(strokes)
+    ]
+    known = [share for share in shares if share is not None]
+    return float(np.mean(known)) if known else None
