@@ -198,6 +198,10 @@ py::array_t<double> play_states(const ForceModel& model, const Array& position, 
     return result;
 }
 
+std::pair<double, double> pair_of(Interval interval) {
+    return {interval.lower, interval.upper};
+}
+
 py::object extrapolated(const ForceModel& model, const Array& position) {
     require_inputs(model, true, true);
     const auto outside = [&](double x) {
@@ -210,6 +214,15 @@ py::object extrapolated(const ForceModel& model, const Array& position) {
     py::array_t<bool> result(std::vector<py::ssize_t>(position.shape(), position.shape() + position.ndim()));
     std::transform(position.data(), position.data() + position.size(), result.mutable_data(), outside);
     return result;
+}
+
+Interval bounds_of(Interval (*bounds)(const NetworkParameters&, double, double, double), const Array& alpha,
+                   const Array& beta, const Array& weight, double linear, double bias, double lower,
+                   double upper, double relative) {
+    const NetworkParameters network{1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+    validate(network, {{lower}, {upper}, {}, {}, std::nullopt});
+    detail::require(relative > 0.0, "relative is " + std::to_string(relative) + ", must be > 0");
+    return bounds(network, lower, upper, relative);
 }
 
 }  // namespace
@@ -247,9 +260,17 @@ void bind_model(py::module_& module) {
         "slope_range",
         [](const ForceModel& model) {
             require_one_input(model.parameters());
-            return model.slope_range();
+            return pair_of(model.slope_bounds());
         },
-        "Smallest and largest slope inside the domain, sliding either way: sampled, not proved.");
+        "Proved (smallest, largest) slope inside the domain, sliding either way; within 1 % of the "
+        "steepest.");
+    type.def(
+        "loss_range",
+        [](const ForceModel& model) {
+            detail::require(model.hysteresis() != nullptr, "the model has no hysteresis, so it has no loss");
+            return pair_of(model.hysteresis()->loss().value_bounds());
+        },
+        "Proved (smallest, largest) h inside the domain; within 1 % of the largest.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -277,6 +298,25 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("above", [](const ForceModel& m) { return name_of(m.domain().above); });
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
+
+    const auto bind_bounds = [&](const char* name, auto bounds, const char* doc) {
+        module.def(
+            name,
+            [bounds](const Array& alpha, const Array& beta, const Array& weight, double linear, double bias,
+                     double lower, double upper, double relative) {
+                return pair_of(bounds_of(bounds, alpha, beta, weight, linear, bias, lower, upper, relative));
+            },
+            py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a, "lower"_a, "upper"_a,
+            "relative"_a = 0.01, doc);
+    };
+    bind_bounds(
+        "value_bounds", &value_bounds,
+        "Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`\n"
+        "times max|f| wider than the true range.");
+    bind_bounds(
+        "slope_bounds", &slope_bounds,
+        "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
+        "times max|f'| wider than the true range.");
 }
 
 }  // namespace palpate::bindings
