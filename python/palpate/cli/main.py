@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -66,6 +67,11 @@ def palpate() -> None:
     """From a recorded force over position to a force that is rendered."""
 
 
+def _help_width() -> int:
+    """As wide as the terminal, which click would not go below 50 for; no wider than text is read well."""
+    return max(30, min(shutil.get_terminal_size().columns, 80))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -74,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with palpate.make_context("palpate", given) as context:
+        with palpate.make_context("palpate", given, terminal_width=_help_width()) as context:
             palpate.invoke(context)
         sys.stdout.flush()
     except BaseException as error:
