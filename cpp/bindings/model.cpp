@@ -184,18 +184,23 @@ py::array_t<double> predict(const ForceModel& model, const Array& x) {
     return result;
 }
 
-py::array_t<double> play_states(const ForceModel& model, const Array& position, std::optional<double> start) {
+py::array_t<double> play_states(const Array& position, double radius, std::optional<double> start) {
     require_vector(position, "position");
-    detail::require(model.hysteresis() != nullptr && model.play_radius().has_value(),
-                    "the model has no play radius, so a motion has no play state");
+    detail::require(radius > 0.0, "radius is " + std::to_string(radius) + ", must be > 0");
     py::array_t<double> result(position.size());
-    HysteresisNetwork::State state =
-        model.hysteresis()->start(start.value_or(position.size() > 0 ? position.data()[0] : 0.0));
+    double state = start.value_or(position.size() > 0 ? position.data()[0] : 0.0);
     for (py::ssize_t k = 0; k < position.size(); ++k) {
-        model.hysteresis()->advance(position.data()[k], state);
-        result.mutable_data()[k] = state.play;
+        state = play(position.data()[k], state, radius);
+        result.mutable_data()[k] = state;
     }
     return result;
+}
+
+py::array_t<double> model_play_states(const ForceModel& model, const Array& position,
+                                      std::optional<double> start) {
+    detail::require(model.play_radius().has_value(),
+                    "the model has no play radius, so a motion has no play state");
+    return play_states(position, *model.play_radius(), start);
 }
 
 std::pair<double, double> pair_of(Interval interval) {
@@ -254,7 +259,7 @@ void bind_model(py::module_& module) {
              "Force at X (n, d), (n,); a hysteresis model takes the direction as one more column.");
     type.def("extrapolated", &extrapolated, "position"_a,
              "Whether a position lies outside the identified domain.");
-    type.def("play", &play_states, "position"_a, "start"_a = py::none(),
+    type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
         "slope_range",
@@ -298,6 +303,11 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("above", [](const ForceModel& m) { return name_of(m.domain().above); });
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
+
+    module.def(
+        "play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
+        "State (n,) of the play operator of a radius along a motion (n,), started at rest unless told\n"
+        "otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).");
 
     const auto bind_bounds = [&](const char* name, auto bounds, const char* doc) {
         module.def(
