@@ -13,6 +13,7 @@ from ..errors import InputError
 from .arguments import PATH
 from .output import finishing, number, print_numbers, print_table, require_writable, talk
 from .pictures import picture_closed_loops, picture_structures, picture_verification
+from .verb import Verb
 
 if TYPE_CHECKING:
     from ..planning import Comparison
@@ -24,7 +25,7 @@ RENDERED_S = 4.0
 """Simulated time of each rendering [s]."""
 
 
-@click.command(epilog="Example: palpate demo -o demo")
+@click.command(cls=Verb, epilog="Example: palpate demo -o demo")
 @click.option("-o", "--output", type=PATH, metavar="FOLDER", default=Path("demo"), help="Where the files go.")
 def demo(output: Path) -> None:
     """Identify, verify and render a sample, without any input or device.

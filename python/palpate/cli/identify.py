@@ -16,6 +16,7 @@ from .figures import require_figure_name
 from .identify_options import identify_options
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_verification
+from .verb import Verb
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=Verb,
     no_args_is_help=True,
     epilog="Example: palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png",
 )

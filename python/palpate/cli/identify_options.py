@@ -12,6 +12,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 import click
 
 from ..identification.options import IdentifyOptions
+from ..identification.stopping import CRITERIA
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -73,4 +74,5 @@ def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
         return click.option(flag, name, metavar="NUMBERS", callback=_numbers, **text)
     if len(kinds) == 1 and get_args(kinds[0]):
         return click.option(flag, name, type=float, nargs=len(get_args(kinds[0])), **text)
-    return click.option(flag, name, type=kinds[0], **text)
+    kind = click.Choice(list(CRITERIA)) if name == "criterion" else kinds[0]
+    return click.option(flag, name, type=kind, **text)

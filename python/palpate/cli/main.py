@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -11,6 +10,7 @@ from importlib import import_module
 import click
 
 from .ending import ending_of
+from .verb import Verbs
 
 _VERBS = {
     "identify": "Identify a model from recordings.",
@@ -22,7 +22,7 @@ _VERBS = {
 """Every verb with its line in the help; its file is imported only when it is used."""
 
 
-class _Verbs(click.Group):
+class _LazyVerbs(Verbs):
     """A group whose commands live in the module of their name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -49,7 +49,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
 
 
 @click.group(
-    cls=_Verbs,
+    cls=_LazyVerbs,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="Example: palpate identify press.csv -o press.json",
@@ -67,11 +67,6 @@ def palpate() -> None:
     """From a recorded force over position to a force that is rendered."""
 
 
-def _help_width() -> int:
-    """As wide as the terminal, which click would not go below 50 for; no wider than text is read well."""
-    return max(30, min(shutil.get_terminal_size().columns, 80))
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
@@ -80,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with palpate.make_context("palpate", given, terminal_width=_help_width()) as context:
+        with palpate.make_context("palpate", given) as context:
             palpate.invoke(context)
         sys.stdout.flush()
     except BaseException as error:

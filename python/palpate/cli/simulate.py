@@ -15,11 +15,13 @@ from .ending import WorkError
 from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_rendering
+from .verb import Verb
 
 _DEFAULT = Scheme()
 
 
 @click.command(
+    cls=Verb,
     no_args_is_help=True,
     epilog="Example: palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv",
 )

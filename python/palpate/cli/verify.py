@@ -11,10 +11,11 @@ from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_o
 from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_closed_loops, picture_verification
+from .verb import Verb
 
 
 @click.command(
-    no_args_is_help=True, epilog="Example: palpate verify press.json fresh.csv --plot residuals.png"
+    cls=Verb, no_args_is_help=True, epilog="Example: palpate verify press.json fresh.csv --plot residuals.png"
 )
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.argument("recording_file", metavar="RECORDING", type=PATH)
