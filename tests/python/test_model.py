@@ -230,6 +230,8 @@ def test_a_model_can_be_read_by_a_person() -> None:
     assert "position from 0 to 0.6 m" in text
     assert "play radius 0.0001 m" in text
     assert "f(x, s) = g(x) + s h(x)  [N]" in text
+    assert "g(x) = sum_i w_i psi(alpha_i (x - beta_i))" in text
+    assert "h(x) = sum_i v_i psi(alpha_i (x - beta_i))" in text
     assert len([line for line in text.splitlines() if re.match(r"  [01]  ", line)]) == 2
     spring = str(Model(**content(wavelets=0, linear=[2.0], bias=0.5)))
     assert spring.endswith("f(x) = +2 x +0.5  [N]")

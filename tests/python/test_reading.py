@@ -74,7 +74,9 @@ def test_metadata_comes_before_the_header(csv_file: Write) -> None:
 def test_line_ends_and_byte_order_marks_do_not_matter(tmp_path: Path, ending: str, mark: str) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes((mark + ending.join([HEADER, *rows()])).encode())
-    assert len(read_recording(path)) == 12
+    recording = read_recording(path)
+    assert len(recording) == 12
+    assert recording.source.columns["position"] == "depth_mm"
 
 
 def test_blank_lines_do_not_matter_and_do_not_shift_line_numbers(csv_file: Write) -> None:
@@ -109,9 +111,10 @@ def test_direction_words(csv_file: Write, words: list[str], expected: int | None
 
 
 @pytest.mark.parametrize("invalid", ["refuse", "drop"])
-def test_an_unknown_direction_is_refused_in_any_case(csv_file: Write, invalid: str) -> None:
-    path = csv_file(HEADER, [*rows(10), "5,100,upward", *rows(3)])
-    assert refusal(path, invalid=invalid).startswith("press.csv, line 12: column direction holds 'upward'")
+@pytest.mark.parametrize("word", ["upward", "2", "0.5"])
+def test_an_unknown_direction_is_refused_in_any_case(csv_file: Write, invalid: str, word: str) -> None:
+    path = csv_file(HEADER, [*rows(10), f"5,100,{word}", *rows(3)])
+    assert refusal(path, invalid=invalid).startswith(f"press.csv, line 12: column direction holds '{word}'")
 
 
 def test_a_segment_column_of_words_is_the_direction(csv_file: Write) -> None:
@@ -232,6 +235,22 @@ def test_bad_rows_are_dropped_and_counted_on_request(csv_file: Write, case: str)
     assert len(recording) == 20
     np.testing.assert_allclose(np.diff(recording.position), 0.5e-3, rtol=1e-9)
     assert re.fullmatch(r"dropped 3 rows .* \(first: line 8\)", recording.notes[1])
+
+
+def test_a_row_that_is_bad_twice_is_counted_once(csv_file: Write) -> None:
+    recording = read_recording(csv_file(HEADER, [*rows(12), "nan,inf,"]), invalid="drop")
+    assert recording.notes[1:] == ("dropped 1 row without a finite number in depth_mm (first: line 14)",)
+
+
+def test_time_must_pass_the_latest_time_before_it(csv_file: Write) -> None:
+    lines = [*timed(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
+    recording = read_recording(csv_file("time_ms,depth_mm,force_N", lines), invalid="drop")
+    np.testing.assert_allclose(recording.position[11:], [5.5e-3, 93e-3])
+    assert recording.notes[2] == "dropped 2 rows whose time repeats or runs backward (first: line 14)"
+
+
+def test_ten_rows_are_enough(csv_file: Write) -> None:
+    assert len(read_recording(csv_file(HEADER, rows(10)))) == 10
 
 
 def test_text_far_below_the_start_is_found(csv_file: Write) -> None:

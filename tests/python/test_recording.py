@@ -115,6 +115,12 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [target]
 
 
+def test_a_metadata_key_with_a_colon_is_refused(tmp_path: Path) -> None:
+    recording = Recording.from_arrays(awkward_numbers(1), awkward_numbers(2), metadata={"a:b": "c"})
+    with pytest.raises(InputError, match="metadata 'a:b' does not fit"):
+        recording.write(tmp_path / "a.csv")
+
+
 @pytest.mark.parametrize(
     ("target", "sentence"),
     [("nowhere/a.csv", "there is no folder"), (".", "it is a folder")],

@@ -38,6 +38,13 @@ def test_the_noise_is_that_of_the_sensor() -> None:
     assert np.std(recording.force - sample_force(recording.position)) == pytest.approx(0.02, rel=0.02)
 
 
+def test_the_encoder_rounds_to_the_nearest_count() -> None:
+    # A bias of half a count would show on the wall, 0.003 N*m against 0.0003 of noise on the mean.
+    recording = sample_recording(1)
+    wall = recording.position > 0.42
+    assert abs(np.mean((recording.force - sample_force(recording.position))[wall])) < 1e-3
+
+
 def test_the_hand_sweeps_at_a_wandering_frequency_of_fifth_to_two_hertz() -> None:
     recording = sample_recording(1)
     assert recording.time is not None

@@ -85,6 +85,19 @@ def test_press_and_release_are_told_apart_by_the_direction() -> None:
     assert result.stiffness_within_jnd == 1.0
 
 
+def test_the_stiffness_is_that_of_each_stroke() -> None:
+    # Steeper by half on the press, flatter by half on the release: each is felt, their mean is not.
+    recording = stroke()
+    assert recording.direction is not None
+    wrong = Recording.from_arrays(
+        recording.position,
+        2 * recording.position + 1 + recording.direction * recording.position,
+        direction=recording.direction,
+        units=RAD,
+    )
+    assert verify(model_of(curve().source), wrong).stiffness_within_jnd == 0.0
+
+
 def test_rows_without_a_direction_are_left_out_and_counted() -> None:
     recording = stroke()
     assert recording.direction is not None
