@@ -12,6 +12,9 @@ from palpate.cli import demo as demo_module
 from palpate.cli.main import main
 from test_planning import keyswitch_by_hand, model_by_hand
 
+JSON_FIELDS = ["structure", "duration_s", "ticks", "force_error_end", "force_error_instant"]
+JSON_FIELDS += ["extrapolated", "status"]
+
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -34,9 +37,7 @@ def test_what_was_rendered_is_written_and_measured(here: Path, capsys: pytest.Ca
 def test_json_names_the_structure_and_its_errors(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "m.json", "--structure", "implicit", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert list(result) == [
-        "structure", "duration_s", "ticks", "force_error_end", "force_error_instant", "extrapolated", "status",
-    ]  # fmt: skip
+    assert list(result) == JSON_FIELDS
     assert result["structure"] == "implicit"
     assert result["ticks"] == 4000
     assert result["status"] == {"Ok": 4000}
@@ -143,7 +144,7 @@ def test_the_demo_s_model_explains_the_fresh_recording_to_its_noise(
     assert verification.fresh
     assert model.n_wavelets <= 10
     assert verification.rmse < 1.1 * 0.02, "noise of the sample: 0.02 N*m"
-    assert f"wavelets              {model.n_wavelets}\n" in out
+    assert re.search(rf"^wavelets +{model.n_wavelets}$", out, re.MULTILINE)
 
 
 def test_the_demo_refuses_a_folder_that_cannot_be_before_it_works(

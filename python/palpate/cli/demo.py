@@ -12,7 +12,13 @@ import click
 from ..errors import InputError
 from .arguments import PATH
 from .output import finishing, number, print_numbers, print_table, require_writable, talk
-from .pictures import picture_closed_loops, picture_structures, picture_verification
+from .pictures import (
+    close_loops,
+    picture_closed_loops,
+    picture_structures,
+    picture_verification,
+    print_closed_loops,
+)
 from .verb import Verb
 
 if TYPE_CHECKING:
@@ -37,7 +43,7 @@ def demo(output: Path) -> None:
     from ..identification import identify
     from ..planning import bench_for, compare_structures
     from ..recording.sample import sample_recording
-    from ..verification import force_driven, motion_driven, verify
+    from ..verification import verify
 
     _prepare(output)
     talk(f"everything in this demo is simulated, nothing was measured; its files go to {output}")
@@ -48,7 +54,7 @@ def demo(output: Path) -> None:
     seconds = time.perf_counter() - start
     talk("verifying on a fresh simulated recording, and closing the loop both ways ...")
     verification = verify(model, fresh)
-    loops = [motion_driven(model, fresh), force_driven(model, fresh)]
+    loops = close_loops(model, fresh)
     talk("rendering on a simulated device with each structure ...")
     structures = compare_structures(model, bench_for(model), RENDERED_S)
 
@@ -74,9 +80,10 @@ def demo(output: Path) -> None:
                 "NRMSE, fresh": number(verification.nrmse),
                 "RMSE, fresh": f"{number(verification.rmse)} {fresh.units['force']}",
                 "identified in": f"{seconds:.2f} s",
-                **{f"NRMSE, {loop.view}": number(loop.nrmse) for loop in loops},
             }
         )
+        click.echo()
+        print_closed_loops(loops)
         click.echo()
         _print_structures(structures, fresh.units["force"])
         click.echo()

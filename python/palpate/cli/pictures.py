@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .figures import figure_file
+from .output import number, print_table
 
 if TYPE_CHECKING:
     from ..model import Model
@@ -17,10 +18,43 @@ if TYPE_CHECKING:
     from ..recording import Recording
     from ..verification import ClosedLoop, Verification
 
-_CLOSED_LOOP_TITLES = {
+_LIGHTER = 0.01
+"""Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
+
+
+_DRIVEN = {
     "motion-driven": "recorded motion drives the device",
     "force-driven": "recorded force drives the object",
 }
+
+
+def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
+    """Both ways to close the loop.
+
+    The recorded motion drives the device. The recorded force drives the object: with the mass and damping
+    that the paper's explicit environment adds to it, and with the little that the implicit one needs.
+    """
+    from .._core import Scheme
+    from ..verification import force_driven, motion_driven
+
+    paper = force_driven(model, recording)
+    light = Scheme(
+        structure="implicit",
+        mass=_LIGHTER * paper.scheme.mass,
+        damping=_LIGHTER * paper.scheme.damping,
+        play_radius=paper.scheme.play_radius,
+    )
+    return [motion_driven(model, recording), paper, force_driven(model, recording, light)]
+
+
+def print_closed_loops(loops: Sequence[ClosedLoop]) -> None:
+    """How far each closed loop is from the recording: in force when driven by motion, else in position."""
+    from ..planning import describe
+
+    print_table(
+        ("closed loop", "NRMSE"),
+        [(f"{loop.view}, {describe(loop.scheme)}", number(loop.nrmse)) for loop in loops],
+    )
 
 
 def picture_verification(
@@ -61,17 +95,18 @@ def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
 
 
 def picture_closed_loops(path: Path, loops: Sequence[ClosedLoop]) -> None:
-    """Recorded and rendered force over position, one panel for each way to close the loop."""
+    """Recorded and rendered force over position, one panel for each closed loop."""
+    from ..planning import describe
     from ..plotting import draw_real_against_rendered
 
-    with figure_file(path, height_inches=0.3 + 2.3 * len(loops), rows=(1.0,) * len(loops)) as axes:
+    with figure_file(path, height_inches=0.3 + 2.2 * len(loops), rows=(1.0,) * len(loops)) as axes:
         for each, loop in zip(axes, loops, strict=True):
             draw_real_against_rendered(
                 each,
                 (loop.recorded_position, loop.recorded_force),
                 (loop.rendered_position, loop.rendered_force),
                 loop.units,
-                title=_CLOSED_LOOP_TITLES[loop.view],
+                title=f"{_DRIVEN[loop.view]}\n{describe(loop.scheme)}",
             )
 
 

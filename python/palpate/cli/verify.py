@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
 from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
-from .pictures import picture_closed_loops, picture_verification
+from .pictures import close_loops, picture_closed_loops, picture_verification, print_closed_loops
 from .verb import Verb
+
+if TYPE_CHECKING:
+    from ..verification import ClosedLoop
 
 
 @click.command(
@@ -37,7 +41,6 @@ def verify(
     the recorded force drives the object and the resulting position is compared.
     """
     from ..model import load_model
-    from ..verification import force_driven, motion_driven
     from ..verification import verify as verify_model
 
     for figure in filter(None, (plot, plot_closed_loop)):
@@ -49,12 +52,11 @@ def verify(
     verification = verify_model(model, recording)
     for note in verification.notes:
         talk(f"  {note}")
-    loops = []
+    loops: list[ClosedLoop] = []
     if plot_closed_loop is not None:
-        loops = [motion_driven(model, recording), force_driven(model, recording)]
-        for loop in loops:
-            for note in loop.notes:
-                talk(f"  {loop.view}: {note}")
+        loops = close_loops(model, recording)
+        for note in dict.fromkeys(note for loop in loops for note in loop.notes):
+            talk(f"  {note}")
     with finishing():
         if plot is not None:
             picture_verification(plot, model, [(recording, verification)])
@@ -80,6 +82,8 @@ def verify(
                 "rows": str(verification.n),
                 "fresh": "yes" if verification.fresh else "no: the model was identified on this data",
                 "outside the model's domain": f"{verification.extrapolated} rows",
-                **{f"closed loop, {loop.view}": f"nrmse {number(loop.nrmse)}" for loop in loops},
             }
         )
+        if loops:
+            click.echo()
+            print_closed_loops(loops)
