@@ -137,7 +137,7 @@ def test_a_column_in_an_unknown_unit_takes_the_stated_one() -> None:
     [
         ({"position": "deep_mm"}, "has no column 'deep_mm' for --position; its columns are depth_mm, y"),
         ({"direction": "stroke"}, "has no column 'stroke' for --direction"),
-        ({"inputs": ("load",)}, "has no column 'load' for --inputs"),
+        ({"inputs": ("load",)}, "has no column 'load' for inputs"),
         ({"units": {"z": "N"}}, "has no column 'z' for --units"),
         ({"units": {"force": "N"}}, "--units force=N also needs --force NAME"),
         ({"units": {"y": "lbf"}}, "--units y=lbf: 'lbf' is no unit; use one of m, mm"),

@@ -141,6 +141,8 @@ def test_current_stays_a_current_until_a_torque_constant_is_given(csv_file: Writ
     torque = read_recording(path, torque_constant=0.0075)
     assert torque.units["force"] == "N*m"
     np.testing.assert_allclose(torque.force, recording.force * 0.0075, rtol=1e-15)
+    for wrong in (0.0, -0.1, float("nan"), float("inf")):
+        assert f"--torque-constant-Nm-per-A is {wrong}" in refusal(path, torque_constant=wrong)
     other = csv_file("angle_rad,torque_Nm", [f"{k},{k}" for k in range(12)])
     assert "--torque-constant-Nm-per-A turns a current into a torque" in refusal(
         other, torque_constant=0.0075

@@ -183,7 +183,8 @@ def test_further_inputs_are_taken_by_name() -> None:
     assert np.abs(result.residual[inside]).max() < 5 * NOISE
     assert result.extrapolated == np.count_nonzero(~inside)
     with pytest.raises(
-        InputError, match="the model needs the input load_N; read the recording with --inputs load_N"
+        InputError,
+        match=re.escape("the model needs the input load_N; read the recording with inputs=('load_N',)"),
     ):
         verify(model, recording)
 
