@@ -76,13 +76,16 @@ def identify(
     model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
+    for note in model.notes.get("identification", ()):
+        talk(f"  {note}")
+    nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
     result = {
         "model": str(output),
         "n_wavelets": model.n_wavelets,
         "n_parameters": model.n_parameters,
         "rung": model.fit.rung,
         "stop_reason": model.stop_reason,
-        "nrmse": model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified),
+        "nrmse": nrmse,
         "seconds": seconds,
     }
     rows = sum(len(recording) for recording in judged_on)
@@ -100,7 +103,7 @@ def identify(
                 "wavelets": str(model.n_wavelets),
                 "parameters": str(model.n_parameters),
                 "kind": f"{model.fit.rung}, stopped by {model.stop_reason}",
-                "nrmse": f"{number(result['nrmse'])} on {judged}",
+                "nrmse": f"{number(nrmse)} on {judged}",
                 "seconds": f"{seconds:.2f}",
             }
         )

@@ -100,7 +100,8 @@ def _steepest_slope(model: Model, scheme: Scheme) -> float:
     position = np.linspace(model.lower[0], model.upper[0], _LOSS_SAMPLES)
     one = np.ones_like(position)
     loss = 0.5 * (model.force(position, direction=one) - model.force(position, direction=-one))
-    radius: float = scheme.play_radius or model.play_radius
+    radius = scheme.play_radius or model.play_radius
+    assert radius, "a scheme that fits a hysteresis model has a play radius"
     return steepest + float(np.abs(loss).max()) / radius
 
 
