@@ -3,6 +3,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,7 +16,7 @@ import pytest
 from palpate import InputError
 from palpate.cli.ending import WorkError, ending_of
 from palpate.cli.main import main, palpate
-from palpate.cli.output import print_json, require_distinct, require_writable
+from palpate.cli.output import finishing, print_json, require_distinct, require_writable
 
 VERBS = ["identify", "verify", "simulate", "show", "demo"]
 
@@ -173,6 +174,13 @@ def test_two_results_do_not_share_a_file(tmp_path: Path) -> None:
 def test_checking_an_output_leaves_nothing_behind(tmp_path: Path) -> None:
     require_writable(tmp_path / "m.json")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_results_are_written_comes_too_late() -> None:
+    with finishing():
+        os.kill(os.getpid(), signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 def test_a_reader_who_leaves_is_no_traceback() -> None:

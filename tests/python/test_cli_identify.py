@@ -94,6 +94,23 @@ def test_columns_units_and_signs_are_options(here: Path, capsys: pytest.CaptureF
     assert model.data.rows == 80
 
 
+def test_rows_without_a_number_can_be_dropped(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "a.csv").write_text("\n".join([HEADER, *LINE, "nan,1.0"]))
+    assert main(["identify", "a.csv", "-o", "m.json", "--invalid", "drop"]) == 0
+    assert load_model(here / "m.json").data.rows == len(LINE)
+
+
+def test_what_identification_noticed_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 200), np.full(5, 1.0), np.linspace(1.0, 0.0, 200)])
+    direction = np.repeat([1, 0, -1], [200, 5, 200])
+    Recording.from_arrays(x, 3.0 * x + 0.2 * direction, direction=direction).write(here / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    notes = load_model(here / "m.json").notes["identification"]
+    assert notes
+    err = capsys.readouterr().err
+    assert all(f"  {note}\n" in err for note in notes)
+
+
 def test_a_current_becomes_a_torque_with_its_constant(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     x = np.linspace(0.0, 1.0, 50).tolist()
     (here / "a.csv").write_text("angle_rad,current_A\n" + "\n".join(f"{a!r},{a!r}" for a in x))

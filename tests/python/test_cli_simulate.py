@@ -3,11 +3,13 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from palpate import load_model, read_recording
+from palpate import Recording, load_model, read_recording, simulate
 from palpate.cli import demo as demo_module
 from palpate.cli.main import main
 from test_planning import keyswitch_by_hand, model_by_hand
@@ -83,6 +85,23 @@ def test_a_current_is_not_rendered(here: Path, capsys: pytest.CaptureFixture[str
     assert "--torque-constant-Nm-per-A" in json.loads(capsys.readouterr().out)["error"]
 
 
+def test_a_rendering_that_ran_away_is_a_failure_of_the_work(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """None is known that gets past the checks; the verdict must not depend on that."""
+
+    def run_away(*arguments: Any) -> Recording:
+        recording = simulate(*arguments)
+        status = recording.columns["status"].copy()
+        status[-7:] = "NonFinite"
+        return replace(recording, columns={**recording.columns, "status": status})
+
+    monkeypatch.setattr("palpate.planning.simulate", run_away)
+    assert main(["simulate", "m.json", "-o", "r.csv"]) == 1
+    assert "ran away: 7 of 4000 ticks" in capsys.readouterr().err
+    assert not Path("r.csv").exists()
+
+
 def test_a_model_with_hysteresis_is_rendered_with_a_play_radius(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -150,8 +169,8 @@ def test_the_demo_s_model_explains_the_fresh_recording_to_its_noise(
 def test_the_demo_refuses_a_folder_that_cannot_be_before_it_works(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for target in ("nowhere/demo", "m.json", "m.json/demo", "/proc/demo"):
+    for target in ("nowhere/demo", "m.json", "m.json/demo", "/proc/demo", "/proc"):
         assert main(["demo", "-o", target]) == 2
         error = capsys.readouterr().err
-        assert error.startswith(f"error: {target} cannot be made: ")
+        assert re.match(f"error: {target}(/model.json)? cannot be (made|written): ", error)
         assert error.count("\n") == 1

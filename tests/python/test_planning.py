@@ -195,6 +195,15 @@ def test_what_was_rendered_is_a_recording_that_says_it_is_simulated(tmp_path: An
     assert set(again.columns["status"]) == {"Ok"}
 
 
+def test_the_recorded_force_is_what_the_device_made_of_the_command() -> None:
+    model = model_by_hand()
+    plan = Plan(model, Scheme(structure="direct"))
+    coarse = DeviceProfile(force_step=0.5)
+    recording = simulate(plan, coarse, bench_for(model).hand, 1.0)
+    assert set(recording.force % 0.5) == {0.0}
+    assert not set(recording.columns["commanded_Nm"] % 0.5) <= {0.0}
+
+
 def test_force_error_at_the_instant_is_the_encoder_s_alone_for_direct_rendering() -> None:
     plan, recording = rendered(model_by_hand(), structure="direct")
     error = force_error(plan, recording)

@@ -42,14 +42,10 @@ class Ending:
                 click.echo(f"error: {self.sentence}", err=True)
             sys.stdout.flush()
         except BrokenPipeError:
-            self._leave_quietly()
-
-    @staticmethod
-    def _leave_quietly() -> None:
-        """What is still buffered has no reader: let the interpreter flush it into nothing."""
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
+            # What is still buffered has no reader: let the interpreter flush it into nothing.
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
 
 
 def ending_of(error: BaseException) -> Ending:
@@ -63,7 +59,6 @@ def ending_of(error: BaseException) -> Ending:
     if isinstance(error, (KeyboardInterrupt, click.Abort)):
         return Ending(INTERRUPTED, "interrupted; nothing was written")
     if isinstance(error, BrokenPipeError):
-        Ending._leave_quietly()
         return Ending(FAILED)
     if isinstance(error, ValueError):
         return Ending(BAD_INPUT, _one_line(str(error)))
