@@ -193,3 +193,15 @@ def test_a_reader_who_leaves_is_no_traceback() -> None:
         assert process.stderr is not None
         assert process.stderr.read() == ""
     assert process.returncode == 1
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["simulate", "nothing.json", "--json"]])
+def test_a_full_disk_behind_standard_output_is_one_sentence(arguments: list[str]) -> None:
+    with open("/dev/full", "w") as full:
+        answer = subprocess.run(
+            [sys.executable, "-m", "palpate", *arguments],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert answer.returncode != 0
+    assert answer.stderr.startswith("error: ")
+    assert answer.stderr.count("\n") == 1

@@ -45,7 +45,7 @@ def demo(output: Path) -> None:
     from ..recording.sample import sample_recording
     from ..verification import verify
 
-    _prepare(output)
+    _require_folder(output)
     talk(f"everything in this demo is simulated, nothing was measured; its files go to {output}")
     recording, fresh = (sample_recording(seed) for seed in (IDENTIFY_SEED, FRESH_SEED))
     talk(f"identifying from {len(recording)} simulated samples ...")
@@ -67,6 +67,7 @@ def demo(output: Path) -> None:
         "structures.png": "force error of each rendering structure",
     }
     with finishing():
+        output.mkdir(exist_ok=True)
         recording.write(output / "sample-1.csv")
         fresh.write(output / "sample-2.csv")
         model.save(output / "model.json")
@@ -91,15 +92,14 @@ def demo(output: Path) -> None:
             click.echo(f"{output / name}: {meaning}")
 
 
-def _prepare(folder: Path) -> None:
-    """Make the folder, or refuse before the work what would fail after it."""
-    try:
-        folder.mkdir(exist_ok=True)
-    except FileNotFoundError:
-        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}") from None
-    except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror}") from None
-    require_writable(folder / "model.json")
+def _require_folder(folder: Path) -> None:
+    """Refuse, before the work, a folder that could not be made or written after it."""
+    if folder.is_dir():
+        require_writable(folder / "model.json")
+    elif folder.exists():
+        raise InputError(f"{folder} is a file, and the demo writes a folder; choose another with --output")
+    else:
+        require_writable(folder)
 
 
 def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
