@@ -2,14 +2,17 @@
 """palpate verify and palpate show: numbers, figures, and what is said of a model file that is wrong."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from palpate import Recording, load_model, verify
+from palpate import Recording, load_model, read_recording, verify
 from palpate.cli.main import main
+from palpate.cli.pictures import close_loops, picture_closed_loops, picture_verification
 from test_planning import keyswitch_by_hand, model_by_hand
 
 JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated", "units"]
@@ -46,8 +49,6 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert main(["verify", "m.json", "a.csv", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert list(result) == JSON_FIELDS
-    from palpate import read_recording
-
     expected = verify(load_model("m.json"), read_recording("a.csv"))
     assert result["nrmse"] == expected.nrmse
     assert result["fresh"] is True
@@ -61,6 +62,28 @@ def test_both_figures_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]) 
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
     assert Path("b.pdf").read_bytes().startswith(b"%PDF")
     assert "force-driven, explicit, m = 0.001, B_o = 0.5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("metadata", "name"), [({"simulated": "yes"}, "simulated data"), ({}, "measured")])
+def test_a_simulated_recording_is_never_called_measured(
+    metadata: dict[str, str], name: str, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = replace(read_recording("a.csv"), metadata=metadata)
+    model = load_model("m.json")
+    legends: list[str] = []
+    savefig = Figure.savefig
+
+    def looked_at(figure: Figure, *arguments: Any, **options: Any) -> None:
+        shown = [axes.get_legend() for axes in figure.axes]
+        legends.extend(text.get_text() for legend in shown if legend for text in legend.get_texts())
+        savefig(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", looked_at)
+    picture_verification(Path("a.png"), model, [(recording, verify(model, recording))])
+    assert legends == [name, "model"]
+    legends.clear()
+    picture_closed_loops(Path("b.png"), recording, close_loops(model, recording))
+    assert set(legends) == {"recorded (simulated)" if metadata else "recorded", "rendered"}
 
 
 def test_a_recording_with_strokes_is_drawn(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

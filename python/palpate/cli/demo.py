@@ -62,8 +62,8 @@ def demo(output: Path) -> None:
         "sample-1.csv": "simulated recording that the model was identified from",
         "sample-2.csv": "simulated recording that it was verified on",
         "model.json": "the model",
-        "measured-and-modelled.png": "its force over position beside the fresh recording, residuals beneath",
-        "real-against-rendered.png": "recorded and rendered force over position, the loop closed both ways",
+        "force-over-position.png": "the model beside the fresh recording, residuals beneath",
+        "closed-loop.png": "recorded and rendered force over position, the loop closed both ways",
         "structures.png": "force error of each rendering structure",
     }
     with finishing():
@@ -71,8 +71,8 @@ def demo(output: Path) -> None:
         recording.write(output / "sample-1.csv")
         fresh.write(output / "sample-2.csv")
         model.save(output / "model.json")
-        picture_verification(output / "measured-and-modelled.png", model, [(fresh, verification)])
-        picture_closed_loops(output / "real-against-rendered.png", loops)
+        picture_verification(output / "force-over-position.png", model, [(fresh, verification)])
+        picture_closed_loops(output / "closed-loop.png", fresh, loops)
         picture_structures(output / "structures.png", structures, fresh.units["force"])
         print_numbers(
             {

@@ -57,6 +57,10 @@ def print_closed_loops(loops: Sequence[ClosedLoop]) -> None:
     )
 
 
+def _is_simulated(recording: Recording) -> bool:
+    return "simulated" in recording.metadata
+
+
 def picture_verification(
     path: Path, model: Model, verified: Sequence[tuple[Recording, Verification]]
 ) -> None:
@@ -78,8 +82,16 @@ def picture_verification(
         units=verified[0][0].units,
     )
     modelled = np.concatenate([verification.force for _, verification in verified])
+    simulated = any(_is_simulated(recording) for recording, _ in verified)
     with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
-        draw_measured_and_modelled(force, residual, recording, modelled, one_curve=one_curve)
+        draw_measured_and_modelled(
+            force,
+            residual,
+            recording,
+            modelled,
+            one_curve=one_curve,
+            seen="simulated data" if simulated else "measured",
+        )
 
 
 def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
@@ -94,8 +106,8 @@ def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
         )
 
 
-def picture_closed_loops(path: Path, loops: Sequence[ClosedLoop]) -> None:
-    """Recorded and rendered force over position, one panel for each closed loop."""
+def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[ClosedLoop]) -> None:
+    """Recorded and rendered force over position, one panel for each closed loop of a recording."""
     from ..planning import describe
     from ..plotting import draw_real_against_rendered
 
@@ -107,6 +119,7 @@ def picture_closed_loops(path: Path, loops: Sequence[ClosedLoop]) -> None:
                 (loop.rendered_position, loop.rendered_force),
                 loop.units,
                 title=f"{_DRIVEN[loop.view]}\n{describe(loop.scheme)}",
+                real_name="recorded (simulated)" if _is_simulated(recording) else "recorded",
             )
 
 

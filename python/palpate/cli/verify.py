@@ -61,7 +61,7 @@ def verify(
         if plot is not None:
             picture_verification(plot, model, [(recording, verification)])
         if plot_closed_loop is not None:
-            picture_closed_loops(plot_closed_loop, loops)
+            picture_closed_loops(plot_closed_loop, recording, loops)
         if as_json:
             print_json(
                 {
