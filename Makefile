@@ -18,6 +18,7 @@ PYTHON ?= python3
 
 # How many random cases a test draws: 1 for every change, 100 for the long run. How long a benchmark runs: 1 for
 # numbers that are published, 0.01 to see that all run and that their answers are right. Both can be set from outside.
+# The sanitizers slow a program ten times and get a tenth of the cases.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full: export PALPATE_TEST_SCALE ?= 100
 bench: export PALPATE_BENCH_SCALE ?= 1
@@ -82,8 +83,8 @@ test-cpp: setup
 
 test-full: setup
 	tools/cpp_tests.sh release
-	tools/cpp_tests.sh asan
-	tools/cpp_tests.sh tsan
+	sanitized=$$(( (PALPATE_TEST_SCALE + 9) / 10 )); for preset in asan tsan; do \
+	  PALPATE_TEST_SCALE=$$sanitized tools/cpp_tests.sh $$preset; done
 	tools/install_tests.sh
 	$(python) -m pytest
 

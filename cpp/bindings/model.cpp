@@ -184,18 +184,27 @@ py::array_t<double> predict(const ForceModel& model, const Array& x) {
     return result;
 }
 
-py::array_t<double> play_states(const ForceModel& model, const Array& position, std::optional<double> start) {
+py::array_t<double> play_states(const Array& position, double radius, std::optional<double> start) {
     require_vector(position, "position");
-    detail::require(model.hysteresis() != nullptr && model.play_radius().has_value(),
-                    "the model has no play radius, so a motion has no play state");
+    detail::require(radius > 0.0, "radius is " + std::to_string(radius) + ", must be > 0");
     py::array_t<double> result(position.size());
-    HysteresisNetwork::State state =
-        model.hysteresis()->start(start.value_or(position.size() > 0 ? position.data()[0] : 0.0));
+    double state = start.value_or(position.size() > 0 ? position.data()[0] : 0.0);
     for (py::ssize_t k = 0; k < position.size(); ++k) {
-        model.hysteresis()->advance(position.data()[k], state);
-        result.mutable_data()[k] = state.play;
+        state = play(position.data()[k], state, radius);
+        result.mutable_data()[k] = state;
     }
     return result;
+}
+
+py::array_t<double> model_play_states(const ForceModel& model, const Array& position,
+                                      std::optional<double> start) {
+    detail::require(model.play_radius().has_value(),
+                    "the model has no play radius, so a motion has no play state");
+    return play_states(position, *model.play_radius(), start);
+}
+
+std::pair<double, double> pair_of(Interval interval) {
+    return {interval.lower, interval.upper};
 }
 
 py::object extrapolated(const ForceModel& model, const Array& position) {
@@ -210,6 +219,15 @@ py::object extrapolated(const ForceModel& model, const Array& position) {
     py::array_t<bool> result(std::vector<py::ssize_t>(position.shape(), position.shape() + position.ndim()));
     std::transform(position.data(), position.data() + position.size(), result.mutable_data(), outside);
     return result;
+}
+
+Interval bounds_of(Interval (*bounds)(const NetworkParameters&, double, double, double), const Array& alpha,
+                   const Array& beta, const Array& weight, double linear, double bias, double lower,
+                   double upper, double relative) {
+    const NetworkParameters network{1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+    validate(network, {{lower}, {upper}, {}, {}, std::nullopt});
+    detail::require(relative > 0.0, "relative is " + std::to_string(relative) + ", must be > 0");
+    return bounds(network, lower, upper, relative);
 }
 
 }  // namespace
@@ -241,15 +259,23 @@ void bind_model(py::module_& module) {
              "Force at X (n, d), (n,); a hysteresis model takes the direction as one more column.");
     type.def("extrapolated", &extrapolated, "position"_a,
              "Whether a position lies outside the identified domain.");
-    type.def("play", &play_states, "position"_a, "start"_a = py::none(),
+    type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
         "slope_range",
         [](const ForceModel& model) {
             require_one_input(model.parameters());
-            return model.slope_range();
+            return pair_of(model.slope_bounds());
         },
-        "Smallest and largest slope inside the domain, sliding either way: sampled, not proved.");
+        "Proved (smallest, largest) slope inside the domain, sliding either way; within 1 % of the "
+        "steepest.");
+    type.def(
+        "loss_range",
+        [](const ForceModel& model) {
+            detail::require(model.hysteresis() != nullptr, "the model has no hysteresis, so it has no loss");
+            return pair_of(model.hysteresis()->loss().value_bounds());
+        },
+        "Proved (smallest, largest) h inside the domain; within 1 % of the largest.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -277,6 +303,30 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("above", [](const ForceModel& m) { return name_of(m.domain().above); });
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
+
+    module.def(
+        "play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
+        "State (n,) of the play operator of a radius along a motion (n,), started at rest unless told\n"
+        "otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).");
+
+    const auto bind_bounds = [&](const char* name, auto bounds, const char* doc) {
+        module.def(
+            name,
+            [bounds](const Array& alpha, const Array& beta, const Array& weight, double linear, double bias,
+                     double lower, double upper, double relative) {
+                return pair_of(bounds_of(bounds, alpha, beta, weight, linear, bias, lower, upper, relative));
+            },
+            py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a, "lower"_a, "upper"_a,
+            "relative"_a = 0.01, doc);
+    };
+    bind_bounds(
+        "value_bounds", &value_bounds,
+        "Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`\n"
+        "times max|f| wider than the true range.");
+    bind_bounds(
+        "slope_bounds", &slope_bounds,
+        "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
+        "times max|f'| wider than the true range.");
 }
 
 }  // namespace palpate::bindings

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ._core import DeviceProfile, Hand, Scheme, __version__
     from .errors import InputError
-    from .identification import IdentifyOptions, frame_bounds, identify
+    from .identification import IdentifyOptions, frame_bounds
+    from .identification.identify import identify
     from .model import Model, load_model
     from .planning import Plan, simulate
     from .recording import Recording, read_recording

@@ -22,7 +22,7 @@ TEST(LoadLineSolver, SolvesAnyUniqueLoadLineOfRandomNetworks) {
         const WaveletNetwork network{test::random_network(random, static_cast<std::size_t>(k % 12)),
                                      test::unit_domain(Continuation::Free)};
         const double lowest =
-            std::min(network.curve().slope_range().first, -network.curve().extent().largest_force);
+            std::min(network.curve().slope_bounds().lower, -network.curve().extent().largest_force);
         const double p = -lowest + std::exp(uniform(random, -2.0, 8.0));
         const double q = uniform(random, -2.0, 2.0) * p;
         const Solution solution = LoadLineSolver{}.solve(network, {}, {p, q}, uniform(random, -2.0, 3.0));

@@ -4,4 +4,6 @@
 
 const char* word_of(palpate::Status status);
 
-int main() { return std::strcmp(word_of(palpate::Status::Limited), "Limited"); }
+int main() {
+    return std::strcmp(word_of(palpate::Status::Limited), "Limited");
+}

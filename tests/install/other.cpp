@@ -2,4 +2,6 @@
 // A second translation unit: whatever the headers define must be inline.
 #include <palpate/palpate.hpp>
 
-const char* word_of(palpate::Status status) { return palpate::text(status).word; }
+const char* word_of(palpate::Status status) {
+    return palpate::text(status).word;
+}

@@ -120,6 +120,8 @@ def test_play_state_follows_the_motion() -> None:
     motion = np.array([0.2, 0.5, 0.45, 0.2])
     play = model.play(motion)
     assert play == pytest.approx([0.2, 0.4, 0.4, 0.3])
+    assert np.array_equal(_core.play(motion, 0.1), play)
+    assert _core.play(motion, 0.1, start=0.25)[0] == 0.25
     assert model.force(motion, play=play) == pytest.approx(5 * motion + 0.2 * np.array([0, 1, 0.5, -1]))
 
 

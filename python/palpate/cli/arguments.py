@@ -61,8 +61,9 @@ class ReadingOptions:
         from ..recording import read_recording
 
         recording = read_recording(path, **self.options)
-        talk(f"read {path}: {len(recording)} rows")
-        for note in recording.notes:
+        chosen, *others = recording.notes
+        talk(f"read {path}: {len(recording)} rows; {chosen}")
+        for note in others:
             talk(f"  {note}")
         return recording
 
@@ -130,7 +131,12 @@ def reading_options(command: F) -> F:
                 help="Turns a force column in A into N*m.",
             ),
             click.option(
-"--rows", metavar="START:STOP", callback=_row_range, default=None, help="Use these rows only, counted from 0."),
+                "--rows",
+                metavar="START:STOP",
+                callback=_row_range,
+                default=None,
+                help="Use these rows only, counted from 0.",
+            ),
             click.option(
                 "--invalid",
                 type=click.Choice(["refuse", "drop"]),

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 import traceback
+from contextlib import suppress
 from dataclasses import dataclass
 
 import click
@@ -32,24 +32,17 @@ class Ending:
     help: str = ""
 
     def tell(self, *, as_json: bool) -> None:
-        """To a machine as one object on standard output, to a person as one line on standard error."""
-        try:
-            if self.help:
-                click.echo(self.help, err=True)
-            elif self.sentence and as_json:
-                click.echo(json.dumps({"error": self.sentence}, ensure_ascii=False))
-            elif self.sentence:
-                click.echo(f"error: {self.sentence}", err=True)
-            sys.stdout.flush()
-        except BrokenPipeError:
-            self._leave_quietly()
+        """To a machine as one object on standard output, to a person as one line on standard error.
 
-    @staticmethod
-    def _leave_quietly() -> None:
-        """What is still buffered has no reader: let the interpreter flush it into nothing."""
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
+        Where nobody can be told, the exit code has to do.
+        """
+        with suppress(OSError):
+            if as_json and self.sentence:
+                click.echo(json.dumps({"error": self.sentence}, ensure_ascii=False))
+                return
+        with suppress(OSError):
+            if self.help or self.sentence:
+                click.echo(self.help or f"error: {self.sentence}", err=True)
 
 
 def ending_of(error: BaseException) -> Ending:
@@ -63,7 +56,6 @@ def ending_of(error: BaseException) -> Ending:
     if isinstance(error, (KeyboardInterrupt, click.Abort)):
         return Ending(INTERRUPTED, "interrupted; nothing was written")
     if isinstance(error, BrokenPipeError):
-        Ending._leave_quietly()
         return Ending(FAILED)
     if isinstance(error, ValueError):
         return Ending(BAD_INPUT, _one_line(str(error)))

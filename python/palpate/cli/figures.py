@@ -19,7 +19,7 @@ _COLUMN_INCHES = 3.5
 
 _DOTS_PER_INCH = 200
 
-_STYLE: dict[str, Any] = {
+_STYLE: Any = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
     "legend.fontsize": 7.0,

@@ -10,6 +10,7 @@ from importlib import import_module
 import click
 
 from .ending import ending_of
+from .verb import Verbs
 
 _VERBS = {
     "identify": "Identify a model from recordings.",
@@ -21,7 +22,7 @@ _VERBS = {
 """Every verb with its line in the help; its file is imported only when it is used."""
 
 
-class _Verbs(click.Group):
+class _LazyVerbs(Verbs):
     """A group whose commands live in the module of their name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -48,7 +49,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
 
 
 @click.group(
-    cls=_Verbs,
+    cls=_LazyVerbs,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="Example: palpate identify press.csv -o press.json",

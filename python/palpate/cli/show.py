@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from .arguments import PATH
+from .verb import Verb
 
 
-@click.command(no_args_is_help=True, epilog="Example: palpate show press.json")
+@click.command(cls=Verb, no_args_is_help=True, epilog="Example: palpate show press.json")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 def show(model_file: Path) -> None:
     """Print a model: its terms, its domain, its units, and how it was identified."""

@@ -5,24 +5,23 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from .._core import Scheme, structure_names
 from .arguments import PATH, json_option, plot_option
 from .ending import WorkError
-from .figures import figure_file, require_figure_name
+from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
-
-if TYPE_CHECKING:
-    from ..planning import Plan
-    from ..recording import Recording
+from .pictures import picture_rendering
+from .verb import Verb
 
 _DEFAULT = Scheme()
 
 
 @click.command(
+    cls=Verb,
     no_args_is_help=True,
     epilog="Example: palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv",
 )
@@ -111,7 +110,7 @@ def simulate(
         if output is not None:
             rendered.write(output)
         if plot is not None:
-            _draw(plot, plan, rendered)
+            picture_rendering(plot, plan, rendered)
         if as_json:
             print_json(result)
             return
@@ -125,15 +124,4 @@ def simulate(
                 "extrapolated": f"{100 * extrapolated:.3g} %",
                 "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
             }
-        )
-
-
-def _draw(path: Path, plan: Plan, rendered: Recording) -> None:
-    from ..planning import force_at
-    from ..plotting import draw_measured_and_modelled
-
-    modelled = force_at(plan, rendered.position)
-    with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
-        draw_measured_and_modelled(
-            force, residual, rendered, modelled, one_curve=not plan.model.hysteretic, seen="rendered"
         )

@@ -18,7 +18,7 @@ def read_json(path: Path) -> Any:
     """The content of a JSON file."""
     require_file(path)
     try:
-        return json.loads(path.read_bytes())
+        return json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise InputError(f"{path}, line {error.lineno}: this is not JSON: {error.msg}") from None
     except UnicodeDecodeError:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from .._core import ForceModel, __version__
@@ -18,7 +17,7 @@ from ..recording import Source
 from .checks import checked
 from .fit import Fit, PathStep
 from .jsontext import read_json, write_json
-from .schema import VERSION, ModelFile, Network
+from .schema import VERSION, ModelFile
 from .text import describe
 
 _HELD_OUT = "held_out_every"
@@ -217,7 +216,7 @@ class Model(ForceModel):
             kind=file.kind,
             inputs=file.inputs,
             units=file.units.model_dump(),
-            **_network(file.network),
+            **file.network.model_dump(exclude={"dimension"}),
             lower=file.domain.lower,
             upper=file.domain.upper,
             **file.continuation.model_dump(),
@@ -279,14 +278,6 @@ def _fit_record(fit: Fit) -> dict[str, Any]:
             for step in fit.path
         ],
     }
-
-
-def _network(network: Network) -> dict[str, Any]:
-    arrays = network.model_dump(exclude={"dimension"})
-    for name in ("alpha", "beta"):
-        # An empty list has lost its second dimension.
-        arrays[name] = np.reshape(arrays[name], (-1, network.dimension))
-    return arrays
 
 
 def load_model(path: str | os.PathLike[str]) -> Model:

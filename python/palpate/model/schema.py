@@ -111,7 +111,7 @@ class ModelFile(_Part):
     """A model of a force, identified by palpate. SI units."""
 
     format: Literal["palpate-model"]
-    version: Literal[1]
+    version: Annotated[int, Field(ge=VERSION, le=VERSION)]
     created_by: str
     kind: Literal["position", "hysteresis", "position_velocity", "general"]
     units: Units

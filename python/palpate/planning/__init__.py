@@ -4,7 +4,7 @@
 from .bench import Bench, bench_for, sweeping_hand
 from .comparison import Comparison, compare_structures
 from .plan import Plan, explicit_slope_limit, play_radius_for
-from .simulation import ForceError, force_at, force_error, simulate
+from .simulation import ForceError, describe, force_at, force_error, simulate
 
 __all__ = [
     "Bench",
@@ -13,6 +13,7 @@ __all__ = [
     "Plan",
     "bench_for",
     "compare_structures",
+    "describe",
     "explicit_slope_limit",
     "force_at",
     "force_error",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._core import DeviceProfile, Hand, Scheme
+from .._core import DeviceProfile, Hand, Scheme, motion_driven
 from .._typing import Float1D
 from ..model import Model
 from .plan import play_radius_for
@@ -18,6 +18,12 @@ _KNOB_TRAVEL = 0.5
 
 _MARGIN = 0.01
 """Share of the travel that the hand leaves free at either end, for its overshoot."""
+
+_HELD_SHARE = 0.8
+"""Share of the force limit that the hand presses for: harder structures and damping need the rest."""
+
+_RAMP_SAMPLES = 1001
+"""Steps of a slow motion through the domain."""
 
 _STIFFER_THAN_SCENE = 2.0
 """Stiffness of the hand over that of the straight line through the scene, so that it reaches the far end."""
@@ -77,10 +83,11 @@ def bench_for(model: Model) -> Bench:
 
 
 def sweeping_hand(model: Model, device: DeviceProfile, *, scale: float = 1.0) -> Hand:
-    """A hand that leads the handle through the whole domain of a model and not beyond.
+    """A hand that leads the handle through the domain of a model and not beyond it, whatever the structure.
 
-    The hand is a spring to a moving point, so the point has to run ahead by f / stiffness; where the device
-    cannot hold the model's force, the point runs ahead by what the device can.
+    The hand is a spring to a moving point, which has to run ahead of the handle by the felt force over the
+    hand's stiffness. Behind a coupling less force is felt, so the point runs ahead by what is felt there: a
+    harder structure is pressed a little less far, and none is extrapolated.
 
     Parameters
     ----------
@@ -94,17 +101,30 @@ def sweeping_hand(model: Model, device: DeviceProfile, *, scale: float = 1.0) ->
     default = Hand()
     lower, upper = float(model.lower[0]), float(model.upper[0])
     travel = upper - lower
-    stiffness = max(default.stiffness * scale, _STIFFER_THAN_SCENE * _largest_force(model) / travel)
-    inner = np.array([lower + _MARGIN * travel, upper - _MARGIN * travel])
-    force = np.clip(
-        _sliding_force(model, inner, np.array([-1.0, 1.0])), -device.force_limit, device.force_limit
+    pressed = min(_largest_force(model), device.force_limit)
+    stiffness = max(default.stiffness * scale, _STIFFER_THAN_SCENE * pressed / travel)
+    soft = Scheme(
+        coupling_stiffness=Scheme().coupling_stiffness * scale,
+        coupling_damping=0.0,
+        play_radius=play_radius_for(model, device),
     )
-    targets = inner + force / stiffness
+    inwards = np.linspace(lower + _MARGIN * travel, upper - _MARGIN * travel, _RAMP_SAMPLES)
+
+    def target(ramp: Float1D) -> float:
+        """Where the hand must aim for the handle to come to rest at the end of a slow motion, or before it
+        where the device could not hold the force.
+        """
+        felt = motion_driven(model, soft, ramp, device.period_s)["force"]
+        held = np.flatnonzero(np.abs(felt) <= _HELD_SHARE * device.force_limit)
+        last = held[-1] if held.size else -1
+        return float(ramp[last] + felt[last] / stiffness)
+
+    ends = target(inwards[::-1]), target(inwards)
     return Hand(
         stiffness=stiffness,
         damping=default.damping * scale,
-        lower=float(targets.min()),
-        upper=float(targets.max()),
+        lower=min(ends),
+        upper=max(ends),
         frequency_hz=default.frequency_hz,
     )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures: one function each, drawing on axes that the caller made. A leaf: only the command line needs it."""
+"""Figures: one function each, drawing on axes that the caller made. Only the command line needs them."""
 
 from .measured_and_modelled import draw_measured_and_modelled
 from .real_against_rendered import draw_real_against_rendered

@@ -18,6 +18,7 @@ def draw_real_against_rendered(
     units: Mapping[str, str],
     *,
     title: str = "",
+    real_name: str = "recorded",
 ) -> None:
     """Recorded force over position, dotted, and rendered force over position, solid (paper figure 15).
 
@@ -34,6 +35,8 @@ def draw_real_against_rendered(
         {"position": "rad", "force": "N*m"}.
     title : str
         Which way the loop was closed.
+    real_name : str
+        What the recorded curve is called.
     """
     # The dots are wider than the line in front of them: both are seen where the two agree.
     axes.plot(
@@ -43,7 +46,7 @@ def draw_real_against_rendered(
         marker=".",
         markersize=4.0,
         markeredgewidth=0,
-        label="recorded",
+        label=real_name,
     )
     axes.plot(*thinned(*rendered), color="black", linewidth=0.7, label="rendered")
     label_position(axes, units)

@@ -94,10 +94,11 @@ def choose_columns(
         A named column or unit does not exist, or no rule chooses.
     """
     named = {"position": position, "force": force, "time": time}
-    for option, value in (*named.items(), ("direction", direction), *(("inputs", item) for item in inputs)):
+    wanted = [(f"--{role}", name) for role, name in (*named.items(), ("direction", direction))]
+    for option, value in (*wanted, *(("inputs", name) for name in inputs)):
         if value is not None and value not in names:
             raise InputError(
-                f"{file} has no column {value!r} for --{option}; its columns are {', '.join(names)}"
+                f"{file} has no column {value!r} for {option}; its columns are {', '.join(names)}"
             )
     columns = _with_units(file, names, named, dict(units or {}))
     notes: list[str] = []

@@ -179,7 +179,6 @@ class CsvFile:
                     encoding="utf-8",
                     header=None,
                     names=list(self.names),
-                    index_col=False,
                     skiprows=self._header_line,
                     dtype=dtypes,
                     keep_default_na=False,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,12 +11,13 @@ from typing import Literal
 
 import numpy as np
 
-from .._typing import Float1D, Int8Vector
+from .._typing import Float1D
 from ..errors import InputError
 from .columns import Choice, Column, choose_columns
 from .csv_file import CsvFile
 from .files import require_file, sha256_of_file
 from .layout import Layout
+from .notes import chosen, noticed
 from .parquet_file import ParquetFile
 from .recording import UNSTATED, Recording, Source
 from .rows import RowCheck
@@ -27,10 +29,6 @@ MIN_ROWS = 10
 
 MIN_POSITIONS = 3
 """Fewer distinct positions show no force over position."""
-
-FALLING = -0.3
-"""Correlation of force and position below which the force counts as falling over the whole file. A mirrored
-axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction stay between -0.3 and 0.2."""
 
 
 def read_recording(
@@ -142,6 +140,8 @@ def read_recording(
     f = _in_si(choice.force, cells)
     force_unit = choice.force.unit.si if choice.force.unit else UNSTATED
     if torque_constant is not None:
+        if not (math.isfinite(torque_constant) and torque_constant > 0):
+            raise InputError(f"--torque-constant-Nm-per-A is {torque_constant}; it must be a number > 0")
         if force_unit != "A":
             raise InputError(
                 f"{file}: --torque-constant-Nm-per-A turns a current into a torque, but the force is "
@@ -171,7 +171,7 @@ def read_recording(
             "force": force_unit,
         },
         source=source,
-        notes=(_chosen(choice, stroke, torque_constant), *notes, *_noticed(x, f, words)),
+        notes=(chosen(choice, stroke, torque_constant), *notes, *noticed(x, f, words)),
     )
 
 
@@ -224,33 +224,3 @@ def _require_enough(file: Path, position: Column, x: Float1D) -> None:
             f"{file}: column {position.name} holds {distinct} distinct value{plural}; "
             f"force over position needs at least {MIN_POSITIONS}"
         )
-
-
-def _chosen(choice: Choice, stroke: str | None, torque_constant: float | None) -> str:
-    parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
-    if torque_constant is not None:
-        parts[-1] += f" times {torque_constant:g} N*m/A"
-    elif choice.force.unit is not None and choice.force.unit.si == "A":
-        parts[-1] += " (a current; it stays in A)"
-    parts.append(f"time is {choice.time.name}" if choice.time else "there is no time")
-    parts.append(f"direction is {stroke}" if stroke else "there is no direction")
-    if choice.inputs:
-        parts.append(f"inputs are {', '.join(column.name for column in choice.inputs)}")
-    return ", ".join(parts)
-
-
-def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
-    """Say once what looks mirrored; nothing is ever flipped silently."""
-    signs = []
-    if np.ptp(f) > 0 and (correlation := float(np.corrcoef(x, f)[0, 1])) < FALLING:
-        signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
-    if words is not None and len(x) > 1:
-        step = np.diff(x) * words[1:]
-        if step.sum() < 0:
-            signs.append("the position falls where the direction goes into the object")
-    if not signs:
-        return []
-    return [
-        f"{' and '.join(signs)}: if the position grows out of the object give --negate position, "
-        "if the force is positive when pulling give --negate force"
-    ]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from .._typing import Float1D, Int8Vector
@@ -43,7 +44,7 @@ class RowCheck:
 
     def directions(self, name: str, cells: Cells) -> Int8Vector:
         """The direction that each row states. A word that is not known refuses the file in any case."""
-        words, codes = np.unique(cells.astype(str), return_inverse=True)
+        codes, words = pd.factorize(cells)
         values = np.zeros(len(words), dtype=np.int8)
         for index, word in enumerate(words):
             value = direction_of(word)

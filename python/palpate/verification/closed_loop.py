@@ -17,7 +17,7 @@ from ..model import Model
 from ..recording import Recording
 from .metrics import normalised, root_mean_square
 from .prediction import require_same_units
-from .timing import even_motion
+from .timing import even_motion, require_period
 
 PLAY_SHARE_OF_TRAVEL = 0.01
 """Play radius over travel where neither model nor scheme gives one: recorded strokes do not tell it."""
@@ -124,6 +124,7 @@ def force_driven(
     InputError
         The model and the recording, or the model and the scheme, do not fit.
     """
+    require_period(period_s)
     default = scheme or Scheme(structure="explicit")
     if default.structure not in ("explicit", "implicit"):
         raise InputError(
@@ -208,7 +209,7 @@ def _steepest_slope(model: Model, scheme: Scheme) -> float:
         return steepest
     x = np.linspace(model.lower[0], model.upper[0], _STIFFNESS_SAMPLES)
     loss = (model.force(x, direction=np.ones_like(x)) - model.force(x, direction=-np.ones_like(x))) / 2
-    radius = float(scheme.play_radius or model.play_radius)
+    radius = scheme.play_radius or model.play_radius or np.inf
     return steepest + float(np.abs(loss).max()) / radius
 
 

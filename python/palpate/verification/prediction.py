@@ -91,5 +91,5 @@ def _inputs(model: Model, recording: Recording) -> Float2D:
         elif name in recording.input_names:
             columns.append(recording.inputs[:, recording.input_names.index(name)])
         else:
-            raise InputError(f"the model needs the input {name}; read the recording with --inputs {name}")
+            raise InputError(f"the model needs the input {name}; read the recording with inputs=({name!r},)")
     return np.column_stack(columns)

@@ -46,8 +46,7 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     InputError
         The recording does not move, is shorter than two samples, or has a time and a speed was given.
     """
-    if not period_s > 0:
-        raise InputError(f"period_s is {period_s}; it must be > 0")
+    require_period(period_s)
     if recording.time is not None:
         if stroke_speed is not None:
             raise InputError("a stroke speed was given, but the recording has a time of its own")
@@ -60,6 +59,12 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
         raise InputError(f"stroke_speed is {speed}; it must be > 0")
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(recording.position)))])
     return _sampled(recording, way / speed, period_s, speed)
+
+
+def require_period(period_s: float) -> None:
+    """Refuse a sample time that is not positive."""
+    if not period_s > 0:
+        raise InputError(f"period_s is {period_s}; it must be > 0")
 
 
 def _sampled(recording: Recording, time: Float1D, period_s: float, assumed_speed: float | None) -> EvenMotion:

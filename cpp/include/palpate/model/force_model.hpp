@@ -51,15 +51,14 @@ class ForceModel {
         return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
-    /// Smallest and largest slope inside the domain (d = 1), sliding either way: sampled, not proved.
-    [[nodiscard]] std::pair<double, double> slope_range() const noexcept {
+    /// Proved bounds of the slope inside the domain (d = 1), sliding either way.
+    [[nodiscard]] Interval slope_bounds() const {
         if (const WaveletNetwork* single = network()) {
-            return single->curve().slope_range();
+            return single->curve().slope_bounds();
         }
-        const auto [low, high] = hysteresis()->force().slope_range();
-        const auto [loss_low, loss_high] = hysteresis()->loss().slope_range();
-        const double loss = std::max(std::abs(loss_low), std::abs(loss_high));
-        return {low - loss, high + loss};
+        const Interval common = hysteresis()->force().slope_bounds();
+        const double loss = hysteresis()->loss().slope_bounds().largest();
+        return {common.lower - loss, common.upper + loss};
     }
 
     /// The narrowest width 1 / alpha of its wavelets; the travel when it has none (d = 1).

@@ -21,13 +21,19 @@ struct LossParameters {
     double bias = 0.0;
 };
 
+/// The play operator of radius r: what a slot of width 2r does to a motion,
+///
+///     play_k = min(x_k + r, max(x_k - r, play_{k-1})).
+[[nodiscard]] inline double play(double position, double previous, double radius) noexcept {
+    return std::min(position + radius, std::max(position - radius, previous));
+}
+
 /// A force that differs between the way in and the way out,
 ///
-///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1],
+///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1].
 ///
-/// with the play operator play_k = min(x_k + r, max(x_k - r, play_{k-1})). While h >= 0 no loop generates
-/// energy: with the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi sticking (|s| < 1) is
-/// lossless and sliding loses.
+/// While h >= 0 no loop generates energy: with the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi
+/// sticking (|s| < 1) is lossless and sliding loses.
 class HysteresisNetwork {
   public:
     struct State {
@@ -58,7 +64,7 @@ class HysteresisNetwork {
     }
 
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
-        const double play = moved(x, state.play);
+        const double play = palpate::play(x, state.play, play_radius_);
         const double s = (x - play) / play_radius_;
         const Curve g = force_.at(x);
         const Curve h = loss_.at(x);
@@ -69,16 +75,14 @@ class HysteresisNetwork {
                 g.integral + stored / play_radius_, force_.extrapolated(x)};
     }
 
-    void advance(double x, State& state) const noexcept { state.play = moved(x, state.play); }
+    void advance(double x, State& state) const noexcept {
+        state.play = palpate::play(x, state.play, play_radius_);
+    }
 
     /// At rest the object pushes neither way: s = 0.
     [[nodiscard]] State start(double x) const noexcept { return {x}; }
 
   private:
-    [[nodiscard]] double moved(double x, double play) const noexcept {
-        return std::min(x + play_radius_, std::max(x - play_radius_, play));
-    }
-
     static void check(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
                       double play_radius) {
         validate(network, domain);

@@ -71,7 +71,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
         detail::require(
             !model.hysteresis(),
             "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
-        const double steepest = std::max(model.slope_range().second, 0.0);
+        const double steepest = std::max(model.slope_bounds().upper, 0.0);
         detail::require(steepest <= 0.9 * scheme.coupling.stiffness,
                         "coupling_stiffness is " + std::to_string(scheme.coupling.stiffness) +
                             ", must be at least " + std::to_string(steepest / 0.9) +
@@ -81,9 +81,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
 
 /// The numerical search of a structure's load line: where p + f' can vanish it must not step over a whole
 /// wavelet, or it could miss the branch that a slow motion follows.
-[[nodiscard]] inline LoadLineSolver solver_for(const ForceModel& model, double load_line_slope) noexcept {
+[[nodiscard]] inline LoadLineSolver solver_for(const ForceModel& model, double load_line_slope) {
     LoadLineSolver solver;
-    if (load_line_slope + model.slope_range().first <= 0.0) {
+    if (load_line_slope + model.slope_bounds().lower <= 0.0) {
         solver.longest_step = 0.25 * model.finest_width();
     }
     return solver;

@@ -1,0 +1,436 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The C++ core of palpate: evaluation, filters, solvers, structures and simulation.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+class Status:
+    """
+    Why a step ended as it did; the same words in C++ and in records.
+    
+    Members:
+    
+      Ok : the step is exact to its tolerance
+    
+      MaxIterations : the solver used all its evaluations; the position is its best one
+    
+      NotUnique : the load line meets the environment where it falls faster than the line rises
+    
+      NonFinite : an input or the environment was not a finite number; the force sent is zero
+    
+      Timeout : the device did not answer in time
+    
+      Lost : a sample of the device was lost or came twice
+    
+      Fault : the device reported a fault or is gone; the force sent is zero
+    
+      Limited : the force was clipped to the limit
+    """
+    Fault: typing.ClassVar[Status]
+    Limited: typing.ClassVar[Status]
+    Lost: typing.ClassVar[Status]
+    MaxIterations: typing.ClassVar[Status]
+    NonFinite: typing.ClassVar[Status]
+    NotUnique: typing.ClassVar[Status]
+    Ok: typing.ClassVar[Status]
+    Timeout: typing.ClassVar[Status]
+    __members__: typing.ClassVar[dict[str, Status]]
+    @typing.overload
+    def __eq__(self, other: Status) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Status) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class ForceModel:
+    """
+    A force identified over d inputs, with its domain and continuations.
+    
+    f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis
+    f(x, s) = g(x) + s h(x), h with weights of its own on the same wavelets.
+    """
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        """
+        alpha, beta (N, d); weight (N,); linear, lower, upper (d,). ValueError names the field that is wrong.
+        """
+    @typing.overload
+    def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
+        """
+        Stored energy [J] up to a constant; arguments as for force.
+        """
+    @typing.overload
+    def energy(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same for an array of positions, of any shape.
+        """
+    def extrapolated(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+        """
+        Whether a position lies outside the identified domain.
+        """
+    @typing.overload
+    def force(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
+        """
+        Force of the object against the tool [N or N*m]; a number in, a number out, an array in, an array out.
+        
+        A hysteresis model needs direction (+1 pressing, -1 releasing) or, where it has a play radius, play, the
+        state of the play operator. Inputs that the model does not use are ignored; ValueError names one it misses.
+        """
+    @typing.overload
+    def force(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same for an array of positions, of any shape.
+        """
+    def loss_range(self) -> tuple[float, float]:
+        """
+        Proved (smallest, largest) h inside the domain; within 1 % of the largest.
+        """
+    def play(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        State of the play operator along a motion (n,), started at rest unless told otherwise.
+        """
+    def predict(self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Force at X (n, d), (n,); a hysteresis model takes the direction as one more column.
+        """
+    @typing.overload
+    def slope(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
+        """
+        Local stiffness df/dx; arguments as for force.
+        """
+    @typing.overload
+    def slope(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The same for an array of positions, of any shape.
+        """
+    def slope_range(self) -> tuple[float, float]:
+        """
+        Proved (smallest, largest) slope inside the domain, sliding either way; within 1 % of the steepest.
+        """
+    @property
+    def above(self) -> str:
+        ...
+    @property
+    def alpha(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def below(self) -> str:
+        ...
+    @property
+    def beta(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def bias(self) -> float:
+        ...
+    @property
+    def bias_hysteresis(self) -> float | None:
+        ...
+    @property
+    def dimension(self) -> int:
+        ...
+    @property
+    def hysteretic(self) -> bool:
+        ...
+    @property
+    def linear(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def linear_hysteresis(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        ...
+    @property
+    def lower(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def n_wavelets(self) -> int:
+        ...
+    @property
+    def period(self) -> float | None:
+        ...
+    @property
+    def play_radius(self) -> float | None:
+        ...
+    @property
+    def upper(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def weight(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def weight_hysteresis(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        ...
+class TransferFunction:
+    """
+    H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) with its state.
+    """
+    def __init__(self, numerator: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], denominator: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]) -> None:
+        ...
+    def at(self, z: complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex) -> complex:
+        """
+        H(z), for instance at z = exp(1j * omega * T).
+        """
+    def filter(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The response to a signal (n,) from this state; the state itself is left as it is.
+        """
+    def poles(self) -> typing.Annotated[list[complex], "FixedSize(2)"]:
+        ...
+    def reset(self) -> None:
+        """
+        Back to rest.
+        """
+    def step(self, input: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        The next output sample.
+        """
+    @property
+    def denominator(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        ...
+    @property
+    def numerator(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        ...
+class EnvironmentFilters:
+    """
+    Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.
+    """
+    @property
+    def g1(self) -> TransferFunction:
+        ...
+    @property
+    def g2(self) -> TransferFunction:
+        ...
+    @property
+    def i1(self) -> TransferFunction:
+        ...
+    @property
+    def i2(self) -> TransferFunction:
+        ...
+class DeviceProfile:
+    """
+    What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
+    """
+    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def coulomb_friction(self) -> float:
+        """
+        [N or N*m]
+        """
+    @property
+    def delay_samples(self) -> int:
+        """
+        Whole samples from command to force.
+        """
+    @property
+    def encoder_step(self) -> float:
+        """
+        [m or rad]; 0 = not quantised
+        """
+    @property
+    def force_limit(self) -> float:
+        """
+        [N or N*m]
+        """
+    @property
+    def force_step(self) -> float:
+        """
+        [N or N*m]; 0 = not quantised
+        """
+    @property
+    def id(self) -> str:
+        ...
+    @property
+    def inertia(self) -> float:
+        """
+        [kg or kg*m^2]
+        """
+    @property
+    def period_s(self) -> float:
+        """
+        Longest time between two samples [s].
+        """
+    @property
+    def viscous_damping(self) -> float:
+        """
+        [N*s/m or N*m*s/rad]
+        """
+class Hand:
+    """
+    A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.
+    """
+    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex = 15.0, damping: typing.SupportsFloat | typing.SupportsIndex = 0.05, lower: typing.SupportsFloat | typing.SupportsIndex = 0.02, upper: typing.SupportsFloat | typing.SupportsIndex = 0.47, frequency_hz: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def damping(self) -> float:
+        """
+        [N*s/m or N*m*s/rad]
+        """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        [Hz]
+        """
+    @property
+    def lower(self) -> float:
+        """
+        [m or rad]
+        """
+    @property
+    def stiffness(self) -> float:
+        """
+        [N/m or N*m/rad]
+        """
+    @property
+    def upper(self) -> float:
+        """
+        [m or rad]
+        """
+class Scheme:
+    """
+    How a model is rendered: the structure and its numbers, SI units.
+    """
+    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def validate(self, model: ForceModel) -> None:
+        """
+        ValueError names the field, its value and what would be right for this model.
+        """
+    @property
+    def compensated(self) -> bool:
+        ...
+    @property
+    def coupling_damping(self) -> float:
+        ...
+    @property
+    def coupling_stiffness(self) -> float:
+        ...
+    @property
+    def damping(self) -> float:
+        ...
+    @property
+    def mass(self) -> float:
+        ...
+    @property
+    def play_radius(self) -> float:
+        ...
+    @property
+    def structure(self) -> str:
+        ...
+def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
+    """
+    The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
+    """
+def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
+    """
+    The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
+    Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def mexican_hat(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    """
+    The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.
+    """
+def mexican_hat_curvature(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    """
+    psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).
+    """
+def mexican_hat_integral(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    """
+    An antiderivative of psi: -u exp(-u^2 / 2).
+    """
+def mexican_hat_jerk(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    """
+    psi'''(u) = (-u^5 + 10u^3 - 15u) exp(-u^2 / 2).
+    """
+def mexican_hat_slope(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
+    """
+    psi'(u) = (3u - u^3) exp(-u^2 / 2).
+    """
+def motion_driven(model: ForceModel, scheme: Scheme, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    The force that would have been rendered while a recorded motion (n,) moves the device.
+    Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radius: typing.SupportsFloat | typing.SupportsIndex, start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
+    otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).
+    """
+def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20) -> dict:
+    """
+    The model rendered on a simulated device held by a simulated hand, in virtual time.
+    
+    Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true
+    handle when sampled and at the end of the tick that holds the force), environment_position, force
+    (commanded), applied, evaluations, status, extrapolated.
+    """
+def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
+    """
+    Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`
+    times max|f'| wider than the true range.
+    """
+def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
+    """
+    Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`
+    times max|f| wider than the true range.
+    """
+def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.
+    
+    x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.
+    """
+def wavelet_integral_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).
+    """
+def wavelet_jacobian(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], list[numpy.typing.NDArray[numpy.float64]], list[numpy.typing.NDArray[numpy.float64]]]:
+    """
+    The wavelet columns and their derivatives by the dilations and the translations:
+    (value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).
+    """
+def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
+    """
+__version__: str = '0.1.0'
+paper_sample_time_s: float = 0.001
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit'}
+structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit')
+wavelet_curvature_bound: float = 3.0
+wavelet_jerk_bound: float = 5.7831
+wavelet_slope_bound: float = 1.3801190462

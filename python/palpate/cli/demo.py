@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate demo: the whole way on a simulated sample."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..errors import InputError
+from .arguments import PATH
+from .output import finishing, number, print_numbers, print_table, require_writable, talk
+from .pictures import (
+    close_loops,
+    picture_closed_loops,
+    picture_structures,
+    picture_verification,
+    print_closed_loops,
+)
+from .verb import Verb
+
+if TYPE_CHECKING:
+    from ..planning import Comparison
+
+IDENTIFY_SEED, FRESH_SEED = 1, 2
+"""The two recordings of the sample: one to identify, one that the model has not seen."""
+
+RENDERED_S = 4.0
+"""Simulated time of each rendering [s]."""
+
+
+@click.command(cls=Verb, epilog="Example: palpate demo -o demo")
+@click.option("-o", "--output", type=PATH, metavar="FOLDER", default=Path("demo"), help="Where the files go.")
+def demo(output: Path) -> None:
+    """Identify, verify and render a sample, without any input or device.
+
+    Everything is simulated, and nothing was measured: two recordings of a knob with a soft spring and a hard
+    stop are simulated; a model is identified from one of them, verified on the other, and rendered on a
+    simulated device with each structure.
+    """
+    from ..identification import identify
+    from ..planning import bench_for, compare_structures
+    from ..recording.sample import sample_recording
+    from ..verification import verify
+
+    _require_folder(output)
+    talk(f"everything in this demo is simulated, nothing was measured; its files go to {output}")
+    recording, fresh = (sample_recording(seed) for seed in (IDENTIFY_SEED, FRESH_SEED))
+    talk(f"identifying from {len(recording)} simulated samples ...")
+    start = time.perf_counter()
+    model = identify(recording)
+    seconds = time.perf_counter() - start
+    talk("verifying on a fresh simulated recording, and closing the loop both ways ...")
+    verification = verify(model, fresh)
+    loops = close_loops(model, fresh)
+    talk("rendering on a simulated device with each structure ...")
+    structures = compare_structures(model, bench_for(model), RENDERED_S)
+
+    files = {
+        "sample-1.csv": "simulated recording that the model was identified from",
+        "sample-2.csv": "simulated recording that it was verified on",
+        "model.json": "the model",
+        "force-over-position.png": "the model beside the fresh recording, residuals beneath",
+        "closed-loop.png": "recorded and rendered force over position, the loop closed both ways",
+        "structures.png": "force error of each rendering structure",
+    }
+    with finishing():
+        output.mkdir(exist_ok=True)
+        recording.write(output / "sample-1.csv")
+        fresh.write(output / "sample-2.csv")
+        model.save(output / "model.json")
+        picture_verification(output / "force-over-position.png", model, [(fresh, verification)])
+        picture_closed_loops(output / "closed-loop.png", fresh, loops)
+        picture_structures(output / "structures.png", structures, fresh.units["force"])
+        print_numbers(
+            {
+                "wavelets": str(model.n_wavelets),
+                "parameters": str(model.n_parameters),
+                "NRMSE, fresh": number(verification.nrmse),
+                "RMSE, fresh": f"{number(verification.rmse)} {fresh.units['force']}",
+                "identified in": f"{seconds:.2f} s",
+            }
+        )
+        click.echo()
+        print_closed_loops(loops)
+        click.echo()
+        _print_structures(structures, fresh.units["force"])
+        click.echo()
+        for name, meaning in files.items():
+            click.echo(f"{output / name}: {meaning}")
+
+
+def _require_folder(folder: Path) -> None:
+    """Refuse, before the work, a folder that could not be made or written after it."""
+    if folder.is_dir():
+        require_writable(folder / "model.json")
+    elif folder.exists():
+        raise InputError(f"{folder} is a file, and the demo writes a folder; choose another with --output")
+    else:
+        require_writable(folder)
+
+
+def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
+    """Force error of each structure, or why it was refused."""
+    click.echo(f"force error of each structure, RMS in {unit}")
+    print_table(
+        ("structure", "end of tick", "sampled"),
+        [
+            (row.name, number(row.error.end), number(row.error.instant))
+            if row.error is not None
+            else (row.name, "refused", "")
+            for row in rows
+        ],
+    )
+    for row in rows:
+        if row.refused is not None:
+            click.echo(f"{row.name} is refused: {row.refused}")

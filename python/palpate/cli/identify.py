@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate identify: recordings in, a model out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from .figures import require_figure_name
+from .identify_options import identify_options
+from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
+from .pictures import picture_verification
+from .verb import Verb
+
+if TYPE_CHECKING:
+    from ..recording import Recording
+    from ..verification import Verification
+
+
+@click.command(
+    cls=Verb,
+    no_args_is_help=True,
+    epilog="Example: palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png",
+)
+@click.argument("recording_files", metavar="RECORDING...", type=PATH, nargs=-1, required=True)
+@click.option(
+    "-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="The model file to write."
+)
+@click.option(
+    "--hold-out-every",
+    type=click.IntRange(min=2),
+    default=None,
+    metavar="K",
+    help="Keep every K-th row out of the identification and report the error on these rows.",
+)
+@plot_option("measured and modelled force over position, residuals beneath")
+@json_option
+@reading_options
+@identify_options
+def identify(
+    recording_files: tuple[Path, ...],
+    output: Path,
+    hold_out_every: int | None,
+    plot: Path | None,
+    as_json: bool,
+    reading: ReadingOptions,
+    options: dict[str, Any],
+) -> None:
+    """Identify a model of force over position from recordings.
+
+    A recording is CSV or Parquet with a header of names that end in a unit, such as position_rad and
+    torque_Nm. Columns are chosen by name and unit; the first line printed says which. The model is as simple
+    as the data allows: a constant, a line, a wavelet network, and hysteresis where press and release differ.
+    """
+    from ..identification import identify as identify_model
+    from ..verification import verify
+
+    if plot is not None:
+        require_figure_name(plot)
+    for target in filter(None, (output, plot)):
+        require_writable(target, inputs=recording_files)
+    require_distinct(output, plot)
+    recordings = [reading.read(path) for path in recording_files]
+    judged_on = recordings
+    if hold_out_every is not None:
+        parts = [recording.split(hold_out_every) for recording in recordings]
+        recordings, judged_on = [train for train, _ in parts], [test for _, test in parts]
+    talk("identifying ...")
+    start = time.perf_counter()
+    model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
+    seconds = time.perf_counter() - start
+    verified = [(recording, verify(model, recording)) for recording in judged_on]
+    for note in model.notes.get("identification", ()):
+        talk(f"  {note}")
+    nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
+    result = {
+        "model": str(output),
+        "n_wavelets": model.n_wavelets,
+        "n_parameters": model.n_parameters,
+        "rung": model.fit.rung,
+        "stop_reason": model.stop_reason,
+        "nrmse": nrmse,
+        "seconds": seconds,
+    }
+    rows = sum(len(recording) for recording in judged_on)
+    judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
+    with finishing():
+        if plot is not None:
+            picture_verification(plot, model, verified)
+        model.save(output)
+        if as_json:
+            print_json(result)
+            return
+        print_numbers(
+            {
+                "model": str(output),
+                "wavelets": str(model.n_wavelets),
+                "parameters": str(model.n_parameters),
+                "kind": f"{model.fit.rung}, stopped by {model.stop_reason}",
+                "nrmse": f"{number(nrmse)} on {judged}",
+                "seconds": f"{seconds:.2f}",
+            }
+        )
+
+
+def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
+    """RMSE over the standard deviation of the force, the rows of all recordings taken together."""
+    residual = np.concatenate([verification.residual for _, verification in verified])
+    force = np.concatenate([recording.force[verification.rows] for recording, verification in verified])
+    return float(np.sqrt(np.mean(residual**2)) / np.std(force))

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures that several verbs make: what is drawn, in which file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .figures import figure_file
+from .output import number, print_table
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..planning import Comparison, Plan
+    from ..recording import Recording
+    from ..verification import ClosedLoop, Verification
+
+_LIGHTER = 0.01
+"""Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
+
+
+_DRIVEN = {
+    "motion-driven": "recorded motion drives the device",
+    "force-driven": "recorded force drives the object",
+}
+
+
+def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
+    """Both ways to close the loop.
+
+    The recorded motion drives the device. The recorded force drives the object: with the mass and damping
+    that the paper's explicit environment adds to it, and with the little that the implicit one needs.
+    """
+    from .._core import Scheme
+    from ..verification import force_driven, motion_driven
+
+    paper = force_driven(model, recording)
+    light = Scheme(
+        structure="implicit",
+        mass=_LIGHTER * paper.scheme.mass,
+        damping=_LIGHTER * paper.scheme.damping,
+        play_radius=paper.scheme.play_radius,
+    )
+    return [motion_driven(model, recording), paper, force_driven(model, recording, light)]
+
+
+def print_closed_loops(loops: Sequence[ClosedLoop]) -> None:
+    """How far each closed loop is from the recording: in force when driven by motion, else in position."""
+    from ..planning import describe
+
+    print_table(
+        ("closed loop", "NRMSE"),
+        [(f"{loop.view}, {describe(loop.scheme)}", number(loop.nrmse)) for loop in loops],
+    )
+
+
+def _is_simulated(recording: Recording) -> bool:
+    return "simulated" in recording.metadata
+
+
+def picture_verification(
+    path: Path, model: Model, verified: Sequence[tuple[Recording, Verification]]
+) -> None:
+    """Measured and modelled force over position, residuals beneath; several recordings in one figure."""
+    from ..plotting import draw_measured_and_modelled
+    from ..recording import Recording
+
+    directions = [
+        recording.direction[verification.rows]
+        for recording, verification in verified
+        if recording.direction is not None
+    ]
+    all_directed = len(directions) == len(verified)
+    one_curve = not model.hysteretic or all_directed
+    recording = Recording.from_arrays(
+        np.concatenate([recording.position[verification.rows] for recording, verification in verified]),
+        np.concatenate([recording.force[verification.rows] for recording, verification in verified]),
+        direction=np.concatenate(directions) if all_directed else None,
+        units=verified[0][0].units,
+    )
+    modelled = np.concatenate([verification.force for _, verification in verified])
+    simulated = any(_is_simulated(recording) for recording, _ in verified)
+    with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
+        draw_measured_and_modelled(
+            force,
+            residual,
+            recording,
+            modelled,
+            one_curve=one_curve,
+            seen="simulated data" if simulated else "measured",
+        )
+
+
+def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
+    """Rendered force beside the model's own at the measured position, differences beneath."""
+    from ..planning import force_at
+    from ..plotting import draw_measured_and_modelled
+
+    modelled = force_at(plan, rendered.position)
+    with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
+        draw_measured_and_modelled(
+            force, residual, rendered, modelled, one_curve=not plan.model.hysteretic, seen="rendered"
+        )
+
+
+def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[ClosedLoop]) -> None:
+    """Recorded and rendered force over position, one panel for each closed loop of a recording."""
+    from ..planning import describe
+    from ..plotting import draw_real_against_rendered
+
+    with figure_file(path, height_inches=0.3 + 2.2 * len(loops), rows=(1.0,) * len(loops)) as axes:
+        for each, loop in zip(axes, loops, strict=True):
+            draw_real_against_rendered(
+                each,
+                (loop.recorded_position, loop.recorded_force),
+                (loop.rendered_position, loop.rendered_force),
+                loop.units,
+                title=f"{_DRIVEN[loop.view]}\n{describe(loop.scheme)}",
+                real_name="recorded (simulated)" if _is_simulated(recording) else "recorded",
+            )
+
+
+def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str) -> None:
+    """The force error of each structure that was rendered."""
+    from ..plotting import draw_structures
+
+    shown = [(row.name, row.error) for row in rows if row.error is not None]
+    with figure_file(path, height_inches=0.7 + 0.3 * len(shown)) as (axes,):
+        draw_structures(
+            axes,
+            [name for name, _ in shown],
+            [error.end for _, error in shown],
+            [error.instant for _, error in shown],
+            force_unit,
+        )

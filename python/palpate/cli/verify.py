@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate verify: a model beside a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from .figures import require_figure_name
+from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
+from .pictures import close_loops, picture_closed_loops, picture_verification, print_closed_loops
+from .verb import Verb
+
+if TYPE_CHECKING:
+    from ..verification import ClosedLoop
+
+
+@click.command(
+    cls=Verb, no_args_is_help=True, epilog="Example: palpate verify press.json fresh.csv --plot residuals.png"
+)
+@click.argument("model_file", metavar="MODEL.json", type=PATH)
+@click.argument("recording_file", metavar="RECORDING", type=PATH)
+@plot_option("measured and modelled force over position, residuals beneath")
+@plot_option("recorded and rendered force over position, the loop closed both ways", "--plot-closed-loop")
+@json_option
+@reading_options
+def verify(
+    model_file: Path,
+    recording_file: Path,
+    plot: Path | None,
+    plot_closed_loop: Path | None,
+    as_json: bool,
+    reading: ReadingOptions,
+) -> None:
+    """Compare a model with a recording, best one that it has not seen.
+
+    The closed loop is run both ways: the recorded motion moves the device and the rendered force is compared;
+    the recorded force drives the object and the resulting position is compared.
+    """
+    from ..model import load_model
+    from ..verification import verify as verify_model
+
+    for figure in filter(None, (plot, plot_closed_loop)):
+        require_figure_name(figure)
+        require_writable(figure, inputs=(model_file, recording_file))
+    require_distinct(plot, plot_closed_loop)
+    recording = reading.read(recording_file)
+    model = load_model(model_file)
+    verification = verify_model(model, recording)
+    for note in verification.notes:
+        talk(f"  {note}")
+    loops: list[ClosedLoop] = []
+    if plot_closed_loop is not None:
+        loops = close_loops(model, recording)
+        for note in dict.fromkeys(note for loop in loops for note in loop.notes):
+            talk(f"  {note}")
+    with finishing():
+        if plot is not None:
+            picture_verification(plot, model, [(recording, verification)])
+        if plot_closed_loop is not None:
+            picture_closed_loops(plot_closed_loop, recording, loops)
+        if as_json:
+            print_json(
+                {
+                    name: getattr(verification, name)
+                    for name in ("nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh",
+                                 "extrapolated", "units")
+                }
+            )  # fmt: skip
+            return
+        unit = recording.units["force"]
+        print_numbers(
+            {
+                "nrmse": number(verification.nrmse),
+                "rmse": f"{number(verification.rmse)} {unit}",
+                "r2": f"{verification.r2:.6f}",
+                "worst": f"{number(verification.worst)} {unit}",
+                "within what a hand can tell": f"{100 * verification.within_jnd:.3g} % of rows",
+                "rows": str(verification.n),
+                "fresh": "yes" if verification.fresh else "no: the model was identified on this data",
+                "outside the model's domain": f"{verification.extrapolated} rows",
+            }
+        )
+        if loops:
+            click.echo()
+            print_closed_loops(loops)

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Identification of a wavelet network from recorded force over position (paper section 3)."""
+
+from .frame import frame_bounds
+from .identify import identify
+from .ladder import IdentifiedNetwork, fit_environment
+from .options import IdentifyOptions
+
+__all__ = ["IdentifiedNetwork", "IdentifyOptions", "fit_environment", "frame_bounds", "identify"]

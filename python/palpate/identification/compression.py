@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compression of a recording: rows that share a position become one row with a weight.
+
+An encoder repeats its positions, and the least squares of eq. 4 needs of equal positions only their
+count, their mean force and the sum of squares within the group:
+sum_k (y_k - f(x))^2 = w (mean y - f(x))^2 + within.
+Positions that do not repeat are gathered in cells. The mean position and mean force of a cell are exact
+to second order (:func:`binning_error` is what is left), and the part of the within-sum that the slope
+across the cell explains is removed, so that what remains measures noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D, Float2D
+
+SIDE_LEVELS = 16
+"""Cells of the hysteresis input over [-1, 1]; +-1, where sliding contact stays, are centres of two of them."""
+
+POOLED_CELLS = 5
+"""Neighbouring cells that share one slope."""
+
+
+@dataclass(frozen=True)
+class Compressed:
+    """Weighted rows that stand for a recording in every least-squares problem."""
+
+    positions: Float2D
+    """(m, d)"""
+    force: Float1D
+    """(m,) mean force of a row's samples"""
+    weight: Float1D
+    """(m,) samples that a row stands for"""
+    side: Float1D | None
+    """(m,) hysteresis input s in [-1, 1], or None"""
+    spread: Float1D
+    """(m,) variance of the position within a row, summed over the inputs; 0 where positions were equal"""
+    within: float
+    """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
+    samples: int
+    """Rows of the recording"""
+
+
+class Compressor:
+    """Groups the rows of one recording by position, once, and compresses it with or without a hysteresis input.
+
+    Parameters
+    ----------
+    positions : (n, d)
+    force : (n,)
+    max_positions : int
+        With more distinct positions than this they are gathered in that many cells of a regular grid (for d > 1
+        in all).
+    """
+
+    def __init__(self, positions: Float2D, force: Float1D, *, max_positions: int) -> None:
+        self._positions = positions
+        self._force = force
+        self._key, self._merged = _position_key(positions, max_positions)
+        self._slope: Float1D | None = None
+        if not self._merged and positions.shape[1] == 1:
+            self._slope = self._cell_slopes()
+
+    def rows(self, side: Float1D | None = None) -> Compressed:
+        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart."""
+        key = self._key
+        if side is not None:
+            level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
+            key = key + (int(key.max()) + 1) * level
+        group, count = _ranked(key)
+        x = np.column_stack([_mean(group, count, column) for column in self._positions.T])
+        y = _mean(group, count, self._force)
+        dy = self._force - y[group]
+        within = float(dy @ dy)
+        spread = np.zeros(len(count))
+        if not self._merged:
+            dx = self._positions - x[group]
+            spread = _mean(group, count, np.einsum("nd,nd->n", dx, dx))
+            if self._slope is not None:
+                slope = self._slope[self._key]
+                within -= float(np.sum(slope * dx[:, 0] * (2.0 * dy - slope * dx[:, 0])))
+        merged_side = None if side is None else _mean(group, count, side)
+        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), len(self._force))
+
+    def _cell_slopes(self) -> Float1D:
+        """Slope of the force (cells,) over each position cell (d = 1), pooled with its neighbours.
+
+        It is estimated once, whatever the sides, so that all rungs are charged the same few degrees of freedom.
+        """
+        x, y = self._positions[:, 0], self._force
+        group, count = _ranked(self._key)
+        dx = x - _mean(group, count, x)[group]
+        dy = y - _mean(group, count, y)[group]
+        window = np.ones(min(POOLED_CELLS, len(count)))
+        sxx = np.convolve(np.bincount(group, dx * dx), window, "same")
+        sxy = np.convolve(np.bincount(group, dx * dy), window, "same")
+        slope = np.zeros(int(self._key.max()) + 1)
+        slope[np.unique(self._key)] = np.divide(sxy, sxx, out=np.zeros_like(sxy), where=sxx > 0)
+        return slope
+
+
+def binning_error(rows: Compressed, curvature: Float1D) -> float:
+    """RMS error [force] that the cells put into a fit with second derivative curvature (m,) at the rows.
+
+    The mean of f over a cell differs from f at its mean position by f'' Var(x) / 2 to leading order.
+    """
+    bias = 0.5 * curvature * rows.spread
+    return float(np.sqrt(np.average(bias * bias, weights=rows.weight)))
+
+
+def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], bool]:
+    """Group number of each row, and whether the rows of a group have one and the same position."""
+    d = positions.shape[1]
+    if d == 1:
+        distinct = np.unique(positions[:, 0])
+        if len(distinct) <= max_positions:
+            return np.searchsorted(distinct, positions[:, 0]), True
+    else:
+        rows, key = np.unique(positions, axis=0, return_inverse=True)
+        if len(rows) <= max_positions:
+            return key.reshape(-1), True
+    per_axis = max(2, round(max_positions ** (1.0 / d)))
+    low, reach = positions.min(axis=0), np.ptp(positions, axis=0)
+    scale = np.divide(per_axis, reach, out=np.zeros_like(reach), where=reach > 0)
+    cell = np.minimum((positions - low) * scale, per_axis - 1).astype(np.int64)
+    return np.ravel_multi_index(tuple(cell.T), (per_axis,) * d), False
+
+
+def _ranked(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], Float1D]:
+    """Group numbers without gaps (n,), and the rows of each group (groups,)."""
+    count = np.bincount(key)
+    rank = np.cumsum(count > 0) - 1
+    return rank[key], count[count > 0].astype(float)
+
+
+def _mean(group: NDArray[np.int64], count: Float1D, values: Float1D) -> Float1D:
+    return np.asarray(np.bincount(group, values) / count)

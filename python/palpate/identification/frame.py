@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wavelet frames (paper section 2.4): how tight they are, and the truncated frame that a selection starts from.
+
+The members of a frame are a0^(-m/2) psi_v(a0^(-m) x - k b0) over all integers m and k, with V voices
+psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the same step b0.
+"""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float2D
+from ..errors import InputError
+from .separable import Basis
+
+NEGLIGIBLE = 1e-14
+"""Spectral products below this share of the first one cannot change a printed digit of the bounds."""
+
+
+def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
+    """Daubechies' estimate of the frame bounds of the unit-norm Mexican hat (Daubechies 1990, section II.C).
+
+    A, B = (2 pi / b0) (inf, sup over 1 <= |xi| <= a0 of sum_v sum_m |psi_v^(a0^m xi)|^2
+    -/+ sum_v sum_(k != 0) [beta_v(2 pi k / b0) beta_v(-2 pi k / b0)]^(1/2)), with
+    beta_v(s) = sup over xi of sum_m |psi_v^(a0^m xi)| |psi_v^(a0^m xi + s)|.
+
+    Parameters
+    ----------
+    a0 : float
+        Ratio of neighbouring dilations, above 1.
+    b0 : float
+        Translation step, above 0, the same for every voice.
+    voices : int
+        Dilations per octave.
+
+    Returns
+    -------
+    (A, B) : tuple of float
+        The closer B/A is to 1, the tighter the frame; with A <= 0 the estimate cannot show that it is one.
+
+    Raises
+    ------
+    palpate.InputError
+        Naming the argument that is out of its range.
+    """
+    if not (np.isfinite(a0) and a0 > 1.0):
+        raise InputError(f"a0 is {a0!r}; the ratio of neighbouring dilations must be a finite number above 1")
+    if not (np.isfinite(b0) and b0 > 0.0):
+        raise InputError(f"b0 is {b0!r}; the translation step must be a finite number above 0")
+    if isinstance(voices, bool) or int(voices) != voices or voices < 1:
+        raise InputError(f"voices is {voices!r}; it must be a whole number of 1 or more")
+    # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, whatever the voice
+    levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)
+    frequency = np.linspace(1.0, a0, 1001)[:, None] * a0**levels
+    diagonal, cross = np.zeros(len(frequency)), 0.0
+    for stretch in 2.0 ** (-np.arange(voices) / voices):
+        here = _spectrum(frequency / stretch)
+        diagonal += (here * here).sum(axis=1)
+        shift, first = 1, 0.0
+        while True:
+            step = 2.0 * np.pi * shift / b0
+            # psi^ is even: the supremum over -xi at +s is the one over xi at -s, so both factors are this one
+            overlap = max(
+                float((here * _spectrum((frequency + sign * step) / stretch)).sum(axis=1).max())
+                for sign in (1, -1)
+            )
+            cross += 2.0 * overlap
+            first = max(first, overlap)
+            if overlap <= NEGLIGIBLE * first or overlap < np.finfo(float).tiny:
+                break
+            shift += 1
+    unit = 2.0 * np.pi / b0
+    return float(unit * (diagonal.min() - cross)), float(unit * (diagonal.max() + cross))
+
+
+def _spectrum(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fourier transform (unitary) of the unit-norm Mexican hat, without its sign."""
+    return np.asarray(2.0 / np.sqrt(3.0) * np.pi**-0.25 * frequency**2 * np.exp(-0.5 * frequency**2))
+
+
+def truncated_frame(
+    positions: Float2D, *, coarsest: float, finest: float, frame_scale: float, frame_step: float
+) -> Basis:
+    """Members of the single-scaling frame that have data within them, from the coarsest dilation to the finest.
+
+    Each level's translations are found by walking from the data to the lattice points around it, so that the full
+    grid, whose size grows exponentially with the inputs, is never built.
+
+    positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
+    """
+    d = positions.shape[1]
+    offsets = np.array(list(product((-1, 0, 1), repeat=d)))
+    alpha, beta = [], []
+    dilation = coarsest
+    while dilation <= finest:
+        step = frame_step / dilation
+        nearest = np.unique(np.rint(positions / step).astype(np.int64), axis=0)
+        lattice = np.unique((nearest[:, None, :] + offsets).reshape(-1, d), axis=0)
+        beta.append(lattice * step)
+        alpha.append(np.full((len(lattice), d), dilation))
+        dilation *= frame_scale
+    if not alpha:
+        return Basis.empty(d)
+    return Basis(np.concatenate(alpha), np.concatenate(beta))

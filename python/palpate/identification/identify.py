@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""identify: from recordings to a model."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..model import Fit, Model
+from ..recording import Recording, Source
+from .ladder import IdentifiedNetwork, fit_environment
+from .options import IdentifyOptions, options_from
+
+
+def identify(recording: Recording | Sequence[Recording], **options: Any) -> Model:
+    """Identify the environment behind recorded force over position.
+
+    Climbs the ladder constant, linear, position, hysteresis, and stays on the lowest rung that explains the data.
+
+    Parameters
+    ----------
+    recording : Recording or sequence of Recording
+        Several recordings of one environment are identified together; their units must agree.
+    **options
+        Fields of :class:`IdentifyOptions`.
+
+    Returns
+    -------
+    Model
+        ``model.fit`` says which rung was reached and why growth stopped, ``model.path`` every network on the way,
+        ``model.notes["identification"]`` what was refused, left out or imposed, and at what price.
+
+    Raises
+    ------
+    palpate.InputError
+        For an unknown option or a bad value, and for data from which no force over position can be identified.
+    """
+    settings = options_from(options)
+    recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    if not recordings:
+        raise InputError("identify was given no recording; give one, or a list of them")
+    units = dict(recordings[0].units)
+    for other in recordings[1:]:
+        if dict(other.units) != units:
+            raise InputError(
+                f"the recordings have different units, {units} and {dict(other.units)}; identify them apart"
+            )
+    positions = np.concatenate([part.position for part in recordings])[:, None]
+    force = np.concatenate([part.force for part in recordings])
+    side, starts = None, None
+    if all(part.direction is not None for part in recordings):
+        side = np.concatenate([np.asarray(part.direction, dtype=float) for part in recordings])
+    elif all(part.time is not None for part in recordings):
+        starts = np.concatenate([[0], np.cumsum([len(part.position) for part in recordings])[:-1]]).tolist()
+    return _model_of(fit_environment(positions, force, side, settings, starts=starts), recordings, settings)
+
+
+def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> Model:
+    path = [
+        {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
+        for at in network.path
+    ]
+    return Model(
+        kind="hysteresis" if network.weight_hysteresis is not None else "position",
+        inputs=("position",),
+        units=recordings[0].units,
+        alpha=network.alpha,
+        beta=network.beta,
+        weight=network.weight,
+        linear=network.linear,
+        bias=network.bias,
+        weight_hysteresis=network.weight_hysteresis,
+        linear_hysteresis=network.linear_hysteresis,
+        bias_hysteresis=network.bias_hysteresis,
+        lower=network.lower,
+        upper=network.upper,
+        below=network.below,
+        above=network.above,
+        period=options.period,
+        play_radius=network.play_radius,
+        fit=Fit(
+            rung=network.rung,
+            stop_reason=network.stop_reason,
+            nrmse=network.nrmse,
+            n_wavelets=len(network.weight),
+            n_parameters=network.n_parameters,
+            path=path,
+        ),
+        data=Source.merged(part.source for part in recordings),
+        notes={"identification": list(network.notes)} if network.notes else None,
+    )

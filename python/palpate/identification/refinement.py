@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Refinement: all dilations and translations at once, by bounded variable projection.
+
+Weights, slopes and biases are eliminated (Golub & Pereyra 1973, in Kaufman's form), Levenberg-Marquardt steps are
+taken on log(alpha) and beta. Unbounded, a dilation runs away on measured switch curves and the basis turns
+singular; so dilations stay within what the positions around the wavelet resolve, translations within the data's
+reach, and a step is kept only if it lowers the objective: the result is never worse than the start.
+"""
+
+import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotrs
+
+from .._typing import Float1D, Float2D
+from .separable import Basis, SeparableProblem, Solution
+
+COARSEST = 0.5
+"""Smallest dilation [1/box]: over the unit box a wider wavelet is a parabola, which the narrower ones contain."""
+
+REACH = 0.3
+"""How far outside the unit box a translation may stand [box]."""
+
+LONGEST_STEP = 0.7
+"""Longest step of log(alpha) and of alpha beta: the basis changes too much beyond it for its linearisation."""
+
+
+def refine(
+    problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float = 1e-3, restless: int = 2
+) -> Solution:
+    """Lower the objective from start by at most `steps` accepted or tried steps.
+
+    It ends early after `restless` steps in a row that gained less than tolerance of the whole squared error.
+    """
+    best = start
+    if len(start.basis) == 0:
+        return best
+    damping, idle = 1e-2, 0
+    matrix, gradient = problem.normal_equations(best.basis)
+    for _ in range(steps):
+        step = _bounded_step(problem, best.basis, matrix, gradient, damping)
+        trial = problem.solve(_moved(problem, best.basis, step))
+        if trial.objective < best.objective:
+            gain = (best.objective - trial.objective) / problem.total(trial.rss)
+            best, damping = trial, max(damping / 5.0, 1e-9)
+            idle = idle + 1 if gain < tolerance else 0
+            if idle >= restless:
+                break
+            matrix, gradient = problem.normal_equations(best.basis)
+        else:
+            damping *= 6.0
+            if damping > 1e8:
+                break
+    return best
+
+
+def _bounded_step(
+    problem: SeparableProblem, basis: Basis, matrix: Float2D, gradient: Float1D, damping: float
+) -> Float1D:
+    """Levenberg-Marquardt step over the unknowns that are not held by a bound they are being pushed against."""
+    d = problem.dimension
+    push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
+    held_alpha = (push_alpha > 0) & (basis.alpha >= problem.finest(basis.beta) * (1 - 1e-9))
+    held_alpha |= (push_alpha < 0) & (basis.alpha <= COARSEST * (1 + 1e-9))
+    held_beta = (push_beta > 0) & (basis.beta >= 1 + REACH) | (push_beta < 0) & (basis.beta <= -REACH)
+    free = np.flatnonzero(~np.stack([held_alpha.T, held_beta.T]).ravel())
+    step = np.zeros(len(gradient))
+    if len(free) == 0:
+        return step
+    system = matrix[np.ix_(free, free)]
+    diagonal = np.diag(system)
+    floor = 1e-6 * diagonal.max() + np.finfo(float).tiny
+    while True:
+        damped = system + np.diag(damping * np.maximum(diagonal, floor))
+        factor, failed = dpotrf(damped, lower=1)
+        if not failed:
+            break
+        damping = 10.0 * damping + 1e-12
+    step[free] = dpotrs(factor, gradient[free], lower=1)[0]
+    return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+
+
+def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> Basis:
+    """The basis after a step, brought back to its bounds."""
+    grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
+    beta = np.clip(basis.beta + shift / basis.alpha, -REACH, 1 + REACH)
+    ceiling = np.maximum(problem.finest(beta), COARSEST)
+    return Basis(np.clip(basis.alpha * np.exp(grow), COARSEST, ceiling), beta)

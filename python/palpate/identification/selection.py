@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forward orthogonal least squares over a library of wavelets (Chen, Billings & Luo 1989; Zhang 1997).
+
+Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates the
+projections of all others by one product with its orthonormalised columns. Linear and bias columns are always in.
+A candidate that the design already spans to rounding is never taken, so the factors stay well conditioned.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _core
+from .._typing import Float1D, Float2D
+from .separable import Basis, SeparableProblem, Solution
+from .stopping import deviance
+
+DEPENDENT = 1e-7
+"""Share of a candidate's squared norm that must be left outside the design for it to count as a new direction."""
+
+
+class Library:
+    """Candidate wavelets with their weighted columns on every block, computed once."""
+
+    def __init__(self, problem: SeparableProblem, candidates: Basis) -> None:
+        resolved = np.all(candidates.alpha <= problem.finest(candidates.beta), axis=1)
+        self.basis = Basis(candidates.alpha[resolved], candidates.beta[resolved])
+        self.columns: list[list[Float2D]] = []
+        self.grams: list[Float2D] = []
+        for block in problem.blocks:
+            wavelets = _core.wavelet_columns(block.positions, self.basis.alpha, self.basis.beta)
+            columns = [channel[:, None] * wavelets for channel in block.channels.T]
+            self.columns.append(columns)
+            self.grams.append(np.array([[np.einsum("mn,mn->n", a, b) for b in columns] for a in columns]))
+
+    def __len__(self) -> int:
+        return len(self.basis)
+
+
+class OrthogonalSelection:
+    """One forward selection: start from a solved basis, ask for gains, take candidates.
+
+    For each block the candidate's columns (one a channel) have a projected Gram matrix S and a product z with the
+    residual; the fall of the residual sum of squares is z' S^-1 z, summed over the blocks.
+    """
+
+    def __init__(self, library: Library, start: Solution) -> None:
+        self._library = library
+        self._factors = [np.linalg.qr(design)[0] for design in start.designs]
+        self._residuals = list(start.residuals)
+        self._grams, self._products = [], []
+        for columns, gram, factor, residual in zip(
+            library.columns, library.grams, self._factors, self._residuals, strict=True
+        ):
+            self._grams.append(gram - _projected_gram([factor.T @ column for column in columns]))
+            self._products.append(np.array([residual @ column for column in columns]))
+
+    def gains(self) -> Float1D:
+        """(candidates,) fall of the residual sum of squares if that candidate were taken next."""
+        total = np.zeros(len(self._library))
+        for gram, left, product in zip(self._library.grams, self._grams, self._products, strict=True):
+            left, product = left.transpose(2, 0, 1), product.T
+            own = np.maximum(np.einsum("nkk->nk", gram.transpose(2, 0, 1)), np.finfo(float).tiny)
+            root = np.sqrt(own)
+            scaled = left / (root[:, :, None] * root[:, None, :])
+            value, vector = np.linalg.eigh(scaled)
+            along = np.einsum("nkj,nk->nj", vector, product / root)
+            new = value > DEPENDENT
+            total += np.sum(np.where(new, along**2 / np.where(new, value, 1.0), 0.0), axis=1)
+        return total
+
+    def take(self, index: int) -> float:
+        """Add a candidate; returns the residual sum of squares over all blocks."""
+        rss = 0.0
+        for b, columns in enumerate(self._library.columns):
+            factor = self._factors[b]
+            fresh = np.column_stack([column[:, index] for column in columns])
+            norm = np.linalg.norm(fresh, axis=0)
+            for _ in range(2):  # twice is enough (Kahan): orthogonal to rounding
+                fresh = fresh - factor @ (factor.T @ fresh)
+            basis, triangle = np.linalg.qr(fresh)
+            basis = basis[
+                :, np.abs(np.diag(triangle)) > np.sqrt(DEPENDENT) * np.maximum(norm, np.finfo(float).tiny)
+            ]
+            shadows = [basis.T @ column for column in columns]
+            along = basis.T @ self._residuals[b]
+            self._grams[b] = self._grams[b] - _projected_gram(shadows)
+            self._products[b] = self._products[b] - np.array([along @ shadow for shadow in shadows])
+            self._residuals[b] = self._residuals[b] - basis @ along
+            self._factors[b] = np.concatenate([factor, basis], axis=1)
+            rss += float(self._residuals[b] @ self._residuals[b])
+        return rss
+
+
+@dataclass(frozen=True)
+class SelectionPath:
+    """A whole forward selection: chosen candidates in their order, and the error and criterion after each."""
+
+    order: tuple[int, ...]
+    rss: tuple[float, ...]
+    """[force^2] with 0, 1, 2 ... wavelets, the within-group part included"""
+    criterion: tuple[float, ...]
+    best: int
+    """Number of wavelets with the smallest criterion"""
+
+
+def select_forward(
+    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
+) -> SelectionPath:
+    """Select wavelets one by one from the library, up to max_wavelets, and judge each size by the criterion."""
+    start = problem.solve(Basis.empty(problem.dimension))
+    selection = OrthogonalSelection(library, start)
+    order: list[int] = []
+    errors = [problem.total(start.rss)]
+    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.samples:
+        gains = selection.gains()
+        if len(gains) == 0 or gains.max() <= 0.0:
+            break
+        order.append(int(np.argmax(gains)))
+        errors.append(problem.total(selection.take(order[-1])))
+    judged = [
+        deviance(criterion, rss, problem.samples, problem.n_parameters(n)) for n, rss in enumerate(errors)
+    ]
+    return SelectionPath(tuple(order), tuple(errors), tuple(judged), int(np.argmin(judged)))
+
+
+def _projected_gram(shadows: list[Float2D]) -> Float2D:
+    """(channels, channels, candidates) products of the candidates' shadows on an orthonormal basis."""
+    return np.array([[np.einsum("kn,kn->n", a, b) for b in shadows] for a in shadows])

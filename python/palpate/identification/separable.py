@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The separable least-squares problem: linear in weights, slope and bias once the wavelets are given.
+
+A network f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c.x + b (paper eq. 4) is fitted to weighted rows.
+With hysteresis, f = g(x) + s h(x), where g and h share their wavelets and each wavelet has two weights.
+If s is only ever +1 or -1 the strokes are two independent least squares over the same wavelets, in the
+coordinates g + h and g - h: two blocks of one channel each. For s in between it is one block of two
+channels, 1 and s.
+
+Positions stand in the unit box of the data here, so that dilations and translations compare.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.spatial import cKDTree
+
+from .. import _core
+from .._typing import Float1D, Float2D
+from .compression import Compressed
+
+RIDGE = 1e-11
+"""Relative ridge on unit-norm columns: keeps a nearly dependent basis solvable, far below any noise."""
+
+CORE = float(np.sqrt(3.0))
+"""|u| of a wavelet's side lobe: what lies within is the core that data must resolve."""
+
+TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Wavelets without their weights: dilations alpha (N, d) > 0 and translations beta (N, d)."""
+
+    alpha: Float2D
+    beta: Float2D
+
+    @staticmethod
+    def empty(dimension: int) -> "Basis":
+        return Basis(np.zeros((0, dimension)), np.zeros((0, dimension)))
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    def joined(self, other: "Basis") -> "Basis":
+        return Basis(np.concatenate([self.alpha, other.alpha]), np.concatenate([self.beta, other.beta]))
+
+    def without(self, index: int) -> "Basis":
+        return Basis(np.delete(self.alpha, index, axis=0), np.delete(self.beta, index, axis=0))
+
+
+@dataclass(frozen=True)
+class Block:
+    """Weighted rows and their channels: force = sum_k channel_k * (network k at the row's position)."""
+
+    positions: Float2D
+    """(m, d) in the unit box"""
+    target: Float1D
+    """(m,) sqrt(weight) * force"""
+    channels: Float2D
+    """(m, channels) sqrt(weight) * channel"""
+
+    @staticmethod
+    def weighted(positions: Float2D, force: Float1D, weight: Float1D, channels: Float2D) -> "Block":
+        root = np.sqrt(weight)
+        return Block(np.ascontiguousarray(positions), root * force, root[:, None] * channels)
+
+    @property
+    def n_channels(self) -> int:
+        return self.channels.shape[1]
+
+    def design(self, wavelets: Float2D) -> Float2D:
+        """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
+        plain = np.concatenate([np.ones((len(wavelets), 1)), self.positions, wavelets], axis=1)
+        return np.concatenate([channel[:, None] * plain for channel in self.channels.T], axis=1)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Least squares at a fixed basis."""
+
+    basis: Basis
+    coefficients: Float2D
+    """(channels, 1 + d + N), the channels of all blocks one under the other: bias, linear, weights"""
+    rss: float
+    """Residual sum of squares about the rows' mean forces"""
+    objective: float
+    """rss plus the price of the weights' prior: what refinement lowers"""
+    designs: tuple[Float2D, ...]
+    residuals: tuple[Float1D, ...]
+
+
+class SeparableProblem:
+    """Rows, channels, and the prior that makes every basis solvable.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+    readout : (1, channels) or (2, channels)
+        g (and h) as combinations of the channels' networks.
+    samples, within
+        Of the compressed recording: how many samples there are, and the sum of squares inside its rows.
+    force_range : float
+        Largest less smallest force.
+    resolved_by : int
+        Distinct positions of every block that a wavelet's core must hold.
+    """
+
+    def __init__(
+        self,
+        blocks: Sequence[Block],
+        readout: Float2D,
+        *,
+        samples: int,
+        within: float,
+        force_range: float,
+        resolved_by: int,
+    ) -> None:
+        self.blocks = tuple(blocks)
+        self.readout = readout
+        self.samples = samples
+        self.within = within
+        self.dimension = blocks[0].positions.shape[1]
+        self.n_channels = sum(block.n_channels for block in blocks)
+        self.force_range = max(force_range, TINY)
+        self.prior = 0.0
+        distinct = [np.unique(block.positions, axis=0) for block in blocks]
+        self._trees = [cKDTree(positions) for positions in distinct]
+        self.resolved_by = min(resolved_by, *(len(positions) for positions in distinct))
+
+    def n_parameters(self, n_wavelets: int) -> int:
+        """Fitted numbers: d dilations, d translations and a weight a channel; a slope and bias a channel."""
+        return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
+
+    def total(self, rss: float) -> float:
+        """Error over all samples [force^2]; never quite zero, so that noise-free data has a logarithm."""
+        return max(rss + self.within, (1e-12 * self.force_range) ** 2 * self.samples, TINY)
+
+    def rmse(self, solution: Solution) -> float:
+        """Root mean square error over all samples [force]."""
+        return float(np.sqrt(self.total(solution.rss) / self.samples))
+
+    def set_prior(self, rss: float) -> None:
+        """Expect each weight within the force range, as firmly as one sample at this noise would say it.
+
+        Without it, a stroke that has no data where the other one does could give a wavelet there any weight.
+        """
+        self.prior = self.total(rss) / self.samples / self.force_range**2
+
+    def finest(self, beta: Float2D) -> Float2D:
+        """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
+        reach = [tree.query(beta, k=[self.resolved_by])[0][:, 0] for tree in self._trees]
+        return np.asarray(CORE / np.maximum(np.max(reach, axis=0), 1e-9))[:, None]
+
+    def solve(self, basis: Basis) -> Solution:
+        """Weights, slopes and biases of all channels for this basis."""
+        tables, designs = [], []
+        for block in self.blocks:
+            design = block.design(_core.wavelet_columns(block.positions, basis.alpha, basis.beta))
+            found = solve_gram(self.gram(block, design), design.T @ block.target)
+            tables.append(found.reshape(block.n_channels, -1))
+            designs.append(design)
+        return self.solution(basis, np.concatenate(tables), tuple(designs))
+
+    def solution(self, basis: Basis, coefficients: Float2D, designs: tuple[Float2D, ...]) -> Solution:
+        """These coefficients with the errors they leave."""
+        tables = np.split(coefficients, np.cumsum([block.n_channels for block in self.blocks])[:-1])
+        residuals = tuple(
+            block.target - design @ table.ravel()
+            for block, design, table in zip(self.blocks, designs, tables, strict=True)
+        )
+        rss = float(sum(residual @ residual for residual in residuals))
+        price = self.prior * float((coefficients[:, 1 + self.dimension :] ** 2).sum())
+        return Solution(basis, coefficients, rss, rss + price, designs, residuals)
+
+    def normal_equations(self, basis: Basis) -> tuple[Float2D, Float1D]:
+        """Gauss-Newton matrix and descent direction of variable projection at this basis.
+
+        With the linear unknowns eliminated the residual is P y, P the projector off the design's columns,
+        and its Jacobian in Kaufman's form is -P (d design/d theta) coefficients (Golub & Pereyra 1973,
+        Kaufman 1975). Steps are dimensionless, d log(alpha) and alpha d(beta), ordered (quantity, input,
+        wavelet).
+        """
+        size = 2 * self.dimension * len(basis)
+        matrix, gradient = np.zeros((size, size)), np.zeros(size)
+        for block in self.blocks:
+            value, by_alpha, by_beta = _core.wavelet_jacobian(block.positions, basis.alpha, basis.beta)
+            design = block.design(value)
+            gram = self.gram(block, design)
+            found = solve_gram(gram, design.T @ block.target)
+            weights = found.reshape(block.n_channels, -1)[:, 1 + self.dimension :]
+            slope = block.channels @ weights
+            jacobian = np.concatenate(
+                [slope * change * scale for change, scale in zip(by_alpha, basis.alpha.T, strict=True)]
+                + [slope * change / scale for change, scale in zip(by_beta, basis.alpha.T, strict=True)],
+                axis=1,
+            )
+            cross = design.T @ jacobian
+            matrix += jacobian.T @ jacobian - cross.T @ solve_gram(gram, cross)
+            gradient += jacobian.T @ (block.target - design @ found)
+        return matrix, gradient
+
+    def removal_costs(self, solution: Solution) -> Float1D:
+        """Growth of the objective (N,) if one wavelet left and the linear unknowns were solved again."""
+        n, first, start = len(solution.basis), 1 + self.dimension, 0
+        cost = np.zeros(n)
+        for block, design in zip(self.blocks, solution.designs, strict=True):
+            inverse = solve_gram(self.gram(block, design), np.eye(design.shape[1]))
+            weights = solution.coefficients[start : start + block.n_channels, first:].T
+            start += block.n_channels
+            columns = np.arange(block.n_channels) * (first + n) + first + np.arange(n)[:, None]
+            minors = inverse[columns[:, :, None], columns[:, None, :]]
+            cost += np.einsum("nk,nk->n", weights, np.linalg.solve(minors, weights[:, :, None])[:, :, 0])
+        return cost
+
+    def gram(self, block: Block, design: Float2D) -> Float2D:
+        """design' design, plus the prior on the weights."""
+        gram = design.T @ design
+        wavelet = np.flatnonzero(np.arange(len(gram)) % (len(gram) // block.n_channels) > self.dimension)
+        gram[wavelet, wavelet] += self.prior
+        return np.asarray(gram)
+
+
+def problem_of(rows: Compressed, *, resolved_by: int) -> SeparableProblem:
+    """The problem of compressed rows (positions in the unit box): one channel, two strokes, or 1 and s."""
+    if rows.side is None:
+        blocks = [Block.weighted(rows.positions, rows.force, rows.weight, np.ones((len(rows.force), 1)))]
+        readout = np.array([[1.0]])
+    elif np.all(np.abs(rows.side) == 1.0):
+        blocks = [
+            Block.weighted(rows.positions[on], rows.force[on], rows.weight[on], np.ones((int(on.sum()), 1)))
+            for on in (rows.side > 0, rows.side < 0)
+        ]
+        readout = np.array([[0.5, 0.5], [0.5, -0.5]])
+    else:
+        channels = np.column_stack([np.ones_like(rows.side), rows.side])
+        blocks = [Block.weighted(rows.positions, rows.force, rows.weight, channels)]
+        readout = np.eye(2)
+    return SeparableProblem(
+        blocks,
+        readout,
+        samples=rows.samples,
+        within=rows.within,
+        force_range=float(np.ptp(rows.force)),
+        resolved_by=resolved_by,
+    )
+
+
+def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve a positive semidefinite system: Cholesky on unit-norm columns, the ridge raised until it succeeds."""
+    factor, norm = factored(gram)
+    columns = right.reshape(len(gram), -1) / norm[:, None]
+    solved, _ = dpotrs(factor, columns, lower=1)
+    return np.asarray(solved / norm[:, None]).reshape(right.shape)
+
+
+def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
+    """(L, norm) with gram = D L L' D, D = diag(norm), L lower triangular (what stands above it is not used)."""
+    norm = np.sqrt(np.diag(gram))
+    norm = np.where(norm > 0.0, norm, 1.0)
+    scaled = gram / np.outer(norm, norm)
+    on_diagonal = np.diag_indices_from(scaled)
+    unit, ridge = scaled[on_diagonal].copy(), RIDGE
+    while True:
+        scaled[on_diagonal] = unit + ridge
+        factor, failed = dpotrf(scaled, lower=1)
+        if not failed:
+            return factor, norm
+        ridge *= 100.0

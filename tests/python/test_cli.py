@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line as a whole: endings, exit codes, one clear sentence, who reads what."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+
+from palpate import InputError
+from palpate.cli.ending import WorkError, ending_of
+from palpate.cli.main import main, palpate
+from palpate.cli.output import finishing, print_json, require_distinct, require_writable
+
+VERBS = ["identify", "verify", "simulate", "show", "demo"]
+
+
+def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "palpate", *arguments], capture_output=True, text=True, check=False, **options
+    )
+
+
+@pytest.mark.parametrize("arguments", [[], ["identify"], ["verify"], ["simulate"], ["show"]])
+def test_without_arguments_there_is_help_and_exit_code_2(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.err.startswith("Usage: palpate")
+    assert shown.out == ""
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_ends_with_one_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([verb, "--help"]) == 0
+    last = capsys.readouterr().out.strip().split("\n\n")[-1]
+    assert " ".join(last.split()).startswith(f"Example: palpate {verb}")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_fits_a_narrow_terminal(verb: str) -> None:
+    answer = run(verb, "--help", env={**os.environ, "COLUMNS": "40"})
+    assert answer.returncode == 0
+    wide = [line for line in answer.stdout.splitlines() if len(line) > 40]
+    # Names of options and their values are not broken.
+    assert [line for line in wide if not line.lstrip().startswith("-")] == []
+
+
+def test_every_option_with_a_number_has_its_default_or_says_what_happens_without() -> None:
+    context = click.Context(palpate)
+    for verb in VERBS:
+        command = palpate.get_command(context, verb)
+        assert command is not None
+        for option in command.params:
+            if isinstance(option, click.Option) and option.name not in ("help", "version"):
+                assert option.help, f"{verb} {option.name} has no help"
+
+
+def test_the_help_of_the_program_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from palpate.cli.main import main; main(['--help']);"
+        "heavy = {'numpy', 'scipy', 'pandas', 'matplotlib', 'pydantic'};"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stderr.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence"),
+    [
+        (InputError("a.csv is empty"), 2, "a.csv is empty"),
+        (ValueError("inertia is -1, must be > 0"), 2, "inertia is -1, must be > 0"),
+        (WorkError("the rendering ran away"), 1, "the rendering ran away"),
+        (OSError(28, "No space left on device", "m.json"), 1,
+         "the operating system refuses m.json: No space left on device"),
+        (MemoryError(), 1, "there is not enough memory for this recording"),
+        (KeyboardInterrupt(), 130, "interrupted; nothing was written"),
+        (click.UsageError("Missing option\n '-o'."), 2, "Missing option '-o'"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
+)  # fmt: skip
+def test_every_failure_is_one_sentence_with_its_exit_code(
+    error: BaseException, code: int, sentence: str
+) -> None:
+    ending = ending_of(error)
+    assert (ending.code, ending.sentence) == (code, sentence)
+
+
+def test_a_defect_is_told_with_its_place_and_without_a_traceback() -> None:
+    try:
+        raise RuntimeError("two\nlines")
+    except RuntimeError as error:
+        ending = ending_of(error)
+    assert ending.code == 1
+    assert "RuntimeError: two lines (test_cli.py, line" in ending.sentence
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["frobnicate"], ["show", "--frob", "m.json"], ["simulate", "m.json", "--structure", "nice"],
+     ["show", "nothing.json"], ["simulate", "nothing.json", "--plot", "p.txt"]],
+)  # fmt: skip
+def test_bad_usage_is_one_line_on_standard_error(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("error: ")
+    assert shown.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_with_json_a_failure_is_one_object_on_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "nothing.json", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out) == {"error": "there is no file nothing.json"}
+    assert main(["simulate", "--json"]) == 2
+    assert list(json.loads(capsys.readouterr().out)) == ["error"]
+
+
+def test_a_number_that_json_cannot_say_is_null(capsys: pytest.CaptureFixture[str]) -> None:
+    print_json({"r2": float("nan"), "path": [{"criterion": float("inf")}], "n": 3})
+    assert json.loads(capsys.readouterr().out) == {"r2": None, "path": [{"criterion": None}], "n": 3}
+
+
+def a_missing_folder(base: Path) -> Path:
+    return base / "nowhere" / "m.json"
+
+
+def below_a_file(base: Path) -> Path:
+    (base / "file").touch()
+    return base / "file" / "m.json"
+
+
+def a_folder(base: Path) -> Path:
+    return base
+
+
+def in_proc(base: Path) -> Path:
+    return Path("/proc/m.json")
+
+
+@pytest.mark.parametrize("target", [a_missing_folder, below_a_file, a_folder, in_proc])
+def test_an_output_that_cannot_be_written_is_refused(target: Callable[[Path], Path], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written: "):
+        require_writable(target(tmp_path))
+
+
+def test_an_input_is_never_overwritten(tmp_path: Path) -> None:
+    recording = tmp_path / "a.csv"
+    recording.write_text("x")
+    other_name = tmp_path / "link.csv"
+    other_name.symlink_to(recording)
+    for target in (recording, other_name):
+        with pytest.raises(InputError, match="is an input as well"):
+            require_writable(target, inputs=[recording])
+
+
+def test_two_results_do_not_share_a_file(tmp_path: Path) -> None:
+    require_distinct(tmp_path / "a", tmp_path / "b", None)
+    with pytest.raises(InputError, match="two results"):
+        require_distinct(tmp_path / "a", tmp_path / "a")
+
+
+def test_checking_an_output_leaves_nothing_behind(tmp_path: Path) -> None:
+    require_writable(tmp_path / "m.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_results_are_written_comes_too_late() -> None:
+    with finishing():
+        os.kill(os.getpid(), signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_reader_who_leaves_is_no_traceback() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "palpate", "identify", "--help"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["simulate", "nothing.json", "--json"]])
+def test_a_full_disk_behind_standard_output_is_one_sentence(arguments: list[str]) -> None:
+    with open("/dev/full", "w") as full:
+        answer = subprocess.run(
+            [sys.executable, "-m", "palpate", *arguments],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert answer.returncode != 0
+    assert answer.stderr.startswith("error: ")
+    assert answer.stderr.count("\n") == 1

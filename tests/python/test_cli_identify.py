@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate identify: what is written and printed, and one clear sentence for every wrong input."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from palpate import IdentifyOptions, Recording, load_model, read_recording
+from palpate.cli.identify_options import HELP
+from palpate.cli.main import main, palpate
+from palpate.recording.sample import sample_recording
+
+JSON_FIELDS = ["model", "n_wavelets", "n_parameters", "rung", "stop_reason", "nrmse", "seconds"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def spring(path: Path, *, n: int = 400, seed: int = 0) -> Path:
+    """A recording of 3 N*m/rad with a little noise."""
+    random = np.random.default_rng(seed)
+    position = random.uniform(0.0, 1.0, n)
+    force = 3.0 * position + random.normal(0.0, 0.01, n)
+    return Recording.from_arrays(position, force, units={"position": "rad", "force": "N*m"}).write(path)
+
+
+def test_a_model_is_written_that_can_be_loaded(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    spring(here / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    model = load_model(here / "m.json")
+    assert model.slope(0.5) == pytest.approx(3.0, rel=0.02)
+    shown = capsys.readouterr()
+    assert shown.err.splitlines()[0].startswith("read a.csv: 400 rows; ")
+    assert "position_rad" in shown.err.splitlines()[0]
+    assert "wavelets    0" in shown.out
+    assert sorted(path.name for path in here.iterdir()) == ["a.csv", "m.json"]
+
+
+def test_json_is_one_object_with_the_fields_of_the_contract(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spring(here / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    model = load_model(here / "m.json")
+    assert list(result) == JSON_FIELDS
+    assert result["model"] == "m.json"
+    assert (result["n_wavelets"], result["n_parameters"]) == (model.n_wavelets, model.n_parameters)
+    assert (result["rung"], result["stop_reason"]) == (model.fit.rung, model.stop_reason)
+    assert result["nrmse"] == model.fit.nrmse
+    assert result["seconds"] > 0
+
+
+def test_the_error_is_that_of_the_rows_held_out(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = read_recording(spring(here / "a.csv"))
+    assert main(["identify", "a.csv", "-o", "m.json", "--hold-out-every", "5", "--json"]) == 0
+    model = load_model(here / "m.json")
+    held_out = np.arange(len(recording)) % 5 == 4
+    error = model.force(recording.position[held_out]) - recording.force[held_out]
+    expected = np.sqrt(np.mean(error**2)) / np.std(recording.force[held_out])
+    assert json.loads(capsys.readouterr().out)["nrmse"] == pytest.approx(expected, rel=1e-9)
+    assert model.data.held_out_every == 5
+
+
+def test_several_recordings_make_one_model(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for seed, name in enumerate(["a.csv", "b.csv"]):
+        spring(here / name, seed=seed)
+    assert main(["identify", "a.csv", "b.csv", "-o", "m.json", "--plot", "m.png"]) == 0
+    assert set(load_model(here / "m.json").data.files) == {"a.csv", "b.csv"}
+    assert (here / "m.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_columns_units_and_signs_are_options(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    x = np.linspace(0.0, 5.0, 100)
+    table = "\n".join(f"{a!r},{-2.0 * a!r},{a!r}" for a in x.tolist())
+    (here / "a.csv").write_text(f"depth,load,other_mm\n{table}\n")
+    arguments = ["identify", "a.csv", "-o", "m.json", "--position", "depth", "--force", "load"]
+    arguments += ["--units", "depth=mm", "--units", "load=N", "--negate", "force", "--rows", "10:90"]
+    assert main(arguments) == 0
+    model = load_model(here / "m.json")
+    assert model.units == {"position": "m", "force": "N"}
+    assert model.slope(0.0025) == pytest.approx(2000.0, rel=1e-6)
+    assert model.data.rows == 80
+
+
+def test_rows_without_a_number_can_be_dropped(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "a.csv").write_text("\n".join([HEADER, *LINE, "nan,1.0"]))
+    assert main(["identify", "a.csv", "-o", "m.json", "--invalid", "drop"]) == 0
+    assert load_model(here / "m.json").data.rows == len(LINE)
+
+
+def test_what_identification_noticed_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 200), np.full(5, 1.0), np.linspace(1.0, 0.0, 200)])
+    direction = np.repeat([1, 0, -1], [200, 5, 200])
+    Recording.from_arrays(x, 3.0 * x + 0.2 * direction, direction=direction).write(here / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    notes = load_model(here / "m.json").notes["identification"]
+    assert notes
+    err = capsys.readouterr().err
+    assert all(f"  {note}\n" in err for note in notes)
+
+
+def test_a_current_becomes_a_torque_with_its_constant(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    x = np.linspace(0.0, 1.0, 50).tolist()
+    (here / "a.csv").write_text("angle_rad,current_A\n" + "\n".join(f"{a!r},{a!r}" for a in x))
+    assert main(["identify", "a.csv", "-o", "m.json", "--torque-constant-Nm-per-A", "0.5"]) == 0
+    model = load_model(here / "m.json")
+    assert model.units["force"] == "N*m"
+    assert model.slope(0.5) == pytest.approx(0.5, rel=1e-6)
+
+
+def test_every_setting_of_the_identification_is_an_option_with_its_default() -> None:
+    assert list(HELP) == [each.name for each in fields(IdentifyOptions)]
+    shown = CliRunner().invoke(palpate, ["identify", "--help"]).output
+    for name in HELP:
+        assert "--" + name.replace("_", "-") in shown
+    assert f"[default: {IdentifyOptions().max_wavelets}]" in shown
+
+
+def test_settings_reach_the_identification(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sample_recording(3, 5.0).write(here / "a.csv")
+    arguments = ["identify", "a.csv", "-o", "m.json", "--max-wavelets", "2", "--inputs", "position"]
+    assert main([*arguments, "--slope-bounds", "-5", "30", "--no-refine"]) == 0
+    model = load_model(here / "m.json")
+    assert model.n_wavelets <= 2
+    assert model.slope(np.linspace(-0.2, 0.469, 2001)).max() <= 30.0 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--max-wavelets", "-1"], "max_wavelets is -1"),
+        (["--max-wavelets", "many"], "'many' is not a valid integer"),
+        (["--criterion", "luck"], "'luck' is not one of"),
+        (["--slope-bounds", "3", "1"], "slope_bounds is (3.0, 1.0)"),
+        (["--inputs", "mood"], "mood"),
+        (["--hold-out-every", "1"], "--hold-out-every"),
+        (["--units", "mm"], "must be NAME=UNIT"),
+        (["--units", "position_rad=parsec"], "parsec"),
+        (["--rows", "10"], "must be START:STOP"),
+        (["--position", "depth"], "no column 'depth'"),
+        (["--play-radius", "wide"], "must be numbers joined by commas"),
+        (["--plot", "m.doc"], "is no figure file"),
+        (["--plot", "m.json"], "is no figure file"),
+        (["--plot", "nowhere/m.png"], "there is no folder nowhere"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_usage_is_one_sentence_and_writes_nothing(
+    arguments: list[str], sentence: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spring(here / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json", "--json", *arguments]) == 2
+    error = json.loads(capsys.readouterr().out)["error"]
+    assert sentence in error
+    assert "\n" not in error
+    assert [path.name for path in here.iterdir()] == ["a.csv"]
+
+
+HEADER = "position_rad,torque_Nm"
+LINE = [f"{0.1 * k},{0.3 * k}" for k in range(20)]
+
+BAD_FILES = {
+    "no such file": (None, "there is no file a.csv"),
+    "empty": ("", "a.csv is empty"),
+    "header only": (f"{HEADER}\n", "a.csv"),
+    "one column": ("position_rad\n" + "0.1\n" * 20, "one column"),
+    "no units": ("x,y\n" + "0.1,0.2\n" * 20, "--units"),
+    "NaN": ("\n".join([HEADER, *LINE, "nan,1.0"]), "line 22"),
+    "inf": ("\n".join([HEADER, *LINE, "0.5,inf"]), "line 22"),
+    "text in a number": ("\n".join([HEADER, *LINE, "0.5,soft"]), "soft"),
+    "all positions equal": ("\n".join([HEADER, *["0.1,0.2"] * 20]), "position"),
+    "3 rows": ("\n".join([HEADER, *LINE[:3]]), "3"),
+    "no text at all": ("\x00\xff", "a.csv"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_a_bad_recording_is_one_sentence(case: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content, expected = BAD_FILES[case]
+    if content is not None:
+        (here / "a.csv").write_bytes(content.encode("latin-1"))
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 2
+    shown = capsys.readouterr()
+    sentence = shown.err.splitlines()[-1]
+    assert sentence.startswith("error: ")
+    assert "a.csv" in sentence
+    assert expected in sentence
+    assert shown.out == ""
+    assert not (here / "m.json").exists()
+
+
+def missing_folder(base: Path) -> str:
+    return "nowhere/m.json"
+
+
+def below_a_file(base: Path) -> str:
+    return "a.csv/m.json"
+
+
+def in_proc(base: Path) -> str:
+    return "/proc/m.json"
+
+
+def over_the_input(base: Path) -> str:
+    return "a.csv"
+
+
+def over_the_figure(base: Path) -> str:
+    return "m.png"
+
+
+@pytest.mark.parametrize("target", [missing_folder, below_a_file, in_proc, over_the_input, over_the_figure])
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(
+    target: Callable[[Path], str], here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spring(here / "a.csv")
+    before = (here / "a.csv").read_bytes()
+    assert main(["identify", "a.csv", "-o", target(here), "--plot", "m.png"]) == 2
+    shown = capsys.readouterr()
+    assert "identifying" not in shown.err
+    assert "read a.csv" not in shown.err
+    assert shown.err.count("\n") == 1
+    assert (here / "a.csv").read_bytes() == before
+
+
+def test_ctrl_c_ends_with_130_and_writes_nothing(here: Path) -> None:
+    sample_recording(1).write(here / "a.csv")
+    with subprocess.Popen(
+        [sys.executable, "-m", "palpate", "identify", "a.csv", "-o", "m.json"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("identifying"):
+                process.send_signal(signal.SIGINT)
+                break
+        out, err = process.communicate()
+    assert process.returncode == 130
+    assert out == ""
+    assert err == "error: interrupted; nothing was written\n"
+    assert [path.name for path in here.iterdir()] == ["a.csv"]

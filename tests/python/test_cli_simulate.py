@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate simulate and palpate demo."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from palpate import Recording, load_model, read_recording, simulate
+from palpate.cli import demo as demo_module
+from palpate.cli.main import main
+from test_planning import keyswitch_by_hand, model_by_hand
+
+JSON_FIELDS = ["structure", "duration_s", "ticks", "force_error_end", "force_error_instant"]
+JSON_FIELDS += ["extrapolated", "status"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    model_by_hand().save("m.json")
+    return tmp_path
+
+
+def test_what_was_rendered_is_written_and_measured(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["simulate", "m.json", "--structure", "direct", "--duration-s", "0.5"]
+    assert main([*arguments, "-o", "r.csv", "--plot", "r.png"]) == 0
+    shown = capsys.readouterr()
+    assert shown.err.startswith("read m.json: ")
+    assert "simulated" in shown.err
+    assert "force error, end of tick" in shown.out
+    assert len(read_recording("r.csv")) == 500
+    assert Path("r.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_names_the_structure_and_its_errors(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "m.json", "--structure", "implicit", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert list(result) == JSON_FIELDS
+    assert result["structure"] == "implicit"
+    assert result["ticks"] == 4000
+    assert result["status"] == {"Ok": 4000}
+
+
+def test_the_numbers_of_the_scheme_are_options(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    errors = []
+    for stiffness in ("50", "500"):
+        assert main(["simulate", "m.json", "--coupling-stiffness", stiffness, "--json"]) == 0
+        errors.append(json.loads(capsys.readouterr().out)["force_error_end"])
+    assert errors[0] > 5 * errors[1], "a stiffer coupling loses less"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--coupling-stiffness", "-3"], "coupling_stiffness is -3"),
+        (["--coupling-stiffness", "nan"], "coupling_stiffness is nan"),
+        (["--duration-s", "0"], "duration_s is 0"),
+        (["--duration-s", "inf"], "duration_s is inf"),
+        (["--structure", "explicit", "--mass", "0"], "mass is 0"),
+        (["--structure", "explicit", "--coupling-stiffness", "3000"], "diverges"),
+        (["--structure", "direct", "--compensated"], "compensated is set for the direct structure"),
+        (["--compensated", "--coupling-stiffness", "5"], "coupling_stiffness is 5"),
+        (["-o", "nowhere/r.csv"], "there is no folder nowhere"),
+        (["-o", "m.json"], "is an input as well"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_bad_usage_is_one_sentence(
+    arguments: list[str], sentence: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", "m.json", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert sentence in shown.err.splitlines()[-1]
+    assert shown.out == ""
+    assert [path.name for path in here.iterdir()] == ["m.json"]
+
+
+def test_a_current_is_not_rendered(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model_by_hand(units={"position": "rad", "force": "A"}).save("a.json")
+    assert main(["simulate", "a.json", "--json"]) == 2
+    assert "--torque-constant-Nm-per-A" in json.loads(capsys.readouterr().out)["error"]
+
+
+def test_a_rendering_that_ran_away_is_a_failure_of_the_work(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """None is known that gets past the checks; the verdict must not depend on that."""
+
+    def run_away(*arguments: Any) -> Recording:
+        recording = simulate(*arguments)
+        status = recording.columns["status"].copy()
+        status[-7:] = "NonFinite"
+        return replace(recording, columns={**recording.columns, "status": status})
+
+    monkeypatch.setattr("palpate.planning.simulate", run_away)
+    assert main(["simulate", "m.json", "-o", "r.csv"]) == 1
+    assert "ran away: 7 of 4000 ticks" in capsys.readouterr().err
+    assert not Path("r.csv").exists()
+
+
+def test_a_model_with_hysteresis_is_rendered_with_a_play_radius(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keyswitch_by_hand().save("k.json")
+    assert main(["simulate", "k.json", "--structure", "direct", "--json", "--plot", "k.png"]) == 0
+    assert json.loads(capsys.readouterr().out)["force_error_end"] < 0.01
+
+
+@pytest.fixture(scope="module")
+def demonstrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+    """The demo, run once: its folder, what it printed, what it said."""
+    from click.testing import CliRunner
+
+    folder = tmp_path_factory.mktemp("a name with spaces") / "demo"
+    result = CliRunner().invoke(demo_module.demo, ["-o", str(folder)], catch_exceptions=False)
+    assert result.exit_code == 0
+    return folder, result.stdout, result.stderr
+
+
+def test_the_demo_names_every_file_it_writes(demonstrated: tuple[Path, str, str]) -> None:
+    folder, out, _ = demonstrated
+    written = {str(path) for path in folder.iterdir()}
+    named = {line.partition(": ")[0] for line in out.splitlines() if line.startswith(str(folder))}
+    assert named == written
+    assert len([path for path in written if path.endswith(".png")]) == 3
+
+
+def test_the_demo_calls_everything_simulated(demonstrated: tuple[Path, str, str]) -> None:
+    folder, _, err = demonstrated
+    assert err.splitlines()[0].startswith("everything in this demo is simulated")
+    for name in ("sample-1.csv", "sample-2.csv"):
+        assert any(
+            "simulated" in f"{key} {value}" for key, value in read_recording(folder / name).metadata.items()
+        )
+
+
+def test_the_demo_renders_every_structure(demonstrated: tuple[Path, str, str]) -> None:
+    _, out, _ = demonstrated
+    rows = re.findall(
+        r"^((?:direct|massless|implicit|explicit).*?)\s{2,}([\d.e-]+)\s+([\d.e-]+)$", out, re.MULTILINE
+    )
+    assert [name for name, _, _ in rows] == [
+        "direct", "massless, compensated", "massless",
+        "implicit, m = 0.001, B_o = 0", "implicit, m = 0.001, B_o = 0.5", "explicit, m = 0.001, B_o = 0.5",
+    ]  # fmt: skip
+    felt = [float(end) for _, end, _ in rows]
+    assert felt[0] < felt[2] < felt[4]
+    assert felt[1] == pytest.approx(felt[0], rel=0.1)
+
+
+def test_the_demo_s_model_explains_the_fresh_recording_to_its_noise(
+    demonstrated: tuple[Path, str, str],
+) -> None:
+    from palpate import verify
+
+    folder, out, _ = demonstrated
+    model = load_model(folder / "model.json")
+    verification = verify(model, read_recording(folder / "sample-2.csv"))
+    assert verification.fresh
+    assert model.n_wavelets <= 10
+    assert verification.rmse < 1.1 * 0.02, "noise of the sample: 0.02 N*m"
+    assert re.search(rf"^wavelets +{model.n_wavelets}$", out, re.MULTILINE)
+
+
+def test_the_demo_refuses_a_folder_that_cannot_be_before_it_works(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for target in ("nowhere/demo", "m.json", "m.json/demo", "/proc/demo", "/proc"):
+        assert main(["demo", "-o", target]) == 2
+        error = capsys.readouterr().err
+        assert re.match(f"error: {target}(/model.json)? (cannot be written: |is a file, )", error)
+        assert error.count("\n") == 1

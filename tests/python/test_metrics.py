@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors, whiteness and perception, each by its definition or its law."""
+
+import numpy as np
+import pytest
+
+from palpate.verification.metrics import (
+    durbin_watson,
+    lag_one_autocorrelation,
+    normalised,
+    root_mean_square,
+)
+from palpate.verification.perception import (
+    force_floor,
+    share_within_force_jnd,
+    share_within_stiffness_jnd,
+)
+
+
+def test_rms_is_the_root_of_the_mean_square() -> None:
+    assert root_mean_square(np.array([3.0, -4.0, 0.0, 0.0])) == 2.5
+
+
+def test_nrmse_divides_by_the_population_standard_deviation() -> None:
+    reference = np.array([0.0, 2.0])  # population 1, sample sqrt(2)
+    assert normalised(0.25, reference) == 0.25
+
+
+def test_predicting_the_mean_has_an_nrmse_of_one() -> None:
+    reference = np.random.default_rng(1).normal(size=100)
+    assert normalised(root_mean_square(reference.mean() - reference), reference) == pytest.approx(
+        1.0, rel=1e-14
+    )
+
+
+def test_a_constant_reference_has_no_spread() -> None:
+    assert normalised(0.0, np.ones(5)) == 0.0
+    assert normalised(0.1, np.ones(5)) == np.inf
+
+
+def test_white_residuals_are_white() -> None:
+    white = np.random.default_rng(2).normal(size=100_000)
+    assert lag_one_autocorrelation(white) == pytest.approx(0.0, abs=0.02)
+    assert durbin_watson(white) == pytest.approx(2.0, abs=0.04)
+
+
+def test_slow_residuals_are_not_white() -> None:
+    slow = np.sin(np.linspace(0, 20, 100_000))
+    assert lag_one_autocorrelation(slow) > 0.99
+    assert durbin_watson(slow) < 0.01
+
+
+def test_alternating_residuals_are_not_white_either() -> None:
+    alternating = np.resize([1.0, -1.0], 1000)
+    assert lag_one_autocorrelation(alternating) == pytest.approx(-0.999)
+    assert durbin_watson(alternating) == pytest.approx(3.996)
+
+
+def test_no_residual_at_all_counts_as_white() -> None:
+    assert lag_one_autocorrelation(np.zeros(5)) == 0.0
+    assert durbin_watson(np.zeros(5)) == 2.0
+
+
+def test_the_force_band_is_seven_per_cent_of_local_force() -> None:
+    force = np.array([1.0, -1.0, 0.5, 0.5])
+    error = np.array([0.0699, -0.0701, 0.0349, 0.0351])
+    assert share_within_force_jnd(force, error) == 0.5
+
+
+def test_the_force_band_has_a_floor_of_one_per_cent_of_the_largest_force() -> None:
+    force = np.array([-10.0, 0.0, 0.0, 0.0])
+    assert force_floor(force) == pytest.approx(0.1)
+    assert share_within_force_jnd(force, np.array([0.0, 0.099, -0.099, 0.101])) == 0.75
+
+
+@pytest.mark.parametrize(
+    ("factor", "share"), [(0.0, 1.0), (0.229, 1.0), (-0.229, 1.0), (0.231, 0.0), (-0.5, 0.0)]
+)
+def test_the_stiffness_band_is_23_per_cent(factor: float, share: float) -> None:
+    x = np.linspace(0.0, 1.0, 1000)
+    assert share_within_stiffness_jnd(x, 3 * x, factor * 3 * x) == share
+
+
+def test_an_offset_is_no_stiffness() -> None:
+    x = np.linspace(0.0, 1.0, 1000)
+    assert share_within_stiffness_jnd(x, 3 * x, np.full_like(x, 5.0)) == 1.0
+
+
+def test_the_stiffness_is_local() -> None:
+    x = np.linspace(0.0, 1.0, 2001)
+    kink = np.where(x < 0.5, 0.0, 2 * (x - 0.5))
+    assert share_within_stiffness_jnd(x, 3 * x, kink) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_stiffness_needs_motion_and_rows() -> None:
+    assert share_within_stiffness_jnd(np.ones(100), np.ones(100), np.ones(100)) is None
+    few = np.linspace(0.0, 1.0, 20)
+    assert share_within_stiffness_jnd(few, few, few) is None

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model beside a recording, row by row."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palpate import InputError, Model, Recording, load_model, read_recording, verify
+from palpate.model import Fit
+from palpate.recording import Source
+
+RAD = {"position": "rad", "force": "N*m"}
+NOISE = 0.01
+
+
+def model_of(data: Source, hysteresis: bool = False, **change: Any) -> Model:
+    """2 x + 1 over [0, 1]; with hysteresis plus or minus (0.25 + 0.5 x)."""
+    given: dict[str, Any] = {
+        "kind": "hysteresis" if hysteresis else "position",
+        "inputs": ["position"],
+        "units": RAD,
+        "alpha": np.empty((0, 1)),
+        "beta": np.empty((0, 1)),
+        "weight": [],
+        "linear": [2.0],
+        "bias": 1.0,
+        "lower": [0.0],
+        "upper": [1.0],
+        "fit": Fit("linear", "bic", 0.1, 0, 2),
+        "data": data,
+    }
+    if hysteresis:
+        given |= {"weight_hysteresis": [], "linear_hysteresis": [0.5], "bias_hysteresis": 0.25}
+    return Model(**given | change)
+
+
+def stroke(n: int = 400, seed: int = 1, direction: bool = True) -> Recording:
+    """A press and a release of the hysteresis model, with noise."""
+    x = np.concatenate([np.linspace(0, 1, n), np.linspace(1, 0, n)])
+    s = np.repeat([1, -1], n)
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, 2 * n)
+    force = 2 * x + 1 + s * (0.25 + 0.5 * x) + noise
+    return Recording.from_arrays(x, force, direction=s if direction else None, units=RAD)
+
+
+def curve(seed: int = 1, n: int = 1000) -> Recording:
+    x = np.linspace(0, 1, n)
+    return Recording.from_arrays(x, 2 * x + 1 + np.random.default_rng(seed).normal(0, NOISE, n), units=RAD)
+
+
+def test_every_figure_follows_its_definition() -> None:
+    recording = curve()
+    result = verify(model_of(stroke().source), recording)
+    residual = 2 * recording.position + 1 - recording.force
+    assert result.rmse == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+    assert result.mse == pytest.approx(np.mean(residual**2), rel=1e-12)
+    assert result.nrmse == pytest.approx(result.rmse / np.std(recording.force), rel=1e-12)
+    assert result.r2 == pytest.approx(
+        1 - np.sum(residual**2) / np.sum((recording.force - recording.force.mean()) ** 2)
+    )
+    assert result.worst == pytest.approx(np.abs(residual).max(), rel=1e-12)
+    assert result.within_jnd == 1.0
+    assert result.jnd_floor == pytest.approx(0.01 * np.abs(recording.force).max())
+    assert result.stiffness_within_jnd == 1.0
+    assert abs(result.whiteness) < 0.1
+    assert result.durbin_watson == pytest.approx(2.0, abs=0.2)
+    assert (result.n, result.extrapolated, result.units) == (1000, 0, RAD)
+    np.testing.assert_allclose(result.residual, residual, atol=1e-14)
+    np.testing.assert_allclose(result.force, 2 * recording.position + 1, rtol=1e-14)
+    assert result.rows.all()
+
+
+def test_rows_outside_the_domain_are_counted() -> None:
+    model = model_of(stroke().source, lower=[0.25], upper=[0.75])
+    assert verify(model, curve()).extrapolated == 500
+
+
+def test_press_and_release_are_told_apart_by_the_direction() -> None:
+    result = verify(model_of(curve().source, hysteresis=True), stroke())
+    assert result.rmse == pytest.approx(NOISE, rel=0.1)
+    assert result.stiffness_within_jnd == 1.0
+
+
+def test_the_stiffness_is_that_of_each_stroke() -> None:
+    # Steeper by half on the press, flatter by half on the release: each is felt, their mean is not.
+    recording = stroke()
+    assert recording.direction is not None
+    wrong = Recording.from_arrays(
+        recording.position,
+        2 * recording.position + 1 + recording.direction * recording.position,
+        direction=recording.direction,
+        units=RAD,
+    )
+    assert verify(model_of(curve().source), wrong).stiffness_within_jnd == 0.0
+
+
+def test_rows_without_a_direction_are_left_out_and_counted() -> None:
+    recording = stroke()
+    assert recording.direction is not None
+    words = recording.direction.copy()
+    words[100:150] = 0
+    force = recording.force.copy()
+    force[100:150] = 1e6
+    resting = Recording.from_arrays(recording.position, force, direction=words, units=RAD)
+    result = verify(model_of(curve().source, hysteresis=True), resting)
+    assert result.n == 750
+    assert np.count_nonzero(~result.rows) == 50
+    assert result.rmse == pytest.approx(NOISE, rel=0.1)
+    assert "50 rows without a direction (pause, hold) are left out" in result.notes
+
+
+def test_a_single_valued_model_keeps_rows_without_a_direction() -> None:
+    recording = stroke()
+    resting = Recording.from_arrays(
+        recording.position, recording.force, direction=np.zeros(len(recording)), units=RAD
+    )
+    assert verify(model_of(curve().source), resting).n == len(recording)
+
+
+def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
+    model = model_of(curve().source, hysteresis=True, play_radius=0.005)
+    result = verify(model, stroke(direction=False))
+    # All but the 2r after each turning point slide, as if the direction were known.
+    assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
+    assert "the play operator follows the positions" in result.notes[0]
+
+
+def test_without_direction_and_play_radius_the_option_is_named() -> None:
+    model = model_of(curve().source, hysteresis=True)
+    with pytest.raises(
+        InputError, match=re.escape("needs a direction (--direction NAME), or the model a play radius")
+    ):
+        verify(model, stroke(direction=False))
+
+
+def test_a_recording_of_rests_only_is_refused() -> None:
+    recording = stroke()
+    rest = Recording.from_arrays(
+        recording.position, recording.force, direction=np.zeros(len(recording)), units=RAD
+    )
+    with pytest.raises(InputError, match="no row of the recording has a direction"):
+        verify(model_of(curve().source, hysteresis=True), rest)
+
+
+def test_other_units_are_refused() -> None:
+    metres = Recording.from_arrays([0.0, 1.0], [0.0, 1.0], units={"position": "m", "force": "N*m"})
+    with pytest.raises(InputError, match="the model's position is in rad, the recording's in m"):
+        verify(model_of(curve().source), metres)
+    current = Recording.from_arrays([0.0, 1.0], [0.0, 1.0], units={"position": "rad", "force": "A"})
+    with pytest.raises(InputError, match="give --torque-constant-Nm-per-A"):
+        verify(model_of(curve().source), current)
+
+
+def test_units_that_are_not_stated_fit() -> None:
+    recording = curve()
+    plain = Recording.from_arrays(recording.position, recording.force)
+    assert verify(model_of(curve().source), plain).rmse == verify(model_of(curve().source), recording).rmse
+
+
+def test_further_inputs_are_taken_by_name() -> None:
+    recording = curve()
+    load = np.random.default_rng(5).uniform(size=len(recording))
+    both = replace(
+        recording, force=recording.force + 3 * load, inputs=load.reshape(-1, 1), input_names=("load_N",)
+    )
+    model = model_of(
+        stroke().source,
+        kind="general",
+        inputs=["position", "load_N"],
+        alpha=np.empty((0, 2)),
+        beta=np.empty((0, 2)),
+        linear=[2.0, 3.0],
+        lower=[0.0, 0.25],
+        upper=[1.0, 1.0],
+    )
+    # Outside its box the network is continued by a clamped gradient, which need not be the plane.
+    inside = load >= 0.25
+    result = verify(model, both)
+    assert np.abs(result.residual[inside]).max() < 5 * NOISE
+    assert result.extrapolated == np.count_nonzero(~inside)
+    with pytest.raises(
+        InputError,
+        match=re.escape("the model needs the input load_N; read the recording with inputs=('load_N',)"),
+    ):
+        verify(model, recording)
+
+
+def test_a_model_with_mass_is_not_compared_row_by_row() -> None:
+    with pytest.raises(InputError, match="the model has a mass or a damping"):
+        verify(model_of(stroke().source, mass=0.1), curve())
+
+
+def test_data_is_fresh_unless_the_model_has_seen_it(tmp_path: Path) -> None:
+    whole = read_recording(curve().write(tmp_path / "a.csv"))
+    other = read_recording(curve(seed=2).write(tmp_path / "b.csv"))
+    train, test = whole.split(5)
+    assert not verify(model_of(whole.source), whole).fresh
+    assert verify(model_of(whole.source), other).fresh
+    assert not verify(model_of(whole.source), test).fresh
+    assert verify(model_of(train.source), test).fresh
+    assert not verify(model_of(train.source), train).fresh
+    assert not verify(model_of(train.source), whole).fresh
+    assert not verify(model_of(train.source), whole.split(4)[1]).fresh
+    both = Source.merged([train.source, other.split(5)[0].source])
+    assert verify(model_of(both), other.split(5)[1]).fresh
+    assert not verify(model_of(both), other).fresh
+    assert "not a fresh recording" in verify(model_of(whole.source), whole).notes[-1]
+
+
+def test_freshness_survives_the_file(tmp_path: Path) -> None:
+    whole = read_recording(curve().write(tmp_path / "a.csv"))
+    train, test = whole.split(5)
+    model = load_model(model_of(train.source).save(tmp_path / "a.json"))
+    assert verify(model, test).fresh
+    assert not verify(model, whole).fresh
+
+
+def test_a_copied_file_is_not_fresh(tmp_path: Path) -> None:
+    path = curve().write(tmp_path / "a.csv")
+    copy = tmp_path / "other_name.csv"
+    copy.write_bytes(path.read_bytes())
+    assert not verify(model_of(read_recording(path).source), read_recording(copy)).fresh
