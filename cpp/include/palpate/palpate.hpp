@@ -40,6 +40,7 @@
 #include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/session.hpp"
+#include "palpate/session_text.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/solver/newton.hpp"
 #include "palpate/status.hpp"

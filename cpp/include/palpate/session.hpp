@@ -7,18 +7,20 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "palpate/controller.hpp"
+#include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/outlets.hpp"
 #include "palpate/io/tick_record.hpp"
 #include "palpate/loop.hpp"
 #include "palpate/realtime/flight_recorder.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/privileges.hpp"
+#include "palpate/rendering/scheme.hpp"
 
 namespace palpate {
 
@@ -67,7 +69,6 @@ struct LoopSink {
 template <class Control, class Watch>
 [[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings, Outlets& outlets,
                                         const std::atomic<bool>& asked, Watch watch) {
-    validate(settings.loop);
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
@@ -99,6 +100,22 @@ template <class Control, class Watch>
     report.lost_records = recorder.lost();
     report.last_ticks = last.in_order();
     return report;
+}
+
+/// A model rendered live on an open device. Throws std::invalid_argument before anything moves.
+template <Device D, class Watch>
+[[nodiscard]] SessionReport render_live(const ForceModel& model, const Scheme& scheme, D& device,
+                                        const GuardSettings& guards, const SessionSettings& settings,
+                                        Outlets& outlets, const std::atomic<bool>& asked, Watch watch) {
+    validate(settings.loop);
+    validate(guards);
+    const double period_s = 1.0 / settings.loop.rate_hz;
+    return with_structure(model, scheme, period_s, [&](auto structure) {
+        Controller controller{device, std::move(structure),
+                              Guards{force_limit(guards), slew_limit(guards, period_s), force_ramp(guards, period_s),
+                                     reading_guard(guards, period_s)}};
+        return run_session(controller, settings, outlets, asked, watch);
+    });
 }
 
 }  // namespace palpate

@@ -90,6 +90,12 @@ class GrowingFile {
         return std::rename(part().c_str(), name_.c_str()) == 0 ? 0 : errno;
     }
 
+    /// Removes NAME.part.
+    void discard() noexcept {
+        close();
+        (void)std::remove(part().c_str());
+    }
+
   private:
     void close() noexcept {
         if (const int descriptor = std::exchange(descriptor_, -1); descriptor >= 0) {

@@ -23,10 +23,9 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 /// at the top: room for it is kept there.
 class RecordingFile {
   public:
-    explicit RecordingFile(RecordUnits units = {}) : units_{std::move(units)} {}
-
     /// Opens NAME.part and writes its head; gives the reason where that is not possible.
-    [[nodiscard]] std::string open(const std::string& name, const Metadata& metadata) {
+    [[nodiscard]] std::string open(const std::string& name, RecordUnits units, const Metadata& metadata) {
+        units_ = std::move(units);
         if (std::string reason = file_.open(name); !reason.empty()) {
             return reason;
         }
@@ -42,7 +41,9 @@ class RecordingFile {
         head += padded(line("timing", "not known"));
         head += column_names(units_) + "\n";
         if (file_.append(head) < head.size()) {
-            return name + " cannot be written: " + std::strerror(file_.error());
+            const int error = file_.error();
+            file_.discard();
+            return name + " cannot be written: " + std::strerror(error);
         }
         return "";
     }
