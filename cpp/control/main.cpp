@@ -59,10 +59,9 @@ Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& b
 }
 
 GuardSettings guards_of(const Options& options, const Bench& bench) {
-    GuardSettings guards;
-    guards.force_limit = options.force_limit.value_or(bench.device.force_limit);
-    guards.largest_speed = options.largest_speed.value_or(guards.largest_speed * bench.length);
-    guards.frozen_speed *= bench.length;
+    GuardSettings guards = bench.guards();
+    guards.force_limit = options.force_limit.value_or(guards.force_limit);
+    guards.largest_speed = options.largest_speed.value_or(guards.largest_speed);
     guards.slew_s = options.slew_s;
     guards.ramp_s = options.ramp_s;
     guards.frozen_s = options.frozen_s;

@@ -6,6 +6,7 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/device/hand.hpp"
+#include "palpate/guard/guard_settings.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/scheme.hpp"
 
@@ -35,6 +36,15 @@ struct Bench {
             scheme.play_radius = std::max(4.0 * device.encoder_step, 0.01 * travel);
         }
         return scheme;
+    }
+
+    /// The default guards in this bench's scale. A speed that the encoder hardly resolves says nothing of it.
+    [[nodiscard]] GuardSettings guards() const noexcept {
+        GuardSettings guards;
+        guards.force_limit = device.force_limit;
+        guards.largest_speed *= length;
+        guards.frozen_speed = std::max(guards.frozen_speed * length, 3.0 * device.encoder_step / device.period_s);
+        return guards;
     }
 };
 

@@ -21,7 +21,7 @@ namespace palpate {
 enum class FaultKind : std::uint8_t {
     Late,        ///< no answer in time: Timeout; the sample itself is skipped
     Lost,        ///< one more sample was taken that nobody saw
-    Repeated,    ///< the sample before comes again
+    Repeated,    ///< the last sample comes again
     NotANumber,  ///< the position is NaN
     Frozen,      ///< the encoder repeats its value, everything else goes on
     Jump,        ///< the encoder is off by `jump`
@@ -91,14 +91,14 @@ class Faulty {
         Reading told = now;
         switch (fault.kind) {
             case FaultKind::Late:
-                told = last_;
+                told = now = last_;
                 told.status = Status::Timeout;
                 break;
             case FaultKind::Lost:
                 told = now = device_.exchange(command);
                 break;
             case FaultKind::Repeated:
-                told = last_;
+                told = now = last_;
                 break;
             case FaultKind::NotANumber:
                 told.position = std::numeric_limits<double>::quiet_NaN();

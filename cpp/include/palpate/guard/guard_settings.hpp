@@ -19,8 +19,8 @@ struct GuardSettings {
     double slew_s = 0.005;          ///< time from no force to the limit; 0 = no slew limit [s]
     double ramp_s = 0.2;            ///< from no force to all of it, at the start [s]
     double largest_speed = 100.0;   ///< of the handle: beyond, the encoder jumped [m/s or rad/s]
-    double frozen_speed = 0.8;      ///< a handle this fast cannot stand still at once [m/s or rad/s]
-    double frozen_s = 0.02;         ///< how long it may seem to; 0 = not looked at [s]
+    double frozen_speed = 0.3;      ///< a handle this fast cannot stand still at once [m/s or rad/s]
+    double frozen_s = 0.05;         ///< how long it may seem to; 0 = not looked at [s]
 };
 
 /// Throws std::invalid_argument: the field, its value, what would be right.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -42,7 +43,7 @@ class ReadingGuard {
         const bool lost = started_ && advanced > expected;
         lost_ += lost ? advanced - expected : 0;
         last_sequence_ = sequence;
-        exchanges_ = 0;
+        exchanges_ = advanced < expected ? std::min(expected - advanced, most_late) : 0;
         if (!std::isfinite(position)) {
             return Status::NonFinite;
         }
@@ -59,6 +60,8 @@ class ReadingGuard {
     [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
 
   private:
+    static constexpr std::uint64_t most_late = 2;  ///< samples that may come later than their exchange
+
     [[nodiscard]] Status followed(double position, double samples) noexcept {
         const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);
         last_position_ = position;
@@ -79,7 +82,7 @@ class ReadingGuard {
     bool started_ = false;
     bool was_fast_ = false;
     std::uint64_t last_sequence_ = 0;
-    std::uint64_t exchanges_ = 0;  ///< since the last sample that came
+    std::uint64_t exchanges_ = 0;  ///< whose sample has not come yet
     std::uint64_t still_ = 0;      ///< samples without motion
     std::uint64_t lost_ = 0;
     std::uint64_t repeated_ = 0;
