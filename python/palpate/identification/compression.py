@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Float2D
 
 SIDE_LEVELS = 16
-"""Cells of the hysteresis input over [-1, 1]; +-1, where sliding contact stays, are centres of two of them."""
+"""Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
 
 POOLED_CELLS = 5
 """Neighbouring cells that share one slope."""
@@ -44,15 +44,14 @@ class Compressed:
 
 
 class Compressor:
-    """Groups the rows of one recording by position, once, and compresses it with or without a hysteresis input.
+    """Groups the rows of one recording by position, once; compresses it with or without a hysteresis input.
 
     Parameters
     ----------
     positions : (n, d)
     force : (n,)
     max_positions : int
-        With more distinct positions than this they are gathered in that many cells of a regular grid (for d > 1
-        in all).
+        With more distinct positions than this they are gathered in that many cells of a regular grid.
     """
 
     def __init__(self, positions: Float2D, force: Float1D, *, max_positions: int) -> None:
@@ -87,7 +86,7 @@ class Compressor:
     def _cell_slopes(self) -> Float1D:
         """Slope of the force (cells,) over each position cell (d = 1), pooled with its neighbours.
 
-        It is estimated once, whatever the sides, so that all rungs are charged the same few degrees of freedom.
+        It is estimated once, whatever the sides, so that it costs all rungs the same few degrees of freedom.
         """
         x, y = self._positions[:, 0], self._force
         group, count = _ranked(self._key)

@@ -70,7 +70,7 @@ class Block:
 
     @property
     def n_channels(self) -> int:
-        return self.channels.shape[1]
+        return int(self.channels.shape[1])
 
     def design(self, wavelets: Float2D) -> Float2D:
         """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
@@ -123,7 +123,7 @@ class SeparableProblem:
         self.readout = readout
         self.samples = samples
         self.within = within
-        self.dimension = blocks[0].positions.shape[1]
+        self.dimension = int(blocks[0].positions.shape[1])
         self.n_channels = sum(block.n_channels for block in blocks)
         self.force_range = max(force_range, TINY)
         self.prior = 0.0
@@ -152,7 +152,7 @@ class SeparableProblem:
 
     def finest(self, beta: Float2D) -> Float2D:
         """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
-        reach = [tree.query(beta, k=[self.resolved_by])[0][:, 0] for tree in self._trees]
+        reach = [np.asarray(tree.query(beta, k=[self.resolved_by])[0])[:, 0] for tree in self._trees]
         return np.asarray(CORE / np.maximum(np.max(reach, axis=0), 1e-9))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
@@ -164,6 +164,10 @@ class SeparableProblem:
             tables.append(found.reshape(block.n_channels, -1))
             designs.append(design)
         return self.solution(basis, np.concatenate(tables), tuple(designs))
+
+    def solution_of(self, other: Solution) -> Solution:
+        """The solution of a problem with the same positions, with the errors that it leaves in this one."""
+        return self.solution(other.basis, other.coefficients, other.designs)
 
     def solution(self, basis: Basis, coefficients: Float2D, designs: tuple[Float2D, ...]) -> Solution:
         """These coefficients with the errors they leave."""
@@ -250,7 +254,7 @@ def problem_of(rows: Compressed, *, resolved_by: int) -> SeparableProblem:
 
 
 def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve a positive semidefinite system: Cholesky on unit-norm columns, the ridge raised until it succeeds."""
+    """Solve a positive semidefinite system by Cholesky on unit-norm columns."""
     factor, norm = factored(gram)
     columns = right.reshape(len(gram), -1) / norm[:, None]
     solved, _ = dpotrs(factor, columns, lower=1)
@@ -258,7 +262,10 @@ def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
-    """(L, norm) with gram = D L L' D, D = diag(norm), L lower triangular (what stands above it is not used)."""
+    """(L, norm) with gram = D L L' D, D = diag(norm); only the lower triangle of L counts.
+
+    The ridge is raised until the factorisation succeeds.
+    """
     norm = np.sqrt(np.diag(gram))
     norm = np.where(norm > 0.0, norm, 1.0)
     scaled = gram / np.outer(norm, norm)
