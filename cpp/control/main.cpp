@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // palpate-control: a model rendered on a device in real time. The exit codes stand in --help.
 #include <atomic>
-#include <cmath>
 #include <csignal>
-#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <iostream>
 #include <stdexcept>
 #include <string>
-#include <utility>
+#include <vector>
 
 #include "options.hpp"
 #include "palpate/bench.hpp"
@@ -27,23 +25,27 @@ namespace {
 std::atomic<bool> asked{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
-void ask_to_stop(int /*signal*/) { asked.store(true, std::memory_order_relaxed); }
+void ask_to_stop(int /*signal*/) {
+    asked.store(true, std::memory_order_relaxed);
+}
 
 /// Ctrl-C and a request to terminate end the loop; a reader that is gone or a file that is full end nothing.
 void handle_signals() {
-    struct sigaction stop {};
+    struct sigaction stop{};
     stop.sa_handler = ask_to_stop;
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         sigaction(signal, &stop, nullptr);
     }
-    struct sigaction ignore {};
+    struct sigaction ignore{};
     ignore.sa_handler = SIG_IGN;
     for (const int signal : {SIGPIPE, SIGXFSZ}) {
         sigaction(signal, &ignore, nullptr);
     }
 }
 
-void refuse(const std::string& sentence) { throw std::invalid_argument(sentence); }
+void refuse(const std::string& sentence) {
+    throw std::invalid_argument(sentence);
+}
 
 Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench) {
     Scheme scheme = bench.scheme(model);
@@ -75,14 +77,17 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
 
 RecordUnits units_of(const ModelFile& file) {
     if (file.force_unit == "A") {
-        refuse("the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A");
+        refuse(
+            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A");
     }
     return {file.position_unit, file.force_unit == "N*m" ? "Nm" : file.force_unit};
 }
 
-void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units, Outlets& outlets) {
+void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
+                  Outlets& outlets) {
     if (options.telemetry_port) {
-        if (const std::string reason = outlets.telemetry.open(*options.telemetry_port, options.telemetry_hz, units);
+        if (const std::string reason =
+                outlets.telemetry.open(*options.telemetry_port, options.telemetry_hz, units);
             !reason.empty()) {
             refuse(reason);
         }
@@ -99,23 +104,6 @@ void open_outlets(const Options& options, const Metadata& metadata, const Record
             std::cerr << "a recording that was cut off earlier is kept as " << aside << "\n";
         }
     }
-}
-
-/// The last ticks before a fault, as a recording of their own. An error is told, and changes nothing else.
-void write_last_ticks(const Options& options, const SessionReport& report, const Metadata& metadata,
-                      const RecordUnits& units, const std::string& ending, const std::string& timing) {
-    const std::string name =
-        std::filesystem::path{options.record}.replace_extension(".fault.csv").string();
-    RecordingFile file;
-    std::string reason = file.open(name, units, metadata);
-    if (reason.empty()) {
-        file.take(report.last_ticks);
-        const int error = file.finish(ending, timing);
-        reason = error == 0 ? "" : std::strerror(error);
-    }
-    std::cerr << (reason.empty() ? "the last " + std::to_string(report.last_ticks.size()) + " ticks are in " + name
-                                 : "the last ticks could not be written: " + reason)
-              << "\n";
 }
 
 int run(const Options& options) {
@@ -143,13 +131,11 @@ int run(const Options& options) {
     for (const std::string& fault : options.faults) {
         faults.push_back(parse_fault(fault, period_s));
     }
-    // The simulation keeps its inner step, 1/20 ms, whatever the rate.
-    const int substeps = std::max(1, static_cast<int>(std::lround(20e3 * period_s)));
-    Faulty device{SimulatedDevice{bench.device, bench.hand, substeps}, faults,
+    Faulty device{SimulatedDevice{bench.device, bench.hand, simulated_substeps(period_s)}, faults,
                   3.0 * guards.largest_speed * period_s};
 
-    const Metadata metadata = flight_metadata(std::string("palpate-control ") + PALPATE_VERSION, options.model, scheme,
-                                              bench, guards, options.loop.rate_hz);
+    const Metadata metadata = flight_metadata(std::string("palpate-control ") + PALPATE_VERSION,
+                                              options.model, scheme, bench, guards, options.loop.rate_hz);
     Outlets outlets;
     if (const Opened opened = device.open(); !opened) {
         refuse(opened.reason);
@@ -170,28 +156,18 @@ int run(const Options& options) {
                                              [&](const SessionView& now) { view.show(now); });
     view.end();
 
-    const std::string ending = ending_text(report.loop, settings.loop) + "; zero force sent, device closed";
-    const std::string timing = timing_text(report.loop.timing, settings.loop.rate_hz) + "; lost records " +
-                               std::to_string(report.lost_records);
     std::string record = options.record;
     if (!record.empty()) {
-        const std::string cut = outlets.file.error() == 0 ? ""
-                                                          : std::string("; incomplete, the disk took no more: ") +
-                                                                std::strerror(outlets.file.error());
-        if (const int error = outlets.file.finish(ending + cut, timing); error != 0) {
-            std::cerr << "warning: the recording keeps its name " << record << ".part: " << std::strerror(error) << "\n";
-            record += ".part";
-        }
-        if (!cut.empty()) {
-            std::cerr << "warning: " << record << " is incomplete: " << std::strerror(outlets.file.error()) << "; "
-                      << outlets.file.refused() << " rows are missing at its end\n";
+        for (const std::string& warning : finish_record(outlets.file, report, settings.loop, record)) {
+            std::cerr << "warning: " << warning << "\n";
         }
     }
     if (!is_orderly(report.loop.ending)) {
-        std::cerr << "error: " << ending << "\n";
+        std::cerr << "error: " << ending_text(report.loop, settings.loop)
+                  << "; zero force sent, device closed\n";
         tell_last_ticks(report, units);
         if (!options.record.empty()) {
-            write_last_ticks(options, report, metadata, units, ending, timing);
+            std::cerr << write_last_ticks(options.record, units, metadata, report, settings.loop) << "\n";
         }
     }
     tell_summary(report, settings, outlets, record, options.as_json);

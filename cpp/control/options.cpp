@@ -16,7 +16,8 @@ namespace palpate::control {
 namespace {
 
 constexpr const char* epilogue =
-    "Ctrl-C ends a run in an orderly way. Exit code: 0 ran its time, or Ctrl-C; 1 stopped by a guard, a fault or\n"
+    "Ctrl-C ends a run in an orderly way. Exit code: 0 ran its time, or Ctrl-C; 1 stopped by a guard, a "
+    "fault or\n"
     "a rate too low; 2 refused before anything moved.\n\n"
     "Example: palpate-control press.json --device simulated --rate-hz 1000 --duration-s 10 --record felt.csv";
 
@@ -28,7 +29,8 @@ CLI::Validator number_between(double low, double high) {
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) {
             return "";
         }
-        const std::string most = std::isfinite(high) ? "from " + readable(low) + " to " + readable(high) : "above 0";
+        const std::string most =
+            std::isfinite(high) ? "from " + readable(low) + " to " + readable(high) : "above 0";
         return "must be a number " + most + ", not " + text;
     });
     return validator;
@@ -40,7 +42,8 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 CLI::Validator structure_word() {
     CLI::Validator validator;
     validator.operation([](std::string& text) -> std::string {
-        const bool known = std::find(structure_names.begin(), structure_names.end(), text) != structure_names.end();
+        const bool known =
+            std::find(structure_names.begin(), structure_names.end(), text) != structure_names.end();
         return known ? "" : "must be direct, massless, implicit or explicit, not " + text;
     });
     return validator;
@@ -57,21 +60,25 @@ void add_rendering(CLI::App& app, Options& options) {
     group(app.add_option("--coupling-damping", options.coupling_damping,
                          "B_c, force per velocity [0.02 N*m*s/rad, scaled]"));
     group(app.add_option("--mass", options.mass, "m of implicit and explicit [0.001 kg*m^2, scaled]"));
-    group(app.add_option("--damping", options.damping, "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
+    group(
+        app.add_option("--damping", options.damping, "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
     group(app.add_option("--play-radius", options.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"));
 }
 
 void add_guards(CLI::App& app, Options& options) {
     const auto group = [](CLI::Option* option) { return option->group("Guards"); };
-    group(app.add_option("--force-limit", options.force_limit, "In the model's unit [the device's: 5 N*m, scaled]"));
+    group(app.add_option("--force-limit", options.force_limit,
+                         "In the model's unit [the device's: 5 N*m, scaled]"));
     group(app.add_option("--slew-s", options.slew_s, "Least time from no force to the limit, 0 = any"))
         ->capture_default_str();
-    group(app.add_option("--ramp-s", options.ramp_s, "From no force to all of it at the start"))->capture_default_str();
+    group(app.add_option("--ramp-s", options.ramp_s, "From no force to all of it at the start"))
+        ->capture_default_str();
     group(app.add_option("--largest-speed", options.largest_speed,
                          "Faster than this the encoder jumped [100 rad/s, scaled]"));
-    group(app.add_option("--frozen-s", options.frozen_s,
-                         "A position that stands this long out of full motion is an encoder that died, 0 = never"))
+    group(app.add_option(
+              "--frozen-s", options.frozen_s,
+              "A position that stands this long out of full motion is an encoder that died, 0 = never"))
         ->capture_default_str();
     group(app.add_option("--tolerated-samples", options.loop.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
@@ -105,17 +112,19 @@ void add_running(CLI::App& app, Options& options) {
         ->check(number_between(-2, 1023))
         ->capture_default_str();
     app.add_flag("--json", options.as_json, "Print the summary as one JSON object");
-    app.add_option("--fault", options.faults,
-                   "For tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES of late, lost, repeated, nan, frozen, "
-                   "jump, saturated, gone");
+    app.add_option(
+        "--fault", options.faults,
+        "For tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES of late, lost, repeated, nan, frozen, "
+        "jump, saturated, gone");
 }
 
 }  // namespace
 
 std::optional<int> read_options(int count, char** words, Options& options) {
-    CLI::App app{"Render a model on a haptic device, tick by tick.\n\n"
-                 "What is sent, felt and measured can be recorded, and identified and verified like any recording.",
-                 "palpate-control"};
+    CLI::App app{
+        "Render a model on a haptic device, tick by tick.\n\n"
+        "What is sent, felt and measured can be recorded, and identified and verified like any recording.",
+        "palpate-control"};
     app.get_formatter()->column_width(34);
     app.footer(epilogue);
     app.set_version_flag("--version", std::string("palpate-control ") + PALPATE_VERSION);

@@ -60,12 +60,14 @@ void LiveView::show(const SessionView& view) {
         }
     }
     if (view.disk_error != 0 && !std::exchange(told_disk_, true)) {
-        say(std::string("warning: the recording stopped, the loop goes on: ") + std::strerror(view.disk_error));
+        say(std::string("warning: the recording stopped, the loop goes on: ") +
+            std::strerror(view.disk_error));
     }
     const double rate = view.progress.rate.rate_hz();
     const bool is_short = rate > 0.0 && rate < 0.99 * settings_.rate_hz;
     if (is_short && !std::exchange(short_of_rate_, is_short)) {
-        say("warning: the loop runs at " + readable(rate) + " Hz, asked for " + readable(settings_.rate_hz) + " Hz");
+        say("warning: the loop runs at " + readable(rate) + " Hz, asked for " + readable(settings_.rate_hz) +
+            " Hz");
     }
     short_of_rate_ = is_short;
     if (terminal_ && ++calls_ % calls_a_line == 0) {
@@ -73,8 +75,8 @@ void LiveView::show(const SessionView& view) {
         const auto missed = view.progress.missed.load(std::memory_order_relaxed);
         std::cerr << "\r\033[K" << readable(static_cast<double>(ticks + missed) / settings_.rate_hz) << " s  "
                   << readable(rate) << " Hz  position " << readable(view.progress.position.load()) << " "
-                  << units_.position << "  force " << readable(view.progress.force.load()) << " " << units_.force
-                  << "  missed " << missed << std::flush;
+                  << units_.position << "  force " << readable(view.progress.force.load()) << " "
+                  << units_.force << "  missed " << missed << std::flush;
         line_is_open_ = true;
     }
 }
@@ -112,8 +114,8 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
         counted += (counted.empty() ? "" : ", ") + std::to_string(count.get<std::uint64_t>()) + " " + word;
     }
     std::cout << "ended      " << ending << "\n"
-              << "rate       " << readable(loop.timing.rate_hz()) << " Hz of " << readable(settings.loop.rate_hz)
-              << " Hz, " << loop.timing.missed << " deadlines missed\n"
+              << "rate       " << readable(loop.timing.rate_hz()) << " Hz of "
+              << readable(settings.loop.rate_hz) << " Hz, " << loop.timing.missed << " deadlines missed\n"
               << "period     " << percentiles(loop.timing.period) << " (the longest gap)\n"
               << "late by    " << percentiles(loop.timing.lateness) << "\n"
               << "ticks      " << counted << "\n"
@@ -123,8 +125,8 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
                   << report.lost_records + file.refused() << " lost\n";
     }
     if (outlets.telemetry.sent() + outlets.telemetry.dropped() > 0) {
-        std::cout << "telemetry  " << outlets.telemetry.sent() << " lines sent, " << outlets.telemetry.dropped()
-                  << " dropped\n";
+        std::cout << "telemetry  " << outlets.telemetry.sent() << " lines sent, "
+                  << outlets.telemetry.dropped() << " dropped\n";
     }
     std::cout << std::flush;
 }

@@ -148,9 +148,8 @@ TEST(Faults, ARunWithoutThemIsOrderly) {
     EXPECT_EQ(run.report->ending, Ending::TimeUp);
     EXPECT_EQ(run.ticks.size(), 2000U);
     EXPECT_EQ(run.report->ticks_by_status[0], 2000U);
-    const auto largest = std::max_element(run.ticks.begin(), run.ticks.end(), [](const auto& a, const auto& b) {
-        return a.force < b.force;
-    });
+    const auto largest = std::max_element(run.ticks.begin(), run.ticks.end(),
+                                          [](const auto& a, const auto& b) { return a.force < b.force; });
     EXPECT_GT(largest->force, 2.0);
 }
 
@@ -162,12 +161,13 @@ struct Expected {
 
 TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
     // 0.4 s: the hand is on its way, the force far from zero.
-    for (const Expected& expected : std::vector<Expected>{{FaultKind::Late, Status::Timeout, Ending::TimeUp},
-                                                          {FaultKind::Lost, Status::Lost, Ending::TimeUp},
-                                                          {FaultKind::Repeated, Status::Lost, Ending::TimeUp},
-                                                          {FaultKind::NotANumber, Status::NonFinite, Ending::TimeUp},
-                                                          {FaultKind::Jump, Status::Jump, Ending::Guard},
-                                                          {FaultKind::Gone, Status::Fault, Ending::DeviceFault}}) {
+    for (const Expected& expected :
+         std::vector<Expected>{{FaultKind::Late, Status::Timeout, Ending::TimeUp},
+                               {FaultKind::Lost, Status::Lost, Ending::TimeUp},
+                               {FaultKind::Repeated, Status::Lost, Ending::TimeUp},
+                               {FaultKind::NotANumber, Status::NonFinite, Ending::TimeUp},
+                               {FaultKind::Jump, Status::Jump, Ending::Guard},
+                               {FaultKind::Gone, Status::Fault, Ending::DeviceFault}}) {
         const Rendering run = render({{expected.kind, 400, 1}}, 1.0);
         const std::string name{fault_names[static_cast<std::size_t>(expected.kind)]};
         expect_safe(run);
@@ -179,7 +179,8 @@ TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
         if (is_final(expected.status)) {
             EXPECT_EQ(run.ticks.size(), 401U) << name;
         } else {
-            EXPECT_EQ(run.ticks[401].status == Status::Ok || run.ticks[401].status == Status::Limited, true) << name;
+            EXPECT_EQ(run.ticks[401].status == Status::Ok || run.ticks[401].status == Status::Limited, true)
+                << name;
         }
     }
 }
@@ -210,7 +211,8 @@ TEST(Faults, OneSampleMoreThanToleratedEndsTheRun) {
 }
 
 TEST(Faults, LostAndRepeatedSamplesAreCounted) {
-    const Rendering run = render({{FaultKind::Lost, 100, 3}, {FaultKind::Repeated, 200, 2}, {FaultKind::Late, 300, 2}}, 0.5);
+    const Rendering run =
+        render({{FaultKind::Lost, 100, 3}, {FaultKind::Repeated, 200, 2}, {FaultKind::Late, 300, 2}}, 0.5);
     EXPECT_EQ(run.report->lost_samples, 3U);
     EXPECT_EQ(run.report->repeated_samples, 2U);
     EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Timeout)], 2U);
@@ -296,7 +298,8 @@ TEST(FaultScript, IsReadFromTheCommandLine) {
     EXPECT_EQ(fault.exchange, 1500U);
     EXPECT_EQ(fault.samples, 200U);
     EXPECT_EQ(parse_fault("late@0", 1e-3).samples, 1U);
-    for (const char* wrong : {"", "late", "late@", "late@x3", "late@-1", "late@1x", "late@1xa", "soft@1", "late@nan"}) {
+    for (const char* wrong :
+         {"", "late", "late@", "late@x3", "late@-1", "late@1x", "late@1xa", "soft@1", "late@nan"}) {
         EXPECT_THROW((void)parse_fault(wrong, 1e-3), std::invalid_argument) << wrong;
     }
 }

@@ -37,8 +37,10 @@ TEST(ModelFile, RefusesEveryBadFileWithTheFieldThatPythonNames) {
             const std::string sentence = error.what();
             EXPECT_EQ(sentence.find('\n'), std::string::npos) << sentence;
             ASSERT_EQ(sentence.rfind(file + ": ", 0), 0U) << sentence;
-            if (const auto& field = entry.at("field"); !field.is_null() && !field.get<std::string>().empty()) {
-                EXPECT_EQ(sentence.substr(file.size() + 2).rfind(field.get<std::string>() + " ", 0), 0U) << sentence;
+            if (const auto& field = entry.at("field");
+                !field.is_null() && !field.get<std::string>().empty()) {
+                EXPECT_EQ(sentence.substr(file.size() + 2).rfind(field.get<std::string>() + " ", 0), 0U)
+                    << sentence;
             }
         }
     }

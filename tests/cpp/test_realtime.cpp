@@ -130,7 +130,8 @@ TEST(DurationHistogram, QuantilesAreThoseOfTheSortedDurationsToOnePartIn256) {
     }
     std::sort(durations.begin(), durations.end());
     for (const double share : {0.001, 0.25, 0.5, 0.99, 0.999, 1.0}) {
-        const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(durations.size()))) - 1;
+        const auto rank =
+            static_cast<std::size_t>(std::ceil(share * static_cast<double>(durations.size()))) - 1;
         const auto exact = static_cast<double>(durations[rank]);
         EXPECT_NEAR(histogram.quantile(share), exact, exact / 256.0) << share;
     }

@@ -224,9 +224,9 @@ Counts counted(Sin sin, StructureKind kind = StructureKind::Massless) {
     return run_watched(model(), kind, sin, nothing, nothing);
 }
 
-#define SKIP_UNDER_SANITIZERS()                                           \
-    if (PALPATE_SANITIZED) {                                              \
-        GTEST_SKIP() << "the sanitizer itself allocates and calls";       \
+#define SKIP_UNDER_SANITIZERS()                                     \
+    if (PALPATE_SANITIZED) {                                        \
+        GTEST_SKIP() << "the sanitizer itself allocates and calls"; \
     }
 
 TEST(RealTimePath, AllocatesLocksAndThrowsNothingInAnyStructure) {
@@ -264,13 +264,13 @@ void tell_and_die(int /*signal*/, siginfo_t* info, void* /*context*/) {
 
 /// From now on this thread may sleep until a deadline, read the clock and end the process, nothing else.
 void forbid_system_calls() {
-    struct sigaction action {};
+    struct sigaction action{};
     action.sa_sigaction = tell_and_die;
     action.sa_flags = SA_SIGINFO;
     sigaction(SIGSYS, &action, nullptr);
     constexpr auto allow = [](unsigned number) {
-        return std::array<sock_filter, 2>{{{BPF_JMP | BPF_JEQ | BPF_K, 0, 1, number},
-                                           {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW}}};
+        return std::array<sock_filter, 2>{
+            {{BPF_JMP | BPF_JEQ | BPF_K, 0, 1, number}, {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW}}};
     };
     const auto sleep = allow(SYS_clock_nanosleep);
     const auto clock = allow(SYS_clock_gettime);
@@ -285,7 +285,8 @@ void forbid_system_calls() {
                                        {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_TRAP}}};
     const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
     prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-    ASSERT_EQ(prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program), 0) << "this kernel has no seccomp filters";
+    ASSERT_EQ(prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program), 0)
+        << "this kernel has no seccomp filters";
 }
 
 void sleep_for_ever() {

@@ -43,7 +43,8 @@ struct Bench {
         GuardSettings guards;
         guards.force_limit = device.force_limit;
         guards.largest_speed *= length;
-        guards.frozen_speed = std::max(guards.frozen_speed * length, 3.0 * device.encoder_step / device.period_s);
+        guards.frozen_speed =
+            std::max(guards.frozen_speed * length, 3.0 * device.encoder_step / device.period_s);
         return guards;
     }
 };
@@ -51,7 +52,8 @@ struct Bench {
 namespace detail {
 
 /// The force while sliding in a direction, +1 pressing and -1 releasing.
-[[nodiscard]] inline double sliding_force(const ForceModel& model, double position, double direction) noexcept {
+[[nodiscard]] inline double sliding_force(const ForceModel& model, double position,
+                                          double direction) noexcept {
     return model.hysteresis() != nullptr ? model.hysteresis()->sliding(position, direction).force
                                          : model.network()->at(position, {}).force;
 }

@@ -13,9 +13,9 @@ namespace palpate {
 
 /// Everything that happened in one tick.
 struct Tick {
-    Reading reading;         ///< what the force was computed from
-    Rendered rendered;       ///< what the structure made of it
-    Command command;         ///< what was sent, after the guards
+    Reading reading;             ///< what the force was computed from
+    Rendered rendered;           ///< what the structure made of it
+    Command command;             ///< what was sent, after the guards
     Status status = Status::Ok;  ///< the first thing that was not Ok on the way
 };
 

@@ -34,11 +34,12 @@ inline constexpr double highest_rate_hz = 10'000.0;
 inline void validate(const LoopSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " + right);
+            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
+                                        right);
         }
     };
-    require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz", settings.rate_hz,
-            "100 to 10000");
+    require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
+            settings.rate_hz, "100 to 10000");
     require(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
     require(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
             settings.lowest_rate_share, "0 to 1");

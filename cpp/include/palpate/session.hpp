@@ -67,8 +67,8 @@ struct LoopSink {
 /// Renders until the loop ends. The device is open; when this returns it is closed, at zero force, and every
 /// record has reached the outlets. `watch(const SessionView&)` is called now and then, and may set `asked`.
 template <class Control, class Watch>
-[[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings, Outlets& outlets,
-                                        const std::atomic<bool>& asked, Watch watch) {
+[[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
+                                        Outlets& outlets, const std::atomic<bool>& asked, Watch watch) {
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
@@ -112,8 +112,8 @@ template <Device D, class Watch>
     const double period_s = 1.0 / settings.loop.rate_hz;
     return with_structure(model, scheme, period_s, [&](auto structure) {
         Controller controller{device, std::move(structure),
-                              Guards{force_limit(guards), slew_limit(guards, period_s), force_ramp(guards, period_s),
-                                     reading_guard(guards, period_s)}};
+                              Guards{force_limit(guards), slew_limit(guards, period_s),
+                                     force_ramp(guards, period_s), reading_guard(guards, period_s)}};
         return run_session(controller, settings, outlets, asked, watch);
     });
 }

@@ -138,8 +138,8 @@ class Faulty {
         for (const std::string_view name : fault_names) {
             names += (names.empty() ? "" : ", ") + std::string(name);
         }
-        throw std::invalid_argument("fault is '" + text + "', must be KIND@SECONDS or KIND@SECONDSxSAMPLES with one of " +
-                                    names);
+        throw std::invalid_argument("fault is '" + text +
+                                    "', must be KIND@SECONDS or KIND@SECONDSxSAMPLES with one of " + names);
     };
     const std::size_t at = text.find('@');
     const auto kind = std::find(fault_names.begin(), fault_names.end(), text.substr(0, at));

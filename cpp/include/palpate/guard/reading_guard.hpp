@@ -21,9 +21,10 @@ namespace palpate {
 class ReadingGuard {
   public:
     struct Limits {
-        double largest_step = std::numeric_limits<double>::infinity();  ///< of the position, a sample [m or rad]
-        double frozen_step = 0.0;                                       ///< see above [m or rad]
-        std::uint64_t frozen_samples = 0;                               ///< see above; 0 = not looked at
+        double largest_step =
+            std::numeric_limits<double>::infinity();  ///< of the position, a sample [m or rad]
+        double frozen_step = 0.0;                     ///< see above [m or rad]
+        std::uint64_t frozen_samples = 0;             ///< see above; 0 = not looked at
     };
 
     ReadingGuard() = default;

@@ -30,7 +30,7 @@ class GrowingFile {
     /// only copy of a recording that was cut off: it is moved to the first free NAME.1.part, NAME.2.part, ...
     [[nodiscard]] std::string open(const std::string& name) {
         name_ = name;
-        struct stat there {};
+        struct stat there{};
         if (stat(name.c_str(), &there) == 0 && !S_ISREG(there.st_mode)) {
             return name + " cannot be written: it is not an ordinary file";
         }
@@ -109,7 +109,7 @@ class GrowingFile {
     }
 
     [[nodiscard]] std::string set_aside() {
-        struct stat there {};
+        struct stat there{};
         for (int k = 1;; ++k) {
             set_aside_as_ = name_ + "." + std::to_string(k) + ".part";
             if (stat(set_aside_as_.c_str(), &there) != 0) {

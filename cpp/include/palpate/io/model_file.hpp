@@ -43,7 +43,8 @@ class JsonField {
     [[noreturn]] void refuse(const std::string& right) const {
         std::string shown = value_.dump();
         shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
-        throw std::invalid_argument((path_.empty() ? "the file holds " : path_ + " is ") + shown + ": must be " + right);
+        throw std::invalid_argument((path_.empty() ? "the file holds " : path_ + " is ") + shown +
+                                    ": must be " + right);
     }
     void require(bool holds, const std::string& right) const {
         if (!holds) {
@@ -52,8 +53,8 @@ class JsonField {
     }
     void require_length(std::size_t length, const char* meaning) const {
         if (value_.size() != length) {
-            throw std::invalid_argument(path_ + " has " + std::to_string(value_.size()) + " values: must have " +
-                                        std::to_string(length) + ", " + meaning);
+            throw std::invalid_argument(path_ + " has " + std::to_string(value_.size()) +
+                                        " values: must have " + std::to_string(length) + ", " + meaning);
         }
     }
 
@@ -193,7 +194,8 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     domain["lower"].require_length(d, "one for each dimension");
     domain["upper"].require_length(d, "one for each dimension");
     for (std::size_t k = 0; k < d; ++k) {
-        domain["lower"].items()[k].require(read.lower[k] < read.upper[k], "below domain.upper[" + std::to_string(k) + "]");
+        domain["lower"].items()[k].require(read.lower[k] < read.upper[k],
+                                           "below domain.upper[" + std::to_string(k) + "]");
     }
     if (const JsonField period = beyond["period"]; !period.is_null()) {
         const double travel = read.upper[0] - read.lower[0];
@@ -205,8 +207,9 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
 }
 
 inline ForceModel read_network(const JsonField& file) {
-    const JsonField network = file["network"].only({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear",
-                                                    "bias", "linear_hysteresis", "bias_hysteresis"});
+    const JsonField network =
+        file["network"].only({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
+                              "linear_hysteresis", "bias_hysteresis"});
     NetworkParameters read;
     read.dimension = network["dimension"].count(1);
     const std::size_t d = read.dimension;
@@ -221,15 +224,16 @@ inline ForceModel read_network(const JsonField& file) {
     network["linear"].require_length(d, "one for each dimension");
     const JsonField loss = network["weight_hysteresis"];
     for (const char* name : {"linear_hysteresis", "bias_hysteresis"}) {
-        network[name].require(network[name].is_null() == loss.is_null(),
-                              loss.is_null() ? "null, because weight_hysteresis is"
-                                             : "given, because weight_hysteresis is");
+        network[name].require(
+            network[name].is_null() == loss.is_null(),
+            loss.is_null() ? "null, because weight_hysteresis is" : "given, because weight_hysteresis is");
     }
     const std::string kind = file["kind"].one_of({"position", "hysteresis", "position_velocity", "general"});
     file["kind"].require(kind != "hysteresis" || !loss.is_null(), "another kind: weight_hysteresis is null");
     file["kind"].require(kind != "position" || loss.is_null(), "hysteresis: weight_hysteresis is given");
     const JsonField radius = file["play_radius"];
-    const std::optional<double> play_radius = radius.is_null() ? std::nullopt : std::optional{radius.positive()};
+    const std::optional<double> play_radius =
+        radius.is_null() ? std::nullopt : std::optional{radius.positive()};
     radius.require(radius.is_null() || !loss.is_null(), "null in a model without hysteresis");
     network["dimension"].require(loss.is_null() || d == 1, "1 in a model with hysteresis");
     const Domain domain = read_domain(file, d);
@@ -253,13 +257,18 @@ inline ForceModel read_network(const JsonField& file) {
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
-    file.only({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass", "damping",
-               "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate", "notes"});
+    file.only({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
+               "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate",
+               "notes"});
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].words();
     const detail::JsonField units = file["units"].only({"position", "force"});
-    ModelFile read{detail::read_network(file), file["kind"].words(), units["position"].one_of({"rad", "m", "count", ""}),
-                   units["force"].one_of({"N*m", "N", "A", ""}), {}, ""};
+    ModelFile read{detail::read_network(file),
+                   file["kind"].words(),
+                   units["position"].one_of({"rad", "m", "count", ""}),
+                   units["force"].one_of({"N*m", "N", "A", ""}),
+                   {},
+                   ""};
     for (const detail::JsonField& input : file["inputs"].items()) {
         read.inputs.push_back(input.words());
     }

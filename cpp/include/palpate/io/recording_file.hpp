@@ -33,8 +33,9 @@ class RecordingFile {
         for (const auto& [key, value] : metadata) {
             head += line(key, value);
         }
-        head += line("palpate-columns", R"({"time": "time_s", "position": "position)" + suffix(units_.position) +
-                                            R"(", "force": "force)" + suffix(units_.force) + R"("})");
+        head +=
+            line("palpate-columns", R"({"time": "time_s", "position": "position)" + suffix(units_.position) +
+                                        R"(", "force": "force)" + suffix(units_.force) + R"("})");
         ending_at_ = static_cast<off_t>(head.size());
         head += padded(line("ended", "not yet: the recording was cut off, or is still growing"));
         timing_at_ = static_cast<off_t>(head.size());
@@ -79,7 +80,9 @@ class RecordingFile {
   private:
     static constexpr std::size_t room = 512;  ///< for each line that is written at the end
 
-    [[nodiscard]] static std::string suffix(const std::string& unit) { return unit.empty() ? "" : "_" + unit; }
+    [[nodiscard]] static std::string suffix(const std::string& unit) {
+        return unit.empty() ? "" : "_" + unit;
+    }
 
     [[nodiscard]] static std::string line(const std::string& key, std::string value) {
         for (char& letter : value) {

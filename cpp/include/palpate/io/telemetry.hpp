@@ -64,8 +64,8 @@ class Telemetry {
         line_.clear();
         append_json(line_, tick, units_);
         const auto* address = reinterpret_cast<const sockaddr*>(&target_);
-        const ssize_t took =
-            ::sendto(socket_, line_.data(), line_.size(), MSG_DONTWAIT | MSG_NOSIGNAL, address, sizeof target_);
+        const ssize_t took = ::sendto(socket_, line_.data(), line_.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                                      address, sizeof target_);
         ++(took == static_cast<ssize_t>(line_.size()) ? sent_ : dropped_);
     }
 

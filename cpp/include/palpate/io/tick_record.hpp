@@ -60,15 +60,16 @@ inline void append_nanoseconds(std::string& text, double seconds) {
 [[nodiscard]] inline std::string column_names(const RecordUnits& units) {
     const auto unit = [](const std::string& suffix) { return suffix.empty() ? "" : "_" + suffix; };
     const std::string velocity = units.position.empty() ? "" : "_" + units.position + "ps";
-    return "time_s,position" + unit(units.position) + ",force" + unit(units.force) + ",applied" + unit(units.force) +
-           ",environment_position" + unit(units.position) + ",velocity" + velocity +
+    return "time_s,position" + unit(units.position) + ",force" + unit(units.force) + ",applied" +
+           unit(units.force) + ",environment_position" + unit(units.position) + ",velocity" + velocity +
            ",sequence,device_clock_s,lateness_s,evaluations,extrapolated,status";
 }
 
 /// The same columns as one line of numbers.
 inline void append_row(std::string& text, const TickRecord& tick) {
     detail::append_nanoseconds(text, tick.time);
-    for (const double value : {tick.position, tick.force, tick.applied, tick.environment_position, tick.velocity}) {
+    for (const double value :
+         {tick.position, tick.force, tick.applied, tick.environment_position, tick.velocity}) {
         text += ',';
         detail::append_number(text, value);
     }

@@ -41,7 +41,8 @@ class Periodic {
         while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
         }
         Wake wake{next_, monotonic_now(), 0};
-        wake.skipped = static_cast<std::uint64_t>(std::max<Nanoseconds>(0, wake.now - wake.deadline) / period_);
+        wake.skipped =
+            static_cast<std::uint64_t>(std::max<Nanoseconds>(0, wake.now - wake.deadline) / period_);
         next_ += static_cast<Nanoseconds>(wake.skipped + 1) * period_;
         return wake;
     }

@@ -84,8 +84,8 @@ inline void touch_stack() noexcept {
         CPU_ZERO(&one);
         CPU_SET(static_cast<unsigned>(cpu), &one);
         if (const int error = pthread_setaffinity_np(pthread_self(), sizeof one, &one); error != 0) {
-            refused.push_back("the loop is not kept on core " + std::to_string(cpu) + " (" + std::strerror(error) +
-                              ")");
+            refused.push_back("the loop is not kept on core " + std::to_string(cpu) + " (" +
+                              std::strerror(error) + ")");
         }
     }
     if (options.priority > 0) {

@@ -88,7 +88,8 @@ struct LoopTiming {
     [[nodiscard]] std::uint64_t ticks() const noexcept { return lateness.count(); }
     /// Ticks a second over the whole run.
     [[nodiscard]] double rate_hz() const noexcept {
-        return last > first ? static_cast<double>(ticks() - 1) * 1e9 / static_cast<double>(last - first) : 0.0;
+        return last > first ? static_cast<double>(ticks() - 1) * 1e9 / static_cast<double>(last - first)
+                            : 0.0;
     }
 };
 
