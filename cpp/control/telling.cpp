@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstring>
 #include <iostream>
+#include <system_error>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -61,7 +61,7 @@ void LiveView::show(const SessionView& view) {
     }
     if (view.disk_error != 0 && !std::exchange(told_disk_, true)) {
         say(std::string("warning: the recording stopped, the loop goes on: ") +
-            std::strerror(view.disk_error));
+            std::generic_category().message(view.disk_error));
     }
     const double rate = view.progress.rate.rate_hz();
     const bool is_short = rate > 0.0 && rate < 0.99 * settings_.rate_hz;

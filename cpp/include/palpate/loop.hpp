@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -117,9 +116,9 @@ namespace detail {
 template <class Control, class Clock, class Sink>
 void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, const std::atomic<bool>& asked,
               Sink& sink, LoopProgress& progress, LoopReport& report) noexcept {
-    const double wanted = settings.duration_s * settings.rate_hz;
-    const auto most = static_cast<double>(std::numeric_limits<std::int64_t>::max() / 2);
-    const auto deadlines = static_cast<std::uint64_t>(std::max(1.0, std::min(std::round(wanted), most)));
+    constexpr double centuries = 1e15;  // of ticks: what "without end" means to a counter
+    const auto deadlines = static_cast<std::uint64_t>(
+        std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, centuries));
     std::uint64_t bad_in_a_row = 0;
     (void)controller.start();  // what the first sample says is judged by the first tick
     clock.start();

@@ -4,8 +4,8 @@
 #include <array>
 #include <charconv>
 #include <cstddef>
-#include <cstring>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -108,15 +108,17 @@ namespace palpate {
     const int disk = file.error();
     std::string ending = ending_text(report.loop, settings) + "; zero force sent, device closed";
     if (disk != 0) {
-        ending += std::string("; incomplete, the disk took no more: ") + std::strerror(disk);
-        warnings.push_back(name + " is incomplete: " + std::strerror(disk) + "; " +
+        ending +=
+            std::string("; incomplete, the disk took no more: ") + std::generic_category().message(disk);
+        warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +
                            std::to_string(file.refused()) + " rows are missing at its end");
     }
     const std::string timing = timing_text(report.loop.timing, settings.rate_hz) + "; lost records " +
                                std::to_string(report.lost_records);
     if (const int error = file.finish(ending, timing); error != 0) {
         name += ".part";
-        warnings.push_back("the recording keeps its name " + name + ": " + std::strerror(error));
+        warnings.push_back("the recording keeps its name " + name + ": " +
+                           std::generic_category().message(error));
     }
     return warnings;
 }

@@ -9,9 +9,9 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdio>
-#include <cstring>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 namespace palpate {
@@ -40,7 +40,7 @@ class GrowingFile {
             }
         }
         descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        return descriptor_ >= 0 ? "" : name + " cannot be written: " + std::strerror(errno);
+        return descriptor_ >= 0 ? "" : name + " cannot be written: " + std::generic_category().message(errno);
     }
 
     [[nodiscard]] bool is_open() const noexcept { return descriptor_ >= 0; }
@@ -117,7 +117,8 @@ class GrowingFile {
             }
         }
         if (std::rename(part().c_str(), set_aside_as_.c_str()) != 0) {
-            return part() + " is an earlier recording and cannot be moved: " + std::strerror(errno);
+            return part() +
+                   " is an earlier recording and cannot be moved: " + std::generic_category().message(errno);
         }
         return "";
     }

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -44,7 +44,7 @@ class RecordingFile {
         if (file_.append(head) < head.size()) {
             const int error = file_.error();
             file_.discard();
-            return name + " cannot be written: " + std::strerror(error);
+            return name + " cannot be written: " + std::generic_category().message(error);
         }
         return "";
     }

@@ -8,9 +8,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "palpate/io/tick_record.hpp"
@@ -34,7 +34,7 @@ class Telemetry {
     [[nodiscard]] std::string open(std::uint16_t port, double rate_hz, RecordUnits units) {
         socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
         if (socket_ < 0) {
-            return std::string("no telemetry: ") + std::strerror(errno);
+            return std::string("no telemetry: ") + std::generic_category().message(errno);
         }
         target_.sin_family = AF_INET;
         target_.sin_port = htons(port);

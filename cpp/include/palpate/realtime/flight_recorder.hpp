@@ -26,7 +26,7 @@ template <class Record, RecordConsumer<Record> Consumer>
 class FlightRecorder {
   public:
     FlightRecorder(Consumer& consumer, std::size_t capacity, std::chrono::milliseconds every)
-        : consumer_{consumer}, ring_{capacity}, batch_(4096), every_{every} {
+        : ring_{capacity}, consumer_{consumer}, every_{every}, batch_(4096) {
         writer_ = std::thread{[this] { write_until_stopped(); }};
     }
     ~FlightRecorder() { stop(); }
@@ -65,12 +65,12 @@ class FlightRecorder {
         }
     }
 
-    Consumer& consumer_;
     RingBuffer<Record> ring_;
-    std::vector<Record> batch_;
+    Consumer& consumer_;
     std::chrono::milliseconds every_;
-    std::atomic<bool> stopping_{false};
+    std::vector<Record> batch_;
     std::atomic<std::uint64_t> lost_{0};
+    std::atomic<bool> stopping_{false};
     std::thread writer_;
 };
 

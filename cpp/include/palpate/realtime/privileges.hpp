@@ -8,8 +8,9 @@
 
 #include <array>
 #include <cerrno>
-#include <cstring>
+#include <cstddef>
 #include <string>
+#include <system_error>
 #include <vector>
 
 namespace palpate {
@@ -55,7 +56,8 @@ namespace detail {
 
 /// Touches the stack that a loop may use, so that no page of it is missing later.
 inline void touch_stack() noexcept {
-    std::array<volatile char, 64 * 1024> page{};
+    constexpr std::size_t bytes = 65'536;
+    std::array<volatile char, bytes> page{};
     for (std::size_t k = 0; k < page.size(); k += 1024) {
         page[k] = 1;
     }
@@ -75,7 +77,8 @@ inline void touch_stack() noexcept {
     }
     pthread_sigmask(SIG_SETMASK, &others, nullptr);
     if (memory.error() != 0) {
-        refused.push_back(std::string("memory is not locked (") + std::strerror(memory.error()) +
+        refused.push_back(std::string("memory is not locked (") +
+                          std::generic_category().message(memory.error()) +
                           "): swapping can delay a tick; raise the limit with ulimit -l");
     }
     if (options.cpu != -2) {
@@ -85,13 +88,14 @@ inline void touch_stack() noexcept {
         CPU_SET(static_cast<unsigned>(cpu), &one);
         if (const int error = pthread_setaffinity_np(pthread_self(), sizeof one, &one); error != 0) {
             refused.push_back("the loop is not kept on core " + std::to_string(cpu) + " (" +
-                              std::strerror(error) + ")");
+                              std::generic_category().message(error) + ")");
         }
     }
     if (options.priority > 0) {
         const sched_param priority{options.priority};
         if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority); error != 0) {
-            refused.push_back(std::string("no real-time priority (") + std::strerror(error) +
+            refused.push_back(std::string("no real-time priority (") +
+                              std::generic_category().message(error) +
                               "): other programs can delay a tick; allow it with an rtprio line in "
                               "/etc/security/limits.conf");
         }

@@ -44,14 +44,15 @@ class DurationHistogram {
     [[nodiscard]] Nanoseconds largest() const noexcept { return largest_; }
 
   private:
-    static constexpr int bits = 7;
+    static constexpr unsigned bits = 7;
     static constexpr std::size_t in_octave = std::size_t{1} << bits;
-    static constexpr int octaves = 40 - bits;
+    static constexpr unsigned octaves = 40 - bits;
     static constexpr std::size_t cells = in_octave * (octaves + 1);
-    static constexpr Nanoseconds longest = (Nanoseconds{1} << 40) - 1;
+    static constexpr Nanoseconds longest = 1'099'511'627'775;  ///< 2^40 - 1
 
     [[nodiscard]] static std::size_t cell_of(std::uint64_t value) noexcept {
-        const int shift = std::max(0, static_cast<int>(std::bit_width(value)) - 1 - bits);
+        const auto width = static_cast<unsigned>(std::bit_width(value));
+        const unsigned shift = width > bits + 1 ? width - bits - 1 : 0;
         return static_cast<std::size_t>(shift) * in_octave + static_cast<std::size_t>(value >> shift);
     }
 
