@@ -47,7 +47,7 @@ class Ending:
 
 
 def drop_what_cannot_be_written() -> None:
-    """Leave the interpreter nothing to flush at exit: that a disk is full or a pipe closed was told already."""
+    """Leave the interpreter nothing to flush at exit: a full disk or a closed pipe was told before."""
     try:
         sys.stdout.flush()
     except OSError:
