@@ -51,18 +51,22 @@ def test_several_recordings_of_one_environment_are_identified_together() -> None
     assert together.data.rows == 300
 
 
-def test_play_restarts_with_every_recording() -> None:
-    """Two presses, each from rest: joined end to end they must not look like one motion that jumps back."""
-    t = np.linspace(0.0, 2.0 * np.pi, 800)
+def test_play_starts_at_rest_in_every_recording() -> None:
+    """A sweep, and twenty rests elsewhere: only a new start explains that a rest lies between the strokes."""
+    random = np.random.default_rng(1)
+    t = np.linspace(0.0, 4.0 * np.pi, 1600)
     x = 0.5 - 0.5 * np.cos(t)
-    side = np.where(t < np.pi, 1.0, -1.0)
-    y = x + 0.2 * side + np.random.default_rng(1).normal(0.0, 0.01, 800)
-    recording = Recording.from_arrays(x, y, time=t)
-    model = identify([recording, recording])
+    y = x + 0.2 * np.sign(np.sin(t)) + random.normal(0.0, 0.01, len(t))
+    recordings = [Recording.from_arrays(x, y, time=t)]
+    for place in random.uniform(0.1, 0.9, 20):
+        rest = place + random.uniform(-1e-4, 1e-4, 40)
+        force = rest + random.normal(0.0, 0.01, 40)
+        recordings.append(Recording.from_arrays(rest, force, time=np.arange(40.0)))
+    model = identify(recordings)
     assert model.kind == "hysteresis"
     assert model.play_radius is not None
-    play = model.play(x)
-    assert np.sqrt(np.mean((model.force(x, play=play) - y) ** 2)) < 0.05
+    spread = np.std(np.concatenate([part.force for part in recordings]))
+    assert model.fit.nrmse * spread < 0.015
 
 
 def test_a_model_with_hysteresis_asks_for_the_direction_it_needs() -> None:
