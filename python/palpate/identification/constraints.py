@@ -125,7 +125,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
             return current
         for bound, x in found:
             reading = np.kron(bound.channels(problem), _columns(free.basis, bound.of_slope, x))
-            rows.append(bound.sign * reading)
+            rows.append(np.asarray(bound.sign * reading, dtype=np.float64))
             limits.append(np.full(len(x), bound.sign * bound.limit + margin * bound.unit))
         coefficients = _least_squares(problem, free, np.concatenate(rows), np.concatenate(limits))
         current = problem.solution(free.basis, coefficients, free.designs)
@@ -149,7 +149,7 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
         bend = _curvature_bound(solution.basis, weights[2:], bound.of_slope, left, right)
         undecided = (lowest >= 0.0) & (lowest < bend * (right - left) ** 2 / 8.0)
         shown = undecided | (lowest < 0.0) if halving == HALVINGS else lowest < 0.0
-        violated.append(np.asarray(np.stack([left[shown], right[shown]]), dtype=np.float64))
+        violated.append(np.stack([left[shown], right[shown]]))
         if shown[undecided].all():
             break
         middle = 0.5 * (left[undecided] + right[undecided])

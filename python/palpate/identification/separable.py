@@ -104,7 +104,7 @@ class SeparableProblem:
     samples, within
         Of the compressed recording: how many samples there are, and the sum of squares inside its rows.
     force_range : float
-        Largest less smallest force.
+        Largest less smallest force, above 0.
     resolved_by : int
         Distinct positions of every block that a wavelet's core must hold.
     """
@@ -125,7 +125,7 @@ class SeparableProblem:
         self.within = within
         self.dimension = int(blocks[0].positions.shape[1])
         self.n_channels = sum(block.n_channels for block in blocks)
-        self.force_range = max(force_range, TINY)
+        self.force_range = force_range
         self.prior = 0.0
         distinct = [np.unique(block.positions, axis=0) for block in blocks]
         self._trees = [cKDTree(positions) for positions in distinct]
@@ -248,7 +248,7 @@ def problem_of(rows: Compressed, *, resolved_by: int) -> SeparableProblem:
         readout,
         samples=rows.samples,
         within=rows.within,
-        force_range=float(np.ptp(rows.force)),
+        force_range=float(np.ptp(rows.force)) or float(np.abs(rows.force).max()) or 1.0,
         resolved_by=resolved_by,
     )
 
