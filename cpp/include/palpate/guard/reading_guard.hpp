@@ -37,7 +37,7 @@ class ReadingGuard {
         }
         const std::uint64_t advanced = sequence - last_sequence_;
         const std::uint64_t expected = exchanges_;
-        if (started_ && advanced == 0) {
+        if (started_ && static_cast<std::int64_t>(advanced) <= 0) {  // again, or one from before
             ++repeated_;
             return Status::Lost;
         }
