@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from palpate import InputError
+from palpate import InputError, _core
 from palpate.identification import IdentifyOptions, fit_environment
 
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) > 1
@@ -88,7 +88,34 @@ def test_rows_without_a_direction_are_left_out_and_counted() -> None:
     network = fit_environment(x[:, None], y, side)
     assert network.rung == "hysteresis"
     assert network.rmse < 0.03
-    assert "30 rows without a direction were left out" in network.notes
+    assert "30 rows without a direction were left out to judge hysteresis" in network.notes
+
+
+def test_rows_without_a_direction_come_back_when_hysteresis_is_refused() -> None:
+    random = np.random.default_rng(6)
+    x = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 1.5, 60), np.linspace(1, 0, 200)])
+    side = np.repeat([1.0, 0.0, -1.0], [200, 60, 200])
+    network = fit_environment(x[:, None], 2.0 * x + random.normal(0.0, 0.02, len(x)), side)
+    assert network.rung == "linear"
+    assert network.upper[0] == 1.5
+    assert any("hysteresis refused" in note for note in network.notes)
+
+
+def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -> None:
+    """A periodic sweep meets each stroke at its own places, and their alternation is no force of position."""
+    random = np.random.default_rng(3)
+    cycle, sample = np.divmod(np.arange(1600), 80)
+    phase = 2.0 * np.pi * (sample + 0.25) / 80 + 0.0005 * cycle
+    x = 0.5 - 0.5 * np.cos(phase)
+    y = 0.3 * x - 0.1 * np.sign(np.sin(phase)) + random.normal(0.0, 0.002, len(x))
+    network = fit_environment(x[:, None], y, starts=[0])
+    assert network.weight_hysteresis is None
+    assert len(network.weight) <= 5
+    between = np.linspace(0.02, 0.98, 5001)
+    force = _core.wavelet_columns(between, network.alpha, network.beta) @ network.weight
+    force = force + network.linear[0] * between + network.bias
+    assert np.abs(force - 0.3 * between).max() < 0.05
+    assert any(note.startswith("hysteresis: h >= 0 imposed") for note in network.notes)
 
 
 def test_play_radius_is_found_from_the_motion_when_no_direction_is_given() -> None:

@@ -17,7 +17,7 @@ from ..errors import InputError
 from .compression import Compressed, Compressor, binning_error
 from .constraints import domain_bounds, impose, moved_to_bounds
 from .frame import truncated_frame
-from .growth import Grown, PathPoint, grow, judge
+from .growth import Grown, PathPoint, grow, judge, prune
 from .identified import IdentifiedNetwork, Readings
 from .options import IdentifyOptions
 from .selection import Library
@@ -86,7 +86,12 @@ def fit_environment(
         limit *= 2
         ladder = _Ladder(positions, force, side, starts, replace(options, max_positions=limit))
         best = ladder.climb()
-    return ladder.finish(best)
+    found = ladder.finish(best)
+    if side is None or best.name == "hysteresis" or ladder.samples == len(force):
+        return found
+    # hysteresis was refused, so there is no reason any more to leave out rows that have no direction
+    every_row = fit_environment(positions, force, None, options)
+    return replace(every_row, path=found.path + every_row.path, notes=found.notes + every_row.notes)
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,9 @@ class _Ladder:
         if side is not None and not ((side > 0).any() and (side < 0).any()):
             side = None
         if side is not None and self._wants_hysteresis and not side.all():
-            self._notes.append(f"{np.count_nonzero(side == 0)} rows without a direction were left out")
+            self._notes.append(
+                f"{np.count_nonzero(side == 0)} rows without a direction were left out to judge hysteresis"
+            )
             positions, force, side = positions[side != 0], force[side != 0], side[side != 0]
         self._positions = (positions - self._lower) / self._reach
         self._force = force
@@ -149,6 +156,11 @@ class _Ladder:
                 "inputs names hysteresis, but the recording has neither both directions nor time; "
                 "name a direction column or leave hysteresis out"
             )
+
+    @property
+    def samples(self) -> int:
+        """Rows that the ladder stands on."""
+        return len(self._force)
 
     @property
     def _wants_hysteresis(self) -> bool:
@@ -239,16 +251,39 @@ class _Ladder:
         h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
         not fall at all with these, growing a network would be in vain.
         """
-        named = self._options.inputs != "auto"
+        options, named = self._options, self._options.inputs != "auto"
         extra = 0 if radius is None else 1
-        problem = problem_of(rows, resolved_by=self._options.resolved_by)
+        problem = problem_of(rows, resolved_by=options.resolved_by)
         first = problem.solve(below.solution.basis)
         n_parameters = problem.n_parameters(len(first.basis)) + extra
-        rung = _Rung("hysteresis", rows, problem, first, n_parameters, self._options.criterion, radius)
-        if named or rung.criterion(self._options) < below.criterion(self._options):
-            rung = self._network(rows, "hysteresis", first.basis)
-            rung = replace(rung, n_parameters=rung.n_parameters + extra, play_radius=radius)
-        return rung if named else self._better(below, rung)
+        free = _Rung("hysteresis", rows, problem, first, n_parameters, options.criterion, radius)
+        if named or free.criterion(options) < below.criterion(options):
+            problem, grown = self._grown(rows, "hysteresis", first.basis)
+            n_parameters = problem.n_parameters(len(grown.solution.basis)) + extra
+            free = _Rung("hysteresis", rows, problem, grown.solution, n_parameters, grown.stop_reason, radius)
+        if not named and self._better(below, free) is below:
+            return below
+        kept = self._constrained(free)
+        return kept if named or kept is free else self._better(self._single_valued(kept), kept)
+
+    def _single_valued(self, hysteresis: _Rung) -> _Rung:
+        """A force of position alone on the wavelets of a hysteresis rung, those it does not need removed.
+
+        Where hysteresis is there but not with h >= 0, this is what remains of it. A network grown on position
+        alone will not do: strokes that a periodic motion samples at different places look like one rapidly
+        changing force.
+        """
+        rows = self._compressor.rows()
+        problem = problem_of(rows, resolved_by=self._options.resolved_by)
+        start = problem.solve(hysteresis.solution.basis)
+        problem.set_prior(start.rss)
+        solution = prune(problem, problem.solve(start.basis), self._options)
+        n_parameters = problem.n_parameters(len(solution.basis))
+        return self._recorded(
+            self._constrained(
+                _Rung("position", rows, problem, solution, n_parameters, hysteresis.stop_reason)
+            )
+        )
 
     def _best_play(self, basis: Basis) -> tuple[float, Compressed]:
         """The play radius [box] whose input helps most on given wavelets, and the rows that it gives."""
@@ -298,10 +333,12 @@ class _Ladder:
         names = " and ".join(dict.fromkeys(bound.name for bound in bounds))
         price = f"RMS error {problem.rmse(kept):.4g} with, {rung.rmse:.4g} without"
         self._notes.append(f"{rung.name}: {names} imposed over the domain, {price}")
-        return replace(rung, solution=kept, n_parameters=problem.n_parameters(len(kept.basis)))
+        more = problem.n_parameters(len(kept.basis)) - problem.n_parameters(len(rung.solution.basis))
+        return replace(rung, solution=kept, n_parameters=rung.n_parameters + more)
 
     def _recorded(self, rung: _Rung) -> _Rung:
-        self._path.append(PathPoint(rung.name, 0, rung.rmse, rung.criterion(self._options)))
+        n_wavelets = len(rung.solution.basis)
+        self._path.append(PathPoint(rung.name, n_wavelets, rung.rmse, rung.criterion(self._options)))
         return rung
 
 
