@@ -12,6 +12,7 @@
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/dynamics/transfer_function.hpp"
 #include "palpate/guard/limits.hpp"
+#include "palpate/model/compiled_network.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/model/hysteresis.hpp"

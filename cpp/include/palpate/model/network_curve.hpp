@@ -33,12 +33,21 @@ class NetworkCurve {
     }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept { return network_; }
+    [[nodiscard]] double lower() const noexcept { return lower_; }
+    [[nodiscard]] double upper() const noexcept { return upper_; }
+    [[nodiscard]] bool periodic() const noexcept { return periodic_; }
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 
     [[nodiscard]] Curve at(double x) const noexcept {
+        return continued(x, [this](double within) noexcept { return inside(within); });
+    }
+
+    /// The curve with `inside` in place of eq. 4 within the domain.
+    template <class Inside>
+    [[nodiscard]] Curve continued(double x, Inside inside) const noexcept {
         if (periodic_) {
-            return wrapped(x);
+            return wrapped(x, inside);
         }
         if (x < lower_) {
             return below_.at(x);
@@ -85,7 +94,8 @@ class NetworkCurve {
 
   private:
     /// Value and slope repeat; the antiderivatives gain what each turn adds.
-    [[nodiscard]] Curve wrapped(double x) const noexcept {
+    template <class Inside>
+    [[nodiscard]] Curve wrapped(double x, Inside inside) const noexcept {
         const double period = upper_ - lower_;
         const double turns = std::floor((x - lower_) / period);
         const double along = x - turns * period - lower_;
