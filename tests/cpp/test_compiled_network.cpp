@@ -76,7 +76,7 @@ TEST(PiecewiseSeptic, IsExactForPolynomialsOfDegreeSeven) {
         return std::array{std::pow(x, 8) / 8.0 + std::pow(x, 5) / 5.0 - x * x / 2.0,
                           std::pow(x, 9) / 72.0 + std::pow(x, 6) / 30.0 - x * x * x / 6.0};
     };
-    PiecewiseSeptic table{-1.0, 2.0, 1, jet};
+    PiecewiseSeptic table{-2, 4, 0.5, jet};
     table.integrate(integrals);
     Random random{49};
     for (int k = 0; k < cases(1000); ++k) {
@@ -183,8 +183,7 @@ TEST(CompiledCurve, ContinuesAsTheNetworkDoes) {
 
 TEST(CompiledCurve, RepeatsAsTheNetworkDoes) {
     Random random{46};
-    Domain knob = test::unit_domain();
-    knob.period = 1.0;
+    const Domain knob{{0.1}, {0.8}, Continuation::Linear, Continuation::Linear, 0.8 - 0.1};
     const WaveletNetwork network = random_scene(random, 9, knob);
     const CompiledCurve curve{network.curve()};
     ASSERT_TRUE(curve.compiled());

@@ -27,4 +27,5 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/solver/newton.hpp"
+#include "palpate/solver/resolvent.hpp"
 #include "palpate/status.hpp"

@@ -132,12 +132,13 @@ class CompiledCurve {
         const double widest = (upper_ - lower_) / 32.0;
         const int fineness = -static_cast<int>(std::floor(std::log2(std::min(width, widest))));
         // Beyond 2^40 cells from zero the position itself says little about its place in the cell.
-        if (!(PiecewiseSeptic::count(lower_, upper_, fineness) <=
-                  static_cast<double>(options.largest_table) &&
-              std::ldexp(reach, fineness) < 0x1p40)) {
+        const double h = std::ldexp(1.0, -fineness);
+        if (!((upper_ - lower_) / h + 4.0 <= static_cast<double>(options.largest_table) &&
+              reach / h < 0x1p40)) {
             return;
         }
-        PiecewiseSeptic table{lower_, upper_, fineness,
+        // One more cell on either side: rounding may take a position that was wrapped past an edge.
+        PiecewiseSeptic table{PiecewiseSeptic::cell(lower_, h) - 1, PiecewiseSeptic::cell(upper_, h) + 1, h,
                               [&](double x) noexcept { return detail::jet(network, x); }};
         certify(table, eighth, detail::jet_rounding(network, reach));
         if (!(value_error_ <= asked)) {

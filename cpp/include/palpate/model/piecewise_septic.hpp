@@ -17,38 +17,31 @@ namespace palpate {
 /// Value and first three derivatives of a function at one position.
 using Jet = std::array<double, 4>;
 
-/// A function as polynomials of degree 7 on cells of equal width h = 2^-m, centred at the multiples of h: one
-/// look-up, one cache line and a few multiplications, however the function came about. Value and first three
-/// derivatives are continuous.
+/// A function as polynomials of degree 7 on cells of equal width h: one look-up, one cache line and a few
+/// multiplications, however the function came about. Value and first three derivatives are continuous.
 ///
-/// Because h is a power of two, cell and local coordinate t = x/h - k in [-1/2, 1/2] are exact.
+/// Cell k is centred at x = k h, its local coordinate is t = x/h - k in [-1/2, 1/2]; both are exact if h is a
+/// power of two.
 class PiecewiseSeptic {
   public:
-    /// Adding this rounds a double to an integer, which then stands in its low bits.
-    static constexpr double rounder = 0x1.8p52;
-
     PiecewiseSeptic() = default;
 
-    /// `jet(x)` gives the derivatives at the cells' borders. Covers [lower, upper] and half a cell around it.
+    /// Cells `first` to `last`; `jet(x)` gives the derivatives at their borders x = (k +- 1/2) h.
     template <class Function>
-    PiecewiseSeptic(double lower, double upper, int fineness, Function jet)
-        : scale_{std::ldexp(1.0, fineness)}, width_{std::ldexp(1.0, -fineness)} {
-        const std::int64_t first = nearest(lower * scale_);
-        const std::int64_t last = nearest(upper * scale_);
-        pieces_.reserve(static_cast<std::size_t>(last - first + 3));
-        Jet left = scaled(jet((static_cast<double>(first) - 1.5) * width_));
-        // One more piece on either side: rounding may take a position that was wrapped past an edge.
-        for (std::int64_t k = first - 1; k <= last + 1; ++k) {
+    PiecewiseSeptic(std::int64_t first, std::int64_t last, double width, Function jet)
+        : scale_{1.0 / width}, width_{width}, origin_{std::bit_cast<std::int64_t>(rounder) + first} {
+        pieces_.reserve(static_cast<std::size_t>(last - first + 1));
+        Jet left = scaled(jet((static_cast<double>(first) - 0.5) * width_));
+        for (std::int64_t k = first; k <= last; ++k) {
             const Jet right = scaled(jet((static_cast<double>(k) + 0.5) * width_));
             pieces_.push_back(piece(left, right));
             left = right;
         }
-        origin_ = std::bit_cast<std::int64_t>(rounder) + first - 1;
     }
 
-    /// How many cells of width 2^-fineness such a table has.
-    [[nodiscard]] static double count(double lower, double upper, int fineness) noexcept {
-        return std::ldexp(upper - lower, fineness) + 3.0;
+    /// The cell that holds x.
+    [[nodiscard]] static std::int64_t cell(double x, double width) noexcept {
+        return std::bit_cast<std::int64_t>(x / width + rounder) - std::bit_cast<std::int64_t>(rounder);
     }
 
     [[nodiscard]] bool empty() const noexcept { return pieces_.empty(); }
@@ -73,6 +66,12 @@ class PiecewiseSeptic {
                ((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) * (t2 * t2);
     }
 
+    /// Slope alone.
+    [[nodiscard]] double slope(double x) const noexcept {
+        const Place at = place(x);
+        return slope(pieces_[at.piece].c, at.t) * scale_;
+    }
+
     /// Value, slope and both antiderivatives from one look-up, after `integrate`.
     [[nodiscard]] Curve at(double x) const noexcept {
         const Place at = place(x);
@@ -82,8 +81,6 @@ class PiecewiseSeptic {
         const double t4 = t2 * t2;
         const double value =
             ((c[0] + c[1] * t) + (c[2] + c[3] * t) * t2) + ((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) * t4;
-        const double slope = ((c[1] + 2.0 * c[2] * t) + (3.0 * c[3] + 4.0 * c[4] * t) * t2) +
-                             ((5.0 * c[5] + 6.0 * c[6] * t) + 7.0 * c[7] * t2) * t4;
         const auto [first, second] = integrals_[at.piece];
         // Powers of t below: the antiderivatives of t^j are t^(j+1)/(j+1) and t^(j+2)/((j+1)(j+2)).
         const double once = ((c[0] + c[1] / 2.0 * t) + (c[2] / 3.0 + c[3] / 4.0 * t) * t2) +
@@ -91,7 +88,7 @@ class PiecewiseSeptic {
         const double twice = ((c[0] / 2.0 + c[1] / 6.0 * t) + (c[2] / 12.0 + c[3] / 20.0 * t) * t2) +
                              ((c[4] / 30.0 + c[5] / 42.0 * t) + (c[6] / 56.0 + c[7] / 72.0 * t) * t2) * t4;
         const double along = t * width_;
-        return {value, slope * scale_, first + along * once, second + along * (first + along * twice)};
+        return {value, slope(c, t) * scale_, first + along * once, second + along * (first + along * twice)};
     }
 
     /// Takes the antiderivatives at the middle of every cell from `antiderivatives(x)`.
@@ -129,6 +126,9 @@ class PiecewiseSeptic {
         std::array<double, 8> c;
     };
 
+    /// Adding this rounds a double to an integer, which then stands in its low bits.
+    static constexpr double rounder = 0x1.8p52;
+
     struct Place {
         std::size_t piece;
         double t;
@@ -141,8 +141,10 @@ class PiecewiseSeptic {
                 z - (rounded - rounder)};
     }
 
-    [[nodiscard]] static std::int64_t nearest(double z) noexcept {
-        return std::bit_cast<std::int64_t>(z + rounder) - std::bit_cast<std::int64_t>(rounder);
+    [[nodiscard]] static double slope(const std::array<double, 8>& c, double t) noexcept {
+        const double t2 = t * t;
+        return ((c[1] + 2.0 * c[2] * t) + (3.0 * c[3] + 4.0 * c[4] * t) * t2) +
+               ((5.0 * c[5] + 6.0 * c[6] * t) + 7.0 * c[7] * t2) * (t2 * t2);
     }
 
     /// Derivatives by t instead of x.

@@ -19,23 +19,30 @@ namespace palpate {
 ///
 /// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit
 /// equation of section 4.3, with the damping of figure 14.
-template <Environment E>
+template <Environment E, class Solver = LoadLineSolver>
 class Implicit {
   public:
-    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period,
-             LoadLineSolver solver = {})
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver = {})
         : environment_{std::move(environment)},
           inertia_{inertia},
           coupling_{coupling},
           period_{period},
-          solver_{solver} {
+          solver_{std::move(solver)} {
         reset(0.0);
+    }
+
+    /// p of every step behind the coupling.
+    [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
+                                                double period) noexcept {
+        return coupling.stiffness + coupling.damping / period +
+               (inertia.mass / (period * period) + inertia.damping / period);
     }
 
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
+        memory_ = {position};
         before_ = position;
     }
 
@@ -69,11 +76,12 @@ class Implicit {
         const double damping = inertia_.damping / period_;
         line.slope += inertia + damping;
         line.intercept += inertia * (2.0 * position_ - before_) + damping * position_;
-        const Solution solution = solver_.solve(environment_, state_, line, position_);
+        const Solution solution = solver_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
         environment_.advance(solution.position, state_);
+        memory_ = solver_.remember(line, solution);
         before_ = position_;
         position_ = solution.position;
         return {0.0, position_, solution.evaluations, solution.status, solution.environment.extrapolated};
@@ -83,8 +91,9 @@ class Implicit {
     Inertia inertia_;
     VirtualCoupling coupling_;
     double period_;
-    LoadLineSolver solver_;
+    Solver solver_;
     typename E::State state_;
+    typename Solver::Memory memory_;
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}
     double before_ = 0.0;    ///< y_{k-2}
