@@ -263,12 +263,15 @@ void bind_model(py::module_& module) {
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
         "slope_range",
-        [](const ForceModel& model) {
+        [](const ForceModel& model, std::optional<double> radius) {
             require_one_input(model.parameters());
-            return pair_of(model.slope_bounds());
+            detail::require(!radius || *radius > 0.0, "play_radius must be > 0");
+            return pair_of(model.slope_bounds(radius));
         },
-        "Proved (smallest, largest) slope inside the domain, sliding either way; within 1 % of the "
-        "steepest.");
+        "play_radius"_a = py::none(),
+        "Proved (smallest, largest) slope inside the domain, sliding either way, within 1 % of the "
+        "steepest.\n"
+        "With a play radius also while a hysteresis model sticks, where h / r adds to it.");
     type.def(
         "loss_range",
         [](const ForceModel& model) {

@@ -26,15 +26,16 @@ std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
 }
 
 py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
-                            const Hand& hand, double duration_s, int substeps) {
+                            const Hand& hand, double duration_s, int substeps, double start_position) {
     detail::require(std::isfinite(duration_s) && duration_s > 0.0,
                     "duration_s is " + std::to_string(duration_s) + ", must be > 0");
+    detail::require(std::isfinite(start_position), "start_position is not a finite number");
     detail::require(substeps >= 1, "substeps is " + std::to_string(substeps) + ", must be at least 1");
     const auto ticks = static_cast<std::size_t>(std::llround(duration_s / device.period_s));
     Trace trace;
     {
         const py::gil_scoped_release unlocked;
-        trace = simulate(model, scheme, device, hand, ticks, substeps);
+        trace = simulate(model, scheme, device, hand, ticks, substeps, start_position);
     }
     return py::dict(
         "time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
@@ -113,8 +114,9 @@ void bind_rendering(py::module_& module) {
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-        "substeps"_a = 20,
-        "The model rendered on a simulated device held by a simulated hand, in virtual time.\n\n"
+        "substeps"_a = 20, "start_position"_a = 0.0,
+        "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
+        "The handle starts at rest at start_position.\n\n"
         "Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true\n"
         "handle when sampled and at the end of the tick that holds the force), environment_position, force\n"
         "(commanded), applied, evaluations, status, extrapolated.");

@@ -133,9 +133,10 @@ class ForceModel:
         """
         The same for an array of positions, of any shape.
         """
-    def slope_range(self) -> tuple[float, float]:
+    def slope_range(self, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> tuple[float, float]:
         """
-        Proved (smallest, largest) slope inside the domain, sliding either way; within 1 % of the steepest.
+        Proved (smallest, largest) slope inside the domain, sliding either way, within 1 % of the steepest.
+        With a play radius also while a hysteresis model sticks, where h / r adds to it.
         """
     @property
     def above(self) -> str:
@@ -390,9 +391,10 @@ def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radi
     State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
     otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).
     """
-def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20) -> dict:
+def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     The model rendered on a simulated device held by a simulated hand, in virtual time.
+    The handle starts at rest at start_position.
     
     Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true
     handle when sampled and at the end of the tick that holds the force), environment_position, force

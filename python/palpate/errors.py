@@ -3,4 +3,4 @@
 
 
 class InputError(ValueError):
-    """Bad input: one sentence that names the file, line or field, the value found, and what would be right."""
+    """Bad input: one sentence that names the file, line or field, the value, and what would be right."""

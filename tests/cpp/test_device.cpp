@@ -113,6 +113,13 @@ TEST(SimulatedDevice, CountsItsSamplesAndOpensAfresh) {
     EXPECT_EQ(device.exchange({}).sequence, 1U);
 }
 
+TEST(SimulatedDevice, StartsAtRestWhereItIsTold) {
+    SimulatedDevice device{DeviceProfile{}, no_hand, 20, 0.3};
+    ASSERT_TRUE(device.open());
+    EXPECT_EQ(device.handle_position(), 0.3);
+    EXPECT_EQ(device.exchange({}).velocity, 0.0);
+}
+
 TEST(DeviceProfile, RefusesImpossibleValuesByName) {
     const auto refusal = [](auto change) -> std::string {
         DeviceProfile profile;

@@ -274,6 +274,14 @@ TEST(Scheme, RefusesWhatCannotBeRendered) {
     EXPECT_THROW((void)simulate(loose, {}, {}, {}, 10), std::invalid_argument);
 }
 
+TEST(Scheme, SlopeBoundsOfAHysteresisModelKnowItsStick) {
+    const ForceModel both{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 1.0, 0.2}, test::unit_domain(), {}};
+    EXPECT_NEAR(both.slope_bounds().lower, 4.0, 1e-9);
+    EXPECT_NEAR(both.slope_bounds().upper, 6.0, 1e-9);
+    EXPECT_NEAR(both.slope_bounds(0.01).upper, 6.0 + 1.2 / 0.01, 1e-6);
+}
+
 TEST(Scheme, RendersHysteresisWithItsPlayRadius) {
     const ForceModel both{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.2}, test::unit_domain(), {}};

@@ -32,9 +32,9 @@ struct Trace {
 /// real time, as fast as it goes.
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
-                                    int substeps = 20) {
+                                    int substeps = 20, double start_position = 0.0) {
     return with_structure(model, scheme, profile.period_s, [&](auto structure) {
-        SimulatedDevice device{profile, hand, substeps};
+        SimulatedDevice device{profile, hand, substeps, start_position};
         (void)device.open();
         Controller controller{device, std::move(structure), ForceLimit{profile.force_limit}};
         (void)controller.start();

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import traceback
 from contextlib import suppress
 from dataclasses import dataclass
@@ -43,6 +44,14 @@ class Ending:
         with suppress(OSError):
             if self.help or self.sentence:
                 click.echo(self.help or f"error: {self.sentence}", err=True)
+
+
+def drop_what_cannot_be_written() -> None:
+    """Leave the interpreter nothing to flush at exit: a full disk or a closed pipe was told before."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def ending_of(error: BaseException) -> Ending:

@@ -27,6 +27,7 @@ HELP = {
     "final_steps": "Refinement steps on the accepted network.",
     "frame_scale": "Ratio of neighbouring dilations of the frame.",
     "frame_step": "Translation step of the frame, over 1/dilation.",
+    "max_candidates": "Members of the frame at most.",
     "resolved_by": "Distinct positions that the core of a wavelet must hold.",
     "max_positions": "Distinct positions of a stroke beyond which they are binned.",
     "hysteresis_nonnegative": "Impose that every loop loses energy.",
@@ -64,7 +65,7 @@ def identify_options(command: F) -> F:
 
 def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
     flag = "--" + name.replace("_", "-")
-    text: dict[str, Any] = {"default": default, "help": HELP[name]}
+    text: dict[str, Any] = {"default": default, "help": HELP.get(name)}
     alternatives = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     kinds = [kind for kind in alternatives if kind is not NoneType]
     if kinds == [bool]:

@@ -9,7 +9,7 @@ from importlib import import_module
 
 import click
 
-from .ending import ending_of
+from .ending import drop_what_cannot_be_written, ending_of
 from .verb import Verbs
 
 _VERBS = {
@@ -81,5 +81,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BaseException as error:
         ending = ending_of(error)
         ending.tell(as_json="--json" in given)
+        drop_what_cannot_be_written()
         return ending.code
     return 0

@@ -2,8 +2,9 @@
 """Identification of a wavelet network from recorded force over position (paper section 3)."""
 
 from .frame import frame_bounds
+from .identified import IdentifiedNetwork
 from .identify import identify
-from .ladder import IdentifiedNetwork, fit_environment
+from .ladder import fit_environment
 from .options import IdentifyOptions
 
 __all__ = ["IdentifiedNetwork", "IdentifyOptions", "fit_environment", "frame_bounds", "identify"]

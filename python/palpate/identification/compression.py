@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Float2D
 
 SIDE_LEVELS = 16
-"""Cells of the hysteresis input over [-1, 1]; +-1, where sliding contact stays, are centres of two of them."""
+"""Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
 
 POOLED_CELLS = 5
 """Neighbouring cells that share one slope."""
@@ -44,24 +44,20 @@ class Compressed:
 
 
 class Compressor:
-    """Groups the rows of one recording by position, once, and compresses it with or without a hysteresis input.
+    """Groups the rows of one recording by position, once; compresses it with or without a hysteresis input.
 
     Parameters
     ----------
     positions : (n, d)
     force : (n,)
     max_positions : int
-        With more distinct positions than this they are gathered in that many cells of a regular grid (for d > 1
-        in all).
+        With more distinct positions than this they are gathered in that many cells of a regular grid.
     """
 
     def __init__(self, positions: Float2D, force: Float1D, *, max_positions: int) -> None:
         self._positions = positions
         self._force = force
         self._key, self._merged = _position_key(positions, max_positions)
-        self._slope: Float1D | None = None
-        if not self._merged and positions.shape[1] == 1:
-            self._slope = self._cell_slopes()
 
     def rows(self, side: Float1D | None = None) -> Compressed:
         """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart."""
@@ -78,27 +74,23 @@ class Compressor:
         if not self._merged:
             dx = self._positions - x[group]
             spread = _mean(group, count, np.einsum("nd,nd->n", dx, dx))
-            if self._slope is not None:
-                slope = self._slope[self._key]
+            if self._positions.shape[1] == 1:
+                slope = self._slopes(dx[:, 0], dy)
                 within -= float(np.sum(slope * dx[:, 0] * (2.0 * dy - slope * dx[:, 0])))
         merged_side = None if side is None else _mean(group, count, side)
         return Compressed(x, y, count, merged_side, spread, max(within, 0.0), len(self._force))
 
-    def _cell_slopes(self) -> Float1D:
-        """Slope of the force (cells,) over each position cell (d = 1), pooled with its neighbours.
+    def _slopes(self, dx: Float1D, dy: Float1D) -> Float1D:
+        """Slope of the force (n,) across each row's cell (d = 1), from deviations within the groups.
 
-        It is estimated once, whatever the sides, so that all rungs are charged the same few degrees of freedom.
+        All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same few
+        degrees of freedom.
         """
-        x, y = self._positions[:, 0], self._force
-        group, count = _ranked(self._key)
-        dx = x - _mean(group, count, x)[group]
-        dy = y - _mean(group, count, y)[group]
+        cell, count = _ranked(self._key)
         window = np.ones(min(POOLED_CELLS, len(count)))
-        sxx = np.convolve(np.bincount(group, dx * dx), window, "same")
-        sxy = np.convolve(np.bincount(group, dx * dy), window, "same")
-        slope = np.zeros(int(self._key.max()) + 1)
-        slope[np.unique(self._key)] = np.divide(sxy, sxx, out=np.zeros_like(sxy), where=sxx > 0)
-        return slope
+        sxx = np.convolve(np.bincount(cell, dx * dx), window, "same")
+        sxy = np.convolve(np.bincount(cell, dx * dy), window, "same")
+        return np.asarray(np.divide(sxy, sxx, out=np.zeros_like(sxy), where=sxx > 0)[cell])
 
 
 def binning_error(rows: Compressed, curvature: Float1D) -> float:

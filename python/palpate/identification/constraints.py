@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import isotonic_regression, nnls
 
@@ -53,6 +54,8 @@ class Bound:
     """Multiples of g (and h)"""
     of_slope: bool
     """Whether the reading is the combination's slope [force/box]"""
+    name: str
+    """What the notes call it"""
     sign: float
     """+1: the reading stays above limit, -1: below"""
     limit: float
@@ -65,17 +68,21 @@ class Bound:
 
 
 def domain_bounds(
-    problem: SeparableProblem, *, nonnegative_hysteresis: bool, slopes: tuple[float, float] | None
+    problem: SeparableProblem, *, hysteresis: bool, slopes: tuple[float, float] | None
 ) -> list[Bound]:
-    """The bounds in force: h >= 0, and (min, max) of the slope [force/box] of every stroke, g + h and g - h."""
+    """The bounds in force: h >= 0, and (min, max) of the slope [force/box] of the strokes g + h and g - h."""
     two = len(problem.readout) == 2
     bounds = []
-    if nonnegative_hysteresis and two:
-        bounds.append(Bound((0.0, 1.0), False, 1.0, 0.0, 1.0))
+    if hysteresis and two:
+        bounds.append(Bound((0.0, 1.0), False, "h >= 0", 1.0, 0.0, 1.0))
     for stroke in [(1.0, 1.0), (1.0, -1.0)] if two else [(1.0,)]:
         for sign, limit in zip((1.0, -1.0), slopes or (), strict=False):
             if np.isfinite(limit):
-                bounds.append(Bound(stroke, True, sign, limit, max(abs(limit) / problem.force_range, 1.0)))
+                bounds.append(
+                    Bound(
+                        stroke, True, "slope bounds", sign, limit, max(abs(limit) / problem.force_range, 1.0)
+                    )
+                )
     return bounds
 
 
@@ -84,8 +91,8 @@ def moved_to_bounds(
 ) -> Compressed:
     """The rows with their forces moved as the solution must move to keep the bounds, noise and all.
 
-    What the bounds forbid is no longer in these rows, so that a network grown on them has its wavelets where the
-    bounded force law needs them. h is projected pointwise, h := max(h, 0); a slope bound by isotonic regression.
+    What the bounds forbid is no longer in these rows, so that a network grown on them has its wavelets where
+    the bounded force law needs them. h is projected pointwise, h := max(h, 0), slopes by isotonic regression.
     """
     grid = np.linspace(0.0, 1.0, GRID + 1)
     readings = problem.readout @ solution.coefficients @ _columns(solution.basis, False, grid).T
@@ -118,7 +125,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
             return current
         for bound, x in found:
             reading = np.kron(bound.channels(problem), _columns(free.basis, bound.of_slope, x))
-            rows.append(bound.sign * reading)
+            rows.append(np.asarray(bound.sign * reading, dtype=np.float64))
             limits.append(np.full(len(x), bound.sign * bound.limit + margin * bound.unit))
         coefficients = _least_squares(problem, free, np.concatenate(rows), np.concatenate(limits))
         current = problem.solution(free.basis, coefficients, free.designs)
@@ -126,7 +133,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
 
 
 def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bound) -> Float1D:
-    """Positions (k,) of the unit box where the bound is violated, one a stretch; empty: certified everywhere."""
+    """Positions (k,) of the unit box where the bound is violated, one a stretch; none: it is certified."""
     weights = bound.channels(problem) @ solution.coefficients
 
     def excess(x: Float1D) -> Float1D:
@@ -136,7 +143,7 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
     edges = np.linspace(0.0, 1.0, CELLS + 1)
     left, right = edges[:-1], edges[1:]
     at_left, at_right = excess(edges)[:-1], excess(edges)[1:]
-    violated: list[Float2D] = []
+    violated: list[NDArray[np.float64]] = []
     for halving in range(HALVINGS + 1):
         lowest = np.minimum(at_left, at_right)
         bend = _curvature_bound(solution.basis, weights[2:], bound.of_slope, left, right)
@@ -217,7 +224,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
 
 
 def _slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
-    """The nearest force (k,) whose slope stays within [low, high]: isotonic regressions, in turn (Dykstra 1983)."""
+    """The nearest force (k,) with slope within [low, high]: isotonic regressions in turn (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
     for _ in range(ALTERNATIONS):
@@ -236,7 +243,7 @@ def _slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Fl
 
 
 def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequence[Bound]) -> Solution:
-    """As much of the solution as keeps all bounds, the rest a straight line well inside them: a convex set."""
+    """As much of the solution as keeps all bounds, the rest a straight line well inside this convex set."""
     lows = [bound.limit for bound in bounds if bound.of_slope and bound.sign > 0]
     highs = [bound.limit for bound in bounds if bound.of_slope and bound.sign < 0]
     inside = {

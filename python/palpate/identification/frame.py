@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavelet frames (paper section 2.4): how tight they are, and the truncated frame that a selection starts from.
+"""Wavelet frames (paper section 2.4): how tight they are, and the truncated frame a selection starts from.
 
 The members of a frame are a0^(-m/2) psi_v(a0^(-m) x - k b0) over all integers m and k, with V voices
 psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the same step b0.
@@ -80,23 +80,33 @@ def _spectrum(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def truncated_frame(
-    positions: Float2D, *, coarsest: float, finest: float, frame_scale: float, frame_step: float
+    positions: Float2D,
+    *,
+    coarsest: float,
+    finest: float,
+    frame_scale: float,
+    frame_step: float,
+    max_candidates: int,
 ) -> Basis:
-    """Members of the single-scaling frame that have data within them, from the coarsest dilation to the finest.
+    """Members of the single-scaling frame that have data within them, from coarsest to finest.
 
-    Each level's translations are found by walking from the data to the lattice points around it, so that the full
-    grid, whose size grows exponentially with the inputs, is never built.
+    Each level's translations are found by walking from the data to the lattice points around it, so that the
+    full grid, whose size grows exponentially with the inputs, is never built. A level that would bring more
+    than max_candidates members is left out: refinement reaches what is finer.
 
     positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
     """
     d = positions.shape[1]
     offsets = np.array(list(product((-1, 0, 1), repeat=d)))
-    alpha, beta = [], []
+    alpha: list[Float2D] = []
+    beta: list[Float2D] = []
     dilation = coarsest
     while dilation <= finest:
         step = frame_step / dilation
         nearest = np.unique(np.rint(positions / step).astype(np.int64), axis=0)
         lattice = np.unique((nearest[:, None, :] + offsets).reshape(-1, d), axis=0)
+        if sum(len(level) for level in beta) + len(lattice) > max_candidates:
+            break
         beta.append(lattice * step)
         alpha.append(np.full((len(lattice), d), dilation))
         dilation *= frame_scale

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How many wavelets? Grow one, refine all, and when the criterion has had enough, prune and refine again.
 
-Growth takes the best frame member by one step of forward orthogonal selection against the refined network, so it
-sees what is still missing; pruning removes what refinement made superfluous, coincident wavelets first of all,
-since of two that coincide one costs nothing to remove. N is thus decided again on the refined network.
+Growth takes the best frame member by one step of forward orthogonal selection against the refined network, so
+it sees what is still missing. Pruning removes what refinement made superfluous, coincident wavelets first of
+all, since of two that coincide one costs nothing to remove. N is thus decided again on the refined network.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,20 @@ from .options import IdentifyOptions
 from .refinement import refine
 from .selection import Library, OrthogonalSelection
 from .separable import Basis, SeparableProblem, Solution
-from .stopping import deviance
+from .stopping import CRITERIA, deviance
 
 PRUNE_CANDIDATES = 3
 """Wavelets tried for removal before pruning gives up."""
 
 PRUNE_HOPE = 6.0
-"""A removal is tried when refinement would have to win back at most this many times the wavelet's own price."""
+"""A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
+
+
+GROWING_TOLERANCE = 1e-3
+"""While the size is open, refinement ends at steps that gain less than this share of the squared error."""
+
+FINAL_TOLERANCE = 1e-4
+"""The same for the accepted network."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +61,8 @@ def grow(
 ) -> Grown:
     """Grow from the wavelets of start until the criterion stops it, prune, refine to the end.
 
-    Growth goes on for `patience` wavelets past the best size, and pruning starts from there: a few wavelets too
-    many let refinement find a better arrangement of the few that stay.
+    Growth goes on for `patience` wavelets past the best size, and pruning starts from there: a few wavelets
+    too many let refinement find a better arrangement of those that stay.
     """
     problem.set_prior(problem.solve(start).rss)
     current = _improved(problem, problem.solve(start), options.refine_steps, options)
@@ -74,7 +81,7 @@ def grow(
             stop_reason = options.criterion
             break
     pruned = prune(problem, current, options)
-    final = _improved(problem, pruned, options.final_steps, options)
+    final = _improved(problem, pruned, options.final_steps, options, tolerance=FINAL_TOLERANCE)
     path.append(_point(problem, final, rung, options))
     if len(final.basis) < options.max_wavelets and stop_reason == "max_wavelets":
         stop_reason = options.criterion
@@ -87,21 +94,24 @@ def prune(problem: SeparableProblem, start: Solution, options: IdentifyOptions) 
     removed = True
     while removed and len(current.basis):
         removed = False
-        n = len(current.basis)
-        price = problem.n_parameters(n) - problem.n_parameters(n - 1)
         costs = problem.removal_costs(current)
         for index in np.argsort(costs)[:PRUNE_CANDIDATES]:
-            if (
-                costs[index]
-                > PRUNE_HOPE * price * np.log(problem.samples) * problem.total(current.rss) / problem.samples
-            ):
-                break
             rest = problem.solve(current.basis.without(int(index)))
+            if judge(problem, rest, options) > value + PRUNE_HOPE * _price(problem, current, options):
+                break
             trial = _improved(problem, rest, options.refine_steps, options)
             if judge(problem, trial, options) < value:
                 current, value, removed = trial, judge(problem, trial, options), True
                 break
     return current
+
+
+def _price(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
+    """What the criterion charges for one of the solution's wavelets."""
+    price, n = CRITERIA[options.criterion], len(solution.basis)
+    return price(problem.samples, problem.n_parameters(n)) - price(
+        problem.samples, problem.n_parameters(n - 1)
+    )
 
 
 def _with_best_candidate(problem: SeparableProblem, library: Library, current: Solution) -> Solution | None:
@@ -117,15 +127,18 @@ def _with_best_candidate(problem: SeparableProblem, library: Library, current: S
 
 
 def _improved(
-    problem: SeparableProblem, solution: Solution, steps: int, options: IdentifyOptions
+    problem: SeparableProblem,
+    solution: Solution,
+    steps: int,
+    options: IdentifyOptions,
+    tolerance: float = GROWING_TOLERANCE,
 ) -> Solution:
     """Refine, then let the prior on the weights follow the noise level that is left."""
     if options.refine:
-        solution = refine(problem, solution, steps=steps)
+        solution = refine(problem, solution, steps=steps, tolerance=tolerance)
     problem.set_prior(solution.rss)
     return problem.solve(solution.basis)
 
 
 def _point(problem: SeparableProblem, solution: Solution, rung: str, options: IdentifyOptions) -> PathPoint:
-    rmse = float(np.sqrt(problem.total(solution.rss) / problem.samples))
-    return PathPoint(rung, len(solution.basis), rmse, judge(problem, solution, options))
+    return PathPoint(rung, len(solution.basis), problem.rmse(solution), judge(problem, solution, options))

@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..model import Fit, Model
+from ..model import Fit, Model, PathStep
 from ..recording import Recording, Source
-from .ladder import IdentifiedNetwork, fit_environment
+from .identified import IdentifiedNetwork
+from .ladder import fit_environment
 from .options import IdentifyOptions, options_from
 
 
 def identify(recording: Recording | Sequence[Recording], **options: Any) -> Model:
     """Identify the environment behind recorded force over position.
 
-    Climbs the ladder constant, linear, position, hysteresis, and stays on the lowest rung that explains the data.
+    Climbs the ladder constant, linear, position, hysteresis, as far as each rung earns its place.
 
     Parameters
     ----------
@@ -28,13 +29,13 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
     Returns
     -------
     Model
-        ``model.fit`` says which rung was reached and why growth stopped, ``model.path`` every network on the way,
-        ``model.notes["identification"]`` what was refused, left out or imposed, and at what price.
+        ``model.fit`` says which rung was reached and why growth stopped, ``model.path`` holds every network
+        on the way, ``model.notes["identification"]`` what was refused, left out or imposed at what price.
 
     Raises
     ------
     palpate.InputError
-        For an unknown option or a bad value, and for data from which no force over position can be identified.
+        For an unknown option or a bad value, and for data that give no force over position.
     """
     settings = options_from(options)
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
@@ -57,7 +58,7 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
 
 
 def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> Model:
-    path = [
+    path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
     ]

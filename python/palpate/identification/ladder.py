@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ladder: constant, linear, position, hysteresis. Model no more than a scene needs.
 
-Every rung is judged on the same samples by the same criterion, and is climbed only if the criterion falls by
-`rung_evidence` or more. What a refused rung would have gained stands in the notes, its networks in the path.
+Every rung is judged on the same samples by the same criterion, with its constraints imposed, and is climbed
+only if the criterion falls by `rung_evidence` or more. What a refused rung would have gained stands in the
+notes, its networks stand in the path.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _core
 from .._typing import Float1D, Float2D
@@ -17,65 +17,30 @@ from ..errors import InputError
 from .compression import Compressed, Compressor, binning_error
 from .constraints import domain_bounds, impose, moved_to_bounds
 from .frame import truncated_frame
-from .growth import PathPoint, grow, judge
+from .growth import Grown, PathPoint, grow, judge
+from .identified import IdentifiedNetwork, Readings
 from .options import IdentifyOptions
 from .selection import Library
 from .separable import Basis, SeparableProblem, Solution, problem_of
 from .stopping import deviance
 
 LEAST_ROWS = 10
+"""Rows below which nothing is identified."""
+
 LEAST_POSITIONS = 3
+"""Distinct positions below which nothing is identified."""
+
+COARSEST_CANDIDATE = 1.0
+"""Dilation of the frame's coarsest level [1/box]."""
 
 BINNING_SHARE = 0.05
-"""Error that gathering positions in cells may add, as a share of the RMS error; above it the cells are halved."""
+"""Error that cells of positions may add, as a share of the RMS error; above it the cells are halved."""
 
 MOST_HALVINGS = 3
-"""Times the cells are halved at most."""
-
+"""Times that cells are halved at most."""
 
 WORTH_REGROWING = 1.01
-"""Ratio of the RMS errors with and without the constraints from which wavelets are moved to suit them."""
-
-
-@dataclass(frozen=True)
-class IdentifiedNetwork:
-    """An identified force law f = g(x) + s h(x) and how it came about; all in the units of the data."""
-
-    alpha: Float2D
-    beta: Float2D
-    weight: Float1D
-    linear: Float1D
-    bias: float
-    weight_hysteresis: Float1D | None
-    linear_hysteresis: Float1D | None
-    bias_hysteresis: float | None
-    lower: Float1D
-    upper: Float1D
-    below: str
-    above: str
-    play_radius: float | None
-    rung: str
-    stop_reason: str
-    n_parameters: int
-    rmse: float
-    """On the samples of the identification"""
-    nrmse: float
-    path: tuple[PathPoint, ...]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Rung:
-    """A candidate model: the solution of a problem over compressed rows."""
-
-    name: str
-    criterion: float
-    stop_reason: str
-    n_parameters: int
-    rows: Compressed
-    problem: SeparableProblem
-    solution: Solution
-    play_radius: float | None = None
+"""Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
 
 
 def fit_environment(
@@ -86,20 +51,20 @@ def fit_environment(
     *,
     starts: Sequence[int] | None = None,
 ) -> IdentifiedNetwork:
-    """Identify a force law from arrays: the ladder on compressed data.
+    """Identify a force law from arrays.
 
     Parameters
     ----------
     positions : (n, d)
-        Positions; growing into the object.
+        Positions, growing into the object.
     force : (n,)
         Force of the object against the tool.
     side : (n,), optional
-        +1 for rows of a stroke into the object, -1 out of it, 0 for neither (kept out of a hysteresis model).
+        +1 in rows of a stroke into the object, -1 out of it, 0 for neither (left out to judge hysteresis).
     options : IdentifyOptions, optional
     starts : sequence of int, optional
-        Rows at which a continuous motion starts. Given, and without side, the hysteresis rung is tried with the play
-        operator pi_k = min(x_k + r, max(x_k - r, pi_(k-1))), s = (x - pi)/r (d = 1).
+        Rows at which a continuous motion starts. With it, and without side, hysteresis is tried with the play
+        operator, s = (x - pi)/r (d = 1).
 
     Returns
     -------
@@ -113,13 +78,45 @@ def fit_environment(
     options = options or IdentifyOptions()
     _require_usable(positions, force)
     limit = options.max_positions
-    for halving in range(MOST_HALVINGS + 1):
-        ladder = _Ladder(positions, force, side, starts, replace(options, max_positions=limit))
-        best = ladder.climb()
-        if halving == MOST_HALVINGS or not _cells_too_wide(best):
+    ladder = _Ladder(positions, force, side, starts, options)
+    best = ladder.climb()
+    for _ in range(MOST_HALVINGS):
+        if not best.cells_too_wide():
             break
         limit *= 2
+        ladder = _Ladder(positions, force, side, starts, replace(options, max_positions=limit))
+        best = ladder.climb()
     return ladder.finish(best)
+
+
+@dataclass(frozen=True)
+class _Rung:
+    """A candidate model: one solution of a problem over compressed rows."""
+
+    name: str
+    rows: Compressed
+    problem: SeparableProblem
+    solution: Solution
+    n_parameters: int
+    stop_reason: str
+    play_radius: float | None = None
+
+    @property
+    def rmse(self) -> float:
+        return self.problem.rmse(self.solution)
+
+    def criterion(self, options: IdentifyOptions) -> float:
+        total = self.problem.total(self.solution.rss)
+        return deviance(options.criterion, total, self.problem.samples, self.n_parameters)
+
+    def cells_too_wide(self) -> bool:
+        """Whether gathering positions in cells may have moved the fit by more than it should (d = 1)."""
+        if self.problem.dimension > 1 or not self.rows.spread.any():
+            return False
+        alpha, beta = self.solution.basis.alpha[:, 0], self.solution.basis.beta[:, 0]
+        bend = _core.mexican_hat_curvature(alpha * (self.rows.positions - beta))
+        by_channel = bend @ (alpha**2 * self.solution.coefficients[:, 2:]).T
+        return binning_error(self.rows, np.abs(by_channel).max(axis=1)) > BINNING_SHARE * self.rmse
 
 
 class _Ladder:
@@ -133,245 +130,203 @@ class _Ladder:
         starts: Sequence[int] | None,
         options: IdentifyOptions,
     ) -> None:
-        self.options = options
-        self.lower = positions.min(axis=0)
-        self.reach = np.ptp(positions, axis=0)
-        self.upper = self.lower + self.reach
-        self.notes: list[str] = []
-        self.path: list[PathPoint] = []
-        self._wants_hysteresis = options.inputs == "auto" or "hysteresis" in options.inputs
-        strokes = side is not None and bool((side > 0).any() and (side < 0).any())
-        if strokes and self._wants_hysteresis:
-            assert side is not None
-            kept = side != 0
-            if not kept.all():
-                self.notes.append(
-                    f"{int((~kept).sum())} rows without a direction were left out, to judge hysteresis"
-                )
-                positions, force, side = positions[kept], force[kept], side[kept]
-        self._positions = (positions - self.lower) / np.where(self.reach > 0, self.reach, 1.0)
-        self._force = np.asarray(force, dtype=float)
-        self._side = np.sign(side).astype(float) if strokes and side is not None else None
-        self._compressor = Compressor(self._positions, self._force, max_positions=options.max_positions)
-        self._starts = starts if positions.shape[1] == 1 else None
-        if (
-            self._side is None
-            and self._starts is None
-            and "hysteresis" in options.inputs
-            and options.inputs != "auto"
-        ):
+        self._options = options
+        self._lower, self._reach = positions.min(axis=0), np.ptp(positions, axis=0)
+        self._notes: list[str] = []
+        self._path: list[PathPoint] = []
+        if side is not None and not ((side > 0).any() and (side < 0).any()):
+            side = None
+        if side is not None and self._wants_hysteresis and not side.all():
+            self._notes.append(f"{np.count_nonzero(side == 0)} rows without a direction were left out")
+            positions, force, side = positions[side != 0], force[side != 0], side[side != 0]
+        self._positions = (positions - self._lower) / self._reach
+        self._force = force
+        self._side = None if side is None else np.sign(side).astype(float)
+        self._starts = starts if side is None and positions.shape[1] == 1 else None
+        self._compressor = Compressor(self._positions, force, max_positions=options.max_positions)
+        if self._side is None and self._starts is None and "hysteresis" in options.inputs:
             raise InputError(
-                'inputs asks for "hysteresis", but the recording has neither both directions nor a time column; '
-                'name a direction column, or leave "hysteresis" out'
+                "inputs names hysteresis, but the recording has neither both directions nor time; "
+                "name a direction column or leave hysteresis out"
             )
 
+    @property
+    def _wants_hysteresis(self) -> bool:
+        return self._options.inputs == "auto" or "hysteresis" in self._options.inputs
+
     def climb(self) -> _Rung:
-        """The highest rung that earned its place, or that the options name."""
+        """The highest rung that earned its place, or the one that the inputs name."""
         rows = self._compressor.rows()
-        best = self._straight(rows, "constant")
-        best = self._better(best, self._straight(rows, "linear"))
-        if self.options.max_wavelets > 0:
-            best = self._better(best, self._network(rows, "position", Basis.empty(self._positions.shape[1])))
-        if self._wants_hysteresis and (self._side is not None or self._starts is not None):
-            hysteresis = self._hysteresis(best)
-            named = self.options.inputs != "auto"
-            best = hysteresis if named and hysteresis is not None else self._better(best, hysteresis)
+        best = self._better(self._constant(rows), self._straight(rows))
+        if self._options.max_wavelets > 0:
+            best = self._better(best, self._network(rows, "position", Basis.empty(rows.positions.shape[1])))
+        if self._side is not None and self._wants_hysteresis:
+            return self._hysteresis(best, self._compressor.rows(self._side), None)
+        if self._starts is not None and self._wants_hysteresis:
+            radius, rows = self._best_play(best.solution.basis)
+            return self._hysteresis(best, rows, radius)
         return best
 
     def finish(self, rung: _Rung) -> IdentifiedNetwork:
-        """Constraints, then back to the units of the data."""
-        rung = self._constrained(rung)
-        solution = rung.solution
-        readings = rung.problem.readout @ solution.coefficients
-        d = self._positions.shape[1]
-        linear = readings[:, 1 : 1 + d] / np.where(self.reach > 0, self.reach, 1.0)
-        bias = readings[:, 0] - linear @ self.lower
-        weights = readings[:, 1 + d :]
-        two = len(readings) == 2
-        rmse = float(np.sqrt(rung.problem.total(solution.rss) / rung.problem.samples))
+        """The rung in the units of the data."""
+        law = Readings.of(rung.solution, rung.problem.readout, self._lower, self._reach)
+        two = len(law.bias) == 2
         spread = float(np.std(self._force))
-        at_lower = readings[0] @ np.concatenate(
-            [
-                [1.0],
-                np.zeros(d),
-                _core.wavelet_columns(np.zeros((1, d)), solution.basis.alpha, solution.basis.beta)[0],
-            ]
-        )
-        contact = abs(at_lower) <= max(rmse, self.options.contact_share * float(np.ptp(self._force)))
+        near_zero = max(rung.rmse, self._options.contact_share * float(np.ptp(self._force)))
+        left_there = len(self._lower) == 1 and abs(law.at_lower) <= near_zero
         return IdentifiedNetwork(
-            alpha=solution.basis.alpha / self.reach,
-            beta=self.lower + solution.basis.beta * self.reach,
-            weight=weights[0],
-            linear=linear[0],
-            bias=float(bias[0]),
-            weight_hysteresis=weights[1] if two else None,
-            linear_hysteresis=linear[1] if two else None,
-            bias_hysteresis=float(bias[1]) if two else None,
-            lower=self.lower,
-            upper=self.upper,
-            below="free" if d == 1 and contact else "linear",
+            alpha=law.alpha,
+            beta=law.beta,
+            weight=law.weights[0],
+            linear=law.linear[0],
+            bias=float(law.bias[0]),
+            weight_hysteresis=law.weights[1] if two else None,
+            linear_hysteresis=law.linear[1] if two else None,
+            bias_hysteresis=float(law.bias[1]) if two else None,
+            lower=self._lower,
+            upper=self._lower + self._reach,
+            below="free" if left_there else "linear",
             above="linear",
-            play_radius=None if rung.play_radius is None else rung.play_radius * float(self.reach[0]),
+            play_radius=None if rung.play_radius is None else rung.play_radius * float(self._reach[0]),
             rung=rung.name,
             stop_reason=rung.stop_reason,
             n_parameters=rung.n_parameters,
-            rmse=rmse,
-            nrmse=rmse / spread if spread > 0 else 0.0,
-            path=tuple(self.path),
-            notes=tuple(self.notes),
+            rmse=rung.rmse,
+            nrmse=rung.rmse / spread if spread > 0 else 0.0,
+            path=tuple(self._path),
+            notes=tuple(self._notes),
         )
 
-    def _straight(self, rows: Compressed, name: str) -> _Rung:
-        """Constant or linear: no wavelets."""
-        problem = problem_of(rows, resolved_by=self.options.resolved_by)
-        solution = problem.solve(Basis.empty(problem.dimension))
-        n_parameters = problem.n_parameters(0)
-        if name == "constant":
-            mean = float(np.average(rows.force, weights=rows.weight))
-            coefficients = np.zeros_like(solution.coefficients)
-            coefficients[0, 0] = mean
-            rss = float(rows.weight @ (rows.force - mean) ** 2)
-            solution, n_parameters = replace(solution, coefficients=coefficients, rss=rss), 1
-        total = problem.total(solution.rss)
-        criterion = deviance(self.options.criterion, total, problem.samples, n_parameters)
-        self.path.append(PathPoint(name, 0, float(np.sqrt(total / problem.samples)), criterion))
-        return _Rung(name, criterion, self.options.criterion, n_parameters, rows, problem, solution)
+    def _constant(self, rows: Compressed) -> _Rung:
+        straight = self._straight_solution(rows)
+        mean = float(np.average(rows.force, weights=rows.weight))
+        coefficients = np.zeros_like(straight.solution.coefficients)
+        coefficients[0, 0] = mean
+        level = straight.problem.solution(straight.solution.basis, coefficients, straight.solution.designs)
+        return self._recorded(replace(straight, name="constant", solution=level, n_parameters=1))
 
-    def _network(self, rows: Compressed, name: str, start: Basis, play_radius: float | None = None) -> _Rung:
-        """A network grown from the wavelets of start."""
-        options = self.options
-        problem = problem_of(rows, resolved_by=options.resolved_by)
+    def _straight(self, rows: Compressed) -> _Rung:
+        return self._recorded(self._constrained(self._straight_solution(rows)))
+
+    def _straight_solution(self, rows: Compressed) -> _Rung:
+        problem = problem_of(rows, resolved_by=self._options.resolved_by)
+        solution = problem.solve(Basis.empty(problem.dimension))
+        return _Rung("linear", rows, problem, solution, problem.n_parameters(0), self._options.criterion)
+
+    def _network(self, rows: Compressed, name: str, start: Basis) -> _Rung:
+        """A network grown from the wavelets of start, with its constraints."""
+        problem, grown = self._grown(rows, name, start)
+        n_parameters = problem.n_parameters(len(grown.solution.basis))
+        return self._constrained(_Rung(name, rows, problem, grown.solution, n_parameters, grown.stop_reason))
+
+    def _grown(self, rows: Compressed, name: str, start: Basis) -> tuple[SeparableProblem, Grown]:
+        problem = problem_of(rows, resolved_by=self._options.resolved_by)
         frame = truncated_frame(
             rows.positions,
-            coarsest=1.0,
+            coarsest=COARSEST_CANDIDATE,
             finest=float(problem.finest(rows.positions).max()),
-            frame_scale=options.frame_scale,
-            frame_step=options.frame_step,
+            frame_scale=self._options.frame_scale,
+            frame_step=self._options.frame_step,
+            max_candidates=self._options.max_candidates,
         )
-        grown = grow(problem, Library(problem, frame), start, name, options)
-        self.path.extend(grown.path)
-        n_parameters = problem.n_parameters(len(grown.solution.basis))
-        return _Rung(
-            name, grown.criterion, grown.stop_reason, n_parameters, rows, problem, grown.solution, play_radius
-        )
+        grown = grow(problem, Library(problem, frame), start, name, self._options)
+        self._path.extend(grown.path)
+        return problem, grown
 
-    def _hysteresis(self, below: _Rung) -> _Rung | None:
-        """g + s h on the wavelets of the rung below, s from the strokes or from the play radius that fits best."""
-        start = below.solution.basis
-        if self._side is not None:
-            rows = self._compressor.rows(self._side)
-            return self._network(rows, "hysteresis", start)
-        tried = []
-        for radius in self.options.play_radius:
-            rows = self._compressor.rows(self._play_side(radius))
-            problem = problem_of(rows, resolved_by=self.options.resolved_by)
-            p = problem.n_parameters(len(start)) + 1
-            total = problem.total(problem.solve(start).rss)
-            tried.append((deviance(self.options.criterion, total, problem.samples, p), radius, rows))
-        value, radius, rows = min(tried, key=lambda item: item[0])
-        if self.options.inputs == "auto" and value > below.criterion - self.options.rung_evidence:
-            self.notes.append(_refusal("hysteresis", below.criterion - value, self.options))
-            return None
-        rung = self._network(rows, "hysteresis", start, radius)
-        price = deviance(self.options.criterion, 1.0, rows.samples, rung.n_parameters + 1) - deviance(
-            self.options.criterion, 1.0, rows.samples, rung.n_parameters
-        )
-        return replace(rung, criterion=rung.criterion + price, n_parameters=rung.n_parameters + 1)
+    def _hysteresis(self, below: _Rung, rows: Compressed, radius: float | None) -> _Rung:
+        """g + s h on top of the wavelets of the rung below, if it earns its place or is named.
 
-    def _play_side(self, radius: float) -> Float1D:
-        """Hysteresis input (n,) of the recorded motion for a play radius [box]; each motion starts at rest, s = 0."""
+        h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
+        not fall at all with these, growing a network would be in vain.
+        """
+        named = self._options.inputs != "auto"
+        extra = 0 if radius is None else 1
+        problem = problem_of(rows, resolved_by=self._options.resolved_by)
+        first = problem.solve(below.solution.basis)
+        n_parameters = problem.n_parameters(len(first.basis)) + extra
+        rung = _Rung("hysteresis", rows, problem, first, n_parameters, self._options.criterion, radius)
+        if named or rung.criterion(self._options) < below.criterion(self._options):
+            rung = self._network(rows, "hysteresis", first.basis)
+            rung = replace(rung, n_parameters=rung.n_parameters + extra, play_radius=radius)
+        return rung if named else self._better(below, rung)
+
+    def _best_play(self, basis: Basis) -> tuple[float, Compressed]:
+        """The play radius [box] whose input helps most on given wavelets, and the rows that it gives."""
         assert self._starts is not None
         motions = np.split(self._positions[:, 0], list(self._starts)[1:])
-        play = np.concatenate([_core.play(motion, radius) for motion in motions])
-        return np.clip((self._positions[:, 0] - play) / radius, -1.0, 1.0)
+        tried = []
+        for radius in self._options.play_radius:
+            play = np.concatenate([_core.play(motion, radius) for motion in motions])
+            rows = self._compressor.rows(np.clip((self._positions[:, 0] - play) / radius, -1.0, 1.0))
+            problem = problem_of(rows, resolved_by=self._options.resolved_by)
+            tried.append((problem.total(problem.solve(basis).rss), radius, rows))
+        _, radius, rows = min(tried, key=lambda candidate: candidate[0])
+        return radius, rows
 
-    def _better(self, below: _Rung, above: _Rung | None) -> _Rung:
-        """The upper rung if the criterion falls enough, else the lower one; says so when it was refused."""
-        if above is None:
-            return below
-        gain = below.criterion - above.criterion
-        if gain >= self.options.rung_evidence:
+    def _better(self, below: _Rung, above: _Rung) -> _Rung:
+        """The upper rung if the criterion falls enough, else the lower one, and a note."""
+        gain = below.criterion(self._options) - above.criterion(self._options)
+        if gain >= self._options.rung_evidence:
             return above
-        self.notes.append(_refusal(above.name, gain, self.options))
+        self._notes.append(
+            f"{above.name} refused: {self._options.criterion} falls by {gain:.4g}, "
+            f"{self._options.rung_evidence:g} is asked for"
+        )
         return below
 
     def _constrained(self, rung: _Rung) -> _Rung:
-        """The rung with the constraints imposed, their price told in the notes.
+        """The rung with its constraints, their price in the notes.
 
-        If they cost more than a little, the network is grown further on forces that keep them, and what that
-        gives is taken if the criterion prefers it once the constraints are imposed on the true forces again.
+        If they cost more than a little, the network is grown further on forces that keep them; the result is
+        taken if the criterion prefers it once the constraints are imposed on the true forces again.
         """
-        options, problem = self.options, rung.problem
-        slopes = options.slope_limits
-        bounds = domain_bounds(
-            problem,
-            nonnegative_hysteresis=options.hysteresis_nonnegative,
-            slopes=None if slopes is None else (slopes[0] * self.reach[0], slopes[1] * self.reach[0]),
-        )
+        options, problem, slopes = self._options, rung.problem, self._options.slope_limits
+        box_slopes = None if slopes is None else (slopes[0] * self._reach[0], slopes[1] * self._reach[0])
+        bounds = domain_bounds(problem, hysteresis=options.hysteresis_nonnegative, slopes=box_slopes)
         if problem.dimension > 1 or not bounds:
             return rung
         kept = impose(problem, rung.solution, bounds)
         if kept is rung.solution:
             return rung
-        free = problem.rmse(rung.solution)
-        n_parameters = rung.n_parameters
-        if options.refine and problem.rmse(kept) > WORTH_REGROWING * free:
-            rows = moved_to_bounds(problem, rung.rows, rung.solution, bounds)
-            grown = self._network(rows, rung.name, rung.solution.basis)
-            trial = impose(problem, problem.solve(grown.solution.basis), bounds)
-            if judge(problem, trial, options) < judge(problem, kept, options):
-                extra = rung.n_parameters - problem.n_parameters(len(rung.solution.basis))
-                n_parameters = grown.n_parameters + extra
+        if options.refine and problem.rmse(kept) > WORTH_REGROWING * rung.rmse and len(kept.basis):
+            moved = moved_to_bounds(problem, rung.rows, rung.solution, bounds)
+            compatible, regrown = self._grown(moved, rung.name, rung.solution.basis)
+            trial = impose(problem, problem.solve(regrown.solution.basis), bounds)
+            if _judged_on(compatible, trial, options) < _judged_on(compatible, kept, options):
                 kept = trial
-        names = [
-            name
-            for name, asked in (("h >= 0", options.hysteresis_nonnegative), ("slope bounds", slopes))
-            if asked
-        ]
-        self.notes.append(
-            f"{' and '.join(names)} imposed over the domain: RMS error {problem.rmse(kept):.4g} with, {free:.4g} without"
-        )
-        return replace(rung, solution=kept, n_parameters=n_parameters)
+        names = " and ".join(dict.fromkeys(bound.name for bound in bounds))
+        price = f"RMS error {problem.rmse(kept):.4g} with, {rung.rmse:.4g} without"
+        self._notes.append(f"{rung.name}: {names} imposed over the domain, {price}")
+        return replace(rung, solution=kept, n_parameters=problem.n_parameters(len(kept.basis)))
+
+    def _recorded(self, rung: _Rung) -> _Rung:
+        self._path.append(PathPoint(rung.name, 0, rung.rmse, rung.criterion(self._options)))
+        return rung
+
+
+def _judged_on(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
+    """Criterion of a solution on the rows of another problem of the same form."""
+    return judge(problem, problem.solution_of(solution), options)
 
 
 def _require_usable(positions: Float2D, force: Float1D) -> None:
     if positions.ndim != 2 or force.shape != (len(positions),):
         raise InputError(
-            f"positions have shape {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
+            f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
         )
     if len(force) < LEAST_ROWS:
-        raise InputError(
-            f"the recording has {len(force)} rows; at least {LEAST_ROWS} are needed to identify a force"
-        )
-    for name, values in (("position", positions), ("force", force)):
-        bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
+        raise InputError(f"the recording has {len(force)} rows; {LEAST_ROWS} or more are needed")
+    for name, values in (("position", positions), ("force", force[:, None])):
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise InputError(
-                f"{name} is {values[bad[0]]} in row {bad[0]}; every value must be a finite number"
+                f"{name} in row {bad[0]} is {values[bad[0]]}; every value must be a finite number"
             )
-    for k, column in enumerate(positions.T):
+    for number, column in enumerate(positions.T):
         if column.min() == column.max():
+            raise InputError(f"all positions are {column[0]:g}; identifying needs a position that moves")
+        if len(np.unique(column)) < LEAST_POSITIONS:
             raise InputError(
-                f"all positions are {column[0]:g}; a force over position needs a position that moves"
+                f"position {number} takes only {len(np.unique(column))} distinct values; "
+                f"{LEAST_POSITIONS} or more are needed"
             )
-        if len(column) < 10_000 and len(np.unique(column)) < LEAST_POSITIONS:
-            raise InputError(
-                f"input {k} takes only {len(np.unique(column))} distinct values; {LEAST_POSITIONS} or more are needed"
-            )
-
-
-def _cells_too_wide(rung: _Rung) -> bool:
-    """Whether gathering positions in cells (d = 1) may have moved the fit by more than its share of the RMS error."""
-    rows, problem, solution = rung.rows, rung.problem, rung.solution
-    if not rows.spread.any() or problem.dimension > 1:
-        return False
-    basis = solution.basis
-    u = basis.alpha[:, 0] * (rows.positions - basis.beta[:, 0])
-    by_channel = _core.mexican_hat_curvature(u) @ (basis.alpha[:, 0] ** 2 * solution.coefficients[:, 2:]).T
-    curvature: NDArray[np.float64] = np.abs(by_channel).max(axis=1)
-    allowed = BINNING_SHARE * np.sqrt(problem.total(solution.rss) / problem.samples)
-    return binning_error(rows, curvature) > allowed
-
-
-def _refusal(rung: str, gain: float, options: IdentifyOptions) -> str:
-    return f"{rung} refused: {options.criterion} falls by {gain:.4g}, {options.rung_evidence:g} is asked for"

@@ -2,14 +2,18 @@
 """The settings of an identification: every default lives here and nowhere else."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 from ..errors import InputError
 from .stopping import CRITERIA
 
-RUNG_INPUTS = ("position", "hysteresis")
-"""Inputs that the ladder knows; "auto" tries them in this order and keeps what earns its place."""
+LADDER_INPUTS = ("position", "hysteresis")
+"""What the ladder can take as inputs, in its order."""
+
+COUPLING_SHARE = 0.9
+"""Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
 
 
 @dataclass(frozen=True)
@@ -19,113 +23,125 @@ class IdentifyOptions:
     Raises
     ------
     palpate.InputError
-        Naming the field, the value and what would be right.
+        Naming the field, its value and what would be right.
     """
 
-    inputs: str | tuple[str, ...] = (
-        "auto"  # "auto": the ladder decides; or ("position",), ("position", "hysteresis")
-    )
-    max_wavelets: int = 64  # largest network tried [-]
-    criterion: str = "bic"  # stopping rule, a key of stopping.CRITERIA
-    rung_evidence: float = (
-        10.0  # fall of the criterion that a more complex rung must show ("very strong": 10) [-]
-    )
-    patience: int = 3  # growth steps without improvement before growth stops [-]
-    refine: bool = True  # False: frame selection only, dilations and translations stay on the frame
-    refine_steps: int = 8  # refinement steps after each added or removed wavelet [-]
-    final_steps: int = 30  # refinement steps on the accepted network [-]
-    frame_scale: float = 2.0  # a0: ratio of neighbouring dilations of the frame [-]
-    frame_step: float = 0.5  # b0: translation step in units of 1/dilation [-]
-    resolved_by: int = (
-        5  # distinct positions, of every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]
-    )
-    max_positions: int = 2048  # distinct positions a stroke kept unmerged; beyond, positions are binned [-]
-    hysteresis_nonnegative: bool = True  # impose h >= 0, so that every loop loses energy
-    slope_bounds: tuple[float, float] | None = (
-        None  # (min, max) of df/dx imposed over the domain [force/position]
-    )
-    coupling_stiffness: float | None = (
-        None  # K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]
-    )
-    play_radius: tuple[float, ...] = (
-        0.0025,
-        0.005,
-        0.01,
-        0.02,
-        0.05,
-    )  # radii tried without a direction [share of travel]
-    contact_share: float = 0.02  # |f(lower)| below this share of the force range is contact: "free" below [-]
-    period: float | None = None  # period of a periodic environment (a knob) [position]
+    inputs: str | tuple[str, ...] = "auto"
+    """"auto": the ladder decides. Or names, as a tuple or with commas between: the rung is then given."""
+    max_wavelets: int = 64
+    """Largest network that is tried [-]"""
+    criterion: str = "bic"
+    """Stopping rule: bic, aicc, gcv or fpe"""
+    rung_evidence: float = 10.0
+    """Fall of the criterion that a more complex rung must show; 10 is called very strong evidence [-]"""
+    patience: int = 3
+    """Wavelets without improvement after which growth stops [-]"""
+    refine: bool = True
+    """False: dilations and translations stay on the frame"""
+    refine_steps: int = 8
+    """Refinement steps after each wavelet that was added or removed [-]"""
+    final_steps: int = 30
+    """Refinement steps of the accepted network [-]"""
+    frame_scale: float = 2.0
+    """a0, the ratio of neighbouring dilations of the frame [-]"""
+    frame_step: float = 0.5
+    """b0, the translation step of the frame in units of 1/dilation [-]"""
+    max_candidates: int = 4096
+    """Members of the truncated frame at most [-]"""
+    resolved_by: int = 5
+    """Distinct positions, on every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]"""
+    max_positions: int = 1024
+    """Distinct positions that are kept apart; more of them are gathered in as many cells [-]"""
+    hysteresis_nonnegative: bool = True
+    """Impose h >= 0 over the domain, so that every loop loses energy"""
+    slope_bounds: tuple[float, float] | None = None
+    """(min, max) of df/dx, imposed over the domain [force/position]"""
+    coupling_stiffness: float | None = None
+    """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
+    play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
+    """Play radii tried for hysteresis where a file does not tell directions [share of the travel]"""
+    contact_share: float = 0.02
+    """Where |f(lower)| is below this share of the force's range the object is left there: "free" below [-]"""
+    period: float | None = None
+    """Period of an environment that repeats, such as a knob [position]"""
 
     def __post_init__(self) -> None:
-        if isinstance(self.inputs, str) and self.inputs != "auto":
-            object.__setattr__(self, "inputs", tuple(name.strip() for name in self.inputs.split(",")))
         if self.inputs != "auto":
-            unknown = [name for name in self.inputs if name not in RUNG_INPUTS]
-            if unknown or "position" not in self.inputs:
+            names = self.inputs.split(",") if isinstance(self.inputs, str) else self.inputs
+            object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
+            if "position" not in self.inputs or not set(self.inputs) <= set(LADDER_INPUTS):
                 raise InputError(
-                    f'inputs is {self.inputs!r}; it must be "auto" or hold "position", with "hysteresis" if wanted'
+                    f'inputs is {",".join(self.inputs)!r}; use "auto", "position" or "position,hysteresis"'
                 )
         if self.criterion not in CRITERIA:
             raise InputError(f"criterion is {self.criterion!r}; it must be one of {', '.join(CRITERIA)}")
-        for name, lowest in (
-            ("max_wavelets", 0),
-            ("patience", 1),
-            ("refine_steps", 1),
-            ("final_steps", 0),
-            ("resolved_by", 3),
-            ("max_positions", 16),
-        ):
+        for name, least in _WHOLE_NUMBERS.items():
             value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
-                raise InputError(f"{name} is {value!r}; it must be a whole number of {lowest} or more")
-        _require_finite("rung_evidence", self.rung_evidence, least=0.0)
-        _require_finite("contact_share", self.contact_share, least=0.0)
-        _require_finite("frame_step", self.frame_step, above=0.0)
-        _require_finite("frame_scale", self.frame_scale, above=1.0)
-        for optional in ("coupling_stiffness", "period"):
-            if getattr(self, optional) is not None:
-                _require_finite(optional, getattr(self, optional), above=0.0)
+            if not isinstance(value, int) or isinstance(value, bool) or value < least:
+                raise InputError(f"{name} is {value!r}; it must be a whole number of {least} or more")
+        for name, above in _NUMBERS.items():
+            _require_number(name, getattr(self, name), above)
         for radius in self.play_radius:
-            _require_finite("play_radius", radius, above=0.0)
-        if self.slope_bounds is not None:
-            if len(self.slope_bounds) != 2 or not self.slope_bounds[0] < self.slope_bounds[1]:
-                raise InputError(
-                    f"slope_bounds is {self.slope_bounds!r}; it must be (min, max) with min below max"
-                )
-            if (
-                self.coupling_stiffness is not None
-                and self.slope_bounds[0] >= COUPLING_SHARE * self.coupling_stiffness
-            ):
-                raise InputError(
-                    f"slope_bounds asks for a slope of at least {self.slope_bounds[0]:g}, but coupling_stiffness "
-                    f"{self.coupling_stiffness:g} allows at most {COUPLING_SHARE * self.coupling_stiffness:g}"
-                )
+            _require_number("play_radius", radius, 0.0)
+        self._require_possible_slopes()
 
     @property
     def slope_limits(self) -> tuple[float, float] | None:
-        """Both slope settings as one (min, max), -inf and inf where nothing is asked; None when neither is set."""
-        low, high = self.slope_bounds if self.slope_bounds is not None else (-math.inf, math.inf)
+        """Both slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
+        low, high = self.slope_bounds or (-math.inf, math.inf)
         if self.coupling_stiffness is not None:
             high = min(high, COUPLING_SHARE * self.coupling_stiffness)
         return None if math.isinf(low) and math.isinf(high) else (low, high)
 
+    def _require_possible_slopes(self) -> None:
+        bounds: tuple[float, ...] | None = self.slope_bounds
+        if bounds is not None and not (len(bounds) == 2 and bounds[0] < bounds[1]):
+            raise InputError(
+                f"slope_bounds is {self.slope_bounds!r}; it must be (min, max) with min below max"
+            )
+        limits = self.slope_limits
+        if limits is not None and not limits[0] < limits[1]:
+            raise InputError(
+                f"slope_bounds asks for a slope of {limits[0]:g} or more, but coupling_stiffness "
+                f"{self.coupling_stiffness:g} allows no more than {limits[1]:g}"
+            )
 
-COUPLING_SHARE = 0.9
-"""A force behind a coupling K_c can be compensated exactly only while its slope stays below K_c; this is the margin."""
+
+_WHOLE_NUMBERS = {
+    "max_wavelets": 0,
+    "patience": 1,
+    "refine_steps": 1,
+    "final_steps": 0,
+    "max_candidates": 1,
+    "resolved_by": 3,
+    "max_positions": 16,
+}
+"""Whole-number settings and the least that makes sense."""
+
+_NUMBERS = {
+    "rung_evidence": -math.inf,
+    "frame_scale": 1.0,
+    "frame_step": 0.0,
+    "contact_share": -math.inf,
+    "coupling_stiffness": 0.0,
+    "period": 0.0,
+}
+"""Real settings and what they must lie above."""
 
 
-def options_from(keywords: dict[str, Any]) -> IdentifyOptions:
-    """Options from keywords, with one sentence for a keyword that does not exist."""
+def options_from(keywords: Mapping[str, Any]) -> IdentifyOptions:
+    """Options from keywords; a keyword that does not exist is told in one sentence."""
     known = [field.name for field in fields(IdentifyOptions)]
     for name in keywords:
         if name not in known:
-            raise InputError(f"identify has no option {name!r}; the options are {', '.join(known)}")
+            raise InputError(f"identify has no option {name!r}; it has {', '.join(known)}")
     return IdentifyOptions(**keywords)
 
 
-def _require_finite(name: str, value: float, *, least: float = -math.inf, above: float = -math.inf) -> None:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or value < least or value <= above:
-        bound = f"above {above:g}" if math.isfinite(above) else f"{least:g} or more"
-        raise InputError(f"{name} is {value!r}; it must be a finite number {bound}")
+def _require_number(name: str, value: Any, above: float) -> None:
+    if value is None and name in ("coupling_stiffness", "period"):
+        return
+    number = math.nan if isinstance(value, bool) or not isinstance(value, (int, float)) else float(value)
+    if not math.isfinite(number) or not number > above:
+        bound = f" above {above:g}" if math.isfinite(above) else ""
+        raise InputError(f"{name} is {value!r}; it must be a finite number{bound}")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Refinement: all dilations and translations at once, by bounded variable projection.
 
-Weights, slopes and biases are eliminated (Golub & Pereyra 1973, in Kaufman's form), Levenberg-Marquardt steps are
-taken on log(alpha) and beta. Unbounded, a dilation runs away on measured switch curves and the basis turns
-singular; so dilations stay within what the positions around the wavelet resolve, translations within the data's
-reach, and a step is kept only if it lowers the objective: the result is never worse than the start.
+Weights, slopes and biases are eliminated (Golub & Pereyra 1973, in Kaufman's form), Levenberg-Marquardt steps
+are taken on log(alpha) and beta. Unbounded, a dilation runs away on measured switch curves and the basis
+turns singular. So dilations stay within what the positions around the wavelet resolve, translations within
+the reach of the data, and a step is kept only if it lowers the objective: never worse than the start.
 """
 
 import numpy as np
@@ -14,21 +14,22 @@ from .._typing import Float1D, Float2D
 from .separable import Basis, SeparableProblem, Solution
 
 COARSEST = 0.5
-"""Smallest dilation [1/box]: over the unit box a wider wavelet is a parabola, which the narrower ones contain."""
+"""Smallest dilation [1/box]: over the unit box a wider wavelet is a parabola, as this one nearly is."""
 
 REACH = 0.3
 """How far outside the unit box a translation may stand [box]."""
 
 LONGEST_STEP = 0.7
-"""Longest step of log(alpha) and of alpha beta: the basis changes too much beyond it for its linearisation."""
+"""Longest step of log(alpha) and of alpha beta: beyond it the basis changes too much to be linearised."""
+
+IDLE_STEPS = 2
+"""Steps in a row with next to no gain after which refinement ends."""
 
 
-def refine(
-    problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float = 1e-3, restless: int = 2
-) -> Solution:
+def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Lower the objective from start by at most `steps` accepted or tried steps.
 
-    It ends early after `restless` steps in a row that gained less than tolerance of the whole squared error.
+    It ends early after IDLE_STEPS steps in a row that gained less than tolerance of the whole squared error.
     """
     best = start
     if len(start.basis) == 0:
@@ -42,7 +43,7 @@ def refine(
             gain = (best.objective - trial.objective) / problem.total(trial.rss)
             best, damping = trial, max(damping / 5.0, 1e-9)
             idle = idle + 1 if gain < tolerance else 0
-            if idle >= restless:
+            if idle >= IDLE_STEPS:
                 break
             matrix, gradient = problem.normal_equations(best.basis)
         else:
@@ -55,7 +56,7 @@ def refine(
 def _bounded_step(
     problem: SeparableProblem, basis: Basis, matrix: Float2D, gradient: Float1D, damping: float
 ) -> Float1D:
-    """Levenberg-Marquardt step over the unknowns that are not held by a bound they are being pushed against."""
+    """Levenberg-Marquardt step over the unknowns that no bound holds against their push."""
     d = problem.dimension
     push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
     held_alpha = (push_alpha > 0) & (basis.alpha >= problem.finest(basis.beta) * (1 - 1e-9))

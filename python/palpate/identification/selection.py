@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forward orthogonal least squares over a library of wavelets (Chen, Billings & Luo 1989; Zhang 1997).
 
-Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates the
-projections of all others by one product with its orthonormalised columns. Linear and bias columns are always in.
-A candidate that the design already spans to rounding is never taken, so the factors stay well conditioned.
+Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates
+the projections of all others by one product with its orthonormalised columns. Linear and bias columns are
+always in. A candidate that the design already spans is never taken, so the factors stay well conditioned.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .separable import Basis, SeparableProblem, Solution
 from .stopping import deviance
 
 DEPENDENT = 1e-7
-"""Share of a candidate's squared norm that must be left outside the design for it to count as a new direction."""
+"""Share of a candidate's squared norm that must stand outside the design for it to be a new direction."""
 
 
 class Library:
@@ -40,8 +40,8 @@ class Library:
 class OrthogonalSelection:
     """One forward selection: start from a solved basis, ask for gains, take candidates.
 
-    For each block the candidate's columns (one a channel) have a projected Gram matrix S and a product z with the
-    residual; the fall of the residual sum of squares is z' S^-1 z, summed over the blocks.
+    For each block a candidate's columns (one a channel) have a projected Gram matrix S and a product z with
+    the residual; the residual sum of squares falls by z' S^-1 z, summed over the blocks.
     """
 
     def __init__(self, library: Library, start: Solution) -> None:
@@ -107,7 +107,7 @@ class SelectionPath:
 def select_forward(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
 ) -> SelectionPath:
-    """Select wavelets one by one from the library, up to max_wavelets, and judge each size by the criterion."""
+    """Select wavelets one by one from the library, up to max_wavelets; judge each size by the criterion."""
     start = problem.solve(Basis.empty(problem.dimension))
     selection = OrthogonalSelection(library, start)
     order: list[int] = []

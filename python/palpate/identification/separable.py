@@ -70,7 +70,7 @@ class Block:
 
     @property
     def n_channels(self) -> int:
-        return self.channels.shape[1]
+        return int(self.channels.shape[1])
 
     def design(self, wavelets: Float2D) -> Float2D:
         """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
@@ -104,7 +104,7 @@ class SeparableProblem:
     samples, within
         Of the compressed recording: how many samples there are, and the sum of squares inside its rows.
     force_range : float
-        Largest less smallest force.
+        Largest less smallest force, above 0.
     resolved_by : int
         Distinct positions of every block that a wavelet's core must hold.
     """
@@ -123,9 +123,9 @@ class SeparableProblem:
         self.readout = readout
         self.samples = samples
         self.within = within
-        self.dimension = blocks[0].positions.shape[1]
+        self.dimension = int(blocks[0].positions.shape[1])
         self.n_channels = sum(block.n_channels for block in blocks)
-        self.force_range = max(force_range, TINY)
+        self.force_range = force_range
         self.prior = 0.0
         distinct = [np.unique(block.positions, axis=0) for block in blocks]
         self._trees = [cKDTree(positions) for positions in distinct]
@@ -152,7 +152,7 @@ class SeparableProblem:
 
     def finest(self, beta: Float2D) -> Float2D:
         """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
-        reach = [tree.query(beta, k=[self.resolved_by])[0][:, 0] for tree in self._trees]
+        reach = [np.asarray(tree.query(beta, k=[self.resolved_by])[0])[:, 0] for tree in self._trees]
         return np.asarray(CORE / np.maximum(np.max(reach, axis=0), 1e-9))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
@@ -164,6 +164,10 @@ class SeparableProblem:
             tables.append(found.reshape(block.n_channels, -1))
             designs.append(design)
         return self.solution(basis, np.concatenate(tables), tuple(designs))
+
+    def solution_of(self, other: Solution) -> Solution:
+        """The solution of a problem with the same positions, with the errors that it leaves in this one."""
+        return self.solution(other.basis, other.coefficients, other.designs)
 
     def solution(self, basis: Basis, coefficients: Float2D, designs: tuple[Float2D, ...]) -> Solution:
         """These coefficients with the errors they leave."""
@@ -244,13 +248,13 @@ def problem_of(rows: Compressed, *, resolved_by: int) -> SeparableProblem:
         readout,
         samples=rows.samples,
         within=rows.within,
-        force_range=float(np.ptp(rows.force)),
+        force_range=float(np.ptp(rows.force)) or float(np.abs(rows.force).max()) or 1.0,
         resolved_by=resolved_by,
     )
 
 
 def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve a positive semidefinite system: Cholesky on unit-norm columns, the ridge raised until it succeeds."""
+    """Solve a positive semidefinite system by Cholesky on unit-norm columns."""
     factor, norm = factored(gram)
     columns = right.reshape(len(gram), -1) / norm[:, None]
     solved, _ = dpotrs(factor, columns, lower=1)
@@ -258,7 +262,10 @@ def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
-    """(L, norm) with gram = D L L' D, D = diag(norm), L lower triangular (what stands above it is not used)."""
+    """(L, norm) with gram = D L L' D, D = diag(norm); only the lower triangle of L counts.
+
+    The ridge is raised until the factorisation succeeds.
+    """
     norm = np.sqrt(np.diag(gram))
     norm = np.where(norm > 0.0, norm, 1.0)
     scaled = gram / np.outer(norm, norm)

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from .._core import DeviceProfile, Scheme
 from ..errors import InputError
 from ..model import Model
@@ -15,9 +13,6 @@ _PLAY_ENCODER_STEPS = 4
 """A play radius below four encoder steps would be switched by the encoder's noise instead of by the hand."""
 
 _PLAY_SHARE_OF_TRAVEL = 0.01
-
-_LOSS_SAMPLES = 1001
-"""Positions at which the loss h of a hysteresis model is looked at."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,9 @@ class Plan:
         """
         if self.structure != "explicit":
             return
-        steepest = _steepest_slope(self.model, self.scheme) + self.scheme.coupling_stiffness
+        # While a hysteresis model sticks, h / r is part of its slope.
+        radius = (self.scheme.play_radius or self.model.play_radius) if self.model.hysteretic else None
+        steepest = self.model.slope_range(radius)[1] + self.scheme.coupling_stiffness
         limit = explicit_slope_limit(self.scheme, device.period_s)
         if steepest >= limit:
             raise InputError(
@@ -90,19 +87,6 @@ def explicit_slope_limit(scheme: Scheme, period_s: float) -> float:
     damping = scheme.damping + scheme.coupling_damping
     limit: float = (4.0 * scheme.mass - 2.0 * damping * period_s) / period_s**2
     return limit
-
-
-def _steepest_slope(model: Model, scheme: Scheme) -> float:
-    """The largest slope that the structure can meet: while a hysteresis model sticks, h / r is part of it."""
-    steepest: float = model.slope_range()[1]
-    if not model.hysteretic:
-        return steepest
-    position = np.linspace(model.lower[0], model.upper[0], _LOSS_SAMPLES)
-    one = np.ones_like(position)
-    loss = 0.5 * (model.force(position, direction=one) - model.force(position, direction=-one))
-    radius = scheme.play_radius or model.play_radius
-    assert radius, "a scheme that fits a hysteresis model has a play radius"
-    return steepest + float(np.abs(loss).max()) / radius
 
 
 def play_radius_for(model: Model, device: DeviceProfile) -> float:

@@ -25,6 +25,8 @@ _NAMES = {int(value): name for name, value in Status.__members__.items()}
 def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> Recording:
     """Render a plan in closed loop, in virtual time: device, hand and controller are simulated.
 
+    The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
+
     Parameters
     ----------
     plan : Plan
@@ -50,8 +52,9 @@ def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> 
         The structure is sure to diverge on this device, or a number is out of range.
     """
     plan.check_for(device)
+    start = float(np.clip(0.0, plan.model.lower[0], plan.model.upper[0]))
     try:
-        trace = _core.simulate(plan.model, plan.scheme, device, hand, duration)
+        trace = _core.simulate(plan.model, plan.scheme, device, hand, duration, start_position=start)
     except InputError:
         raise
     except ValueError as error:

@@ -22,9 +22,6 @@ from .timing import even_motion, require_period
 PLAY_SHARE_OF_TRAVEL = 0.01
 """Play radius over travel where neither model nor scheme gives one: recorded strokes do not tell it."""
 
-_STIFFNESS_SAMPLES = 1001
-"""Positions at which the loss of a hysteresis model is looked at for its steepest slope."""
-
 
 @dataclass(frozen=True)
 class ClosedLoop:
@@ -204,13 +201,8 @@ def _play_radius(model: Model, given: float) -> float:
 
 def _steepest_slope(model: Model, scheme: Scheme) -> float:
     """Largest slope that the environment can meet; while a hysteresis model sticks, h/r is part of it."""
-    steepest = max(0.0, float(model.slope_range()[1]))
-    if not model.hysteretic:
-        return steepest
-    x = np.linspace(model.lower[0], model.upper[0], _STIFFNESS_SAMPLES)
-    loss = (model.force(x, direction=np.ones_like(x)) - model.force(x, direction=-np.ones_like(x))) / 2
-    radius = scheme.play_radius or model.play_radius or np.inf
-    return steepest + float(np.abs(loss).max()) / radius
+    radius = (scheme.play_radius or model.play_radius) if model.hysteretic else None
+    return max(0.0, float(model.slope_range(radius)[1]))
 
 
 def _with(scheme: Scheme, **changes: Any) -> Scheme:

@@ -22,13 +22,14 @@ namespace palpate {
 /// sample time, the noise of a force transducer (it has none).
 class SimulatedDevice {
   public:
-    explicit SimulatedDevice(DeviceProfile profile, Hand hand = {}, int substeps = 20)
-        : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps} {
+    explicit SimulatedDevice(DeviceProfile profile, Hand hand = {}, int substeps = 20, double start = 0.0)
+        : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start} {
         validate(profile_);
     }
 
+    /// Puts the handle at rest at its start position.
     Opened open() {
-        position_ = 0.0;
+        position_ = start_;
         velocity_ = 0.0;
         applied_ = 0.0;
         tick_ = 0;
@@ -99,6 +100,7 @@ class SimulatedDevice {
     DeviceProfile profile_;
     Hand hand_;
     int substeps_;
+    double start_;
     double position_ = 0.0;
     double velocity_ = 0.0;
     double applied_ = 0.0;

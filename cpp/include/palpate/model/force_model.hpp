@@ -51,14 +51,16 @@ class ForceModel {
         return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
-    /// Proved bounds of the slope inside the domain (d = 1), sliding either way.
-    [[nodiscard]] Interval slope_bounds() const {
+    /// Proved bounds of the slope inside the domain (d = 1), sliding either way; with a play radius r also
+    /// while it sticks, where h / r adds to it.
+    [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
         if (const WaveletNetwork* single = network()) {
             return single->curve().slope_bounds();
         }
         const Interval common = hysteresis()->force().slope_bounds();
         const double loss = hysteresis()->loss().slope_bounds().largest();
-        return {common.lower - loss, common.upper + loss};
+        const double stuck = radius ? hysteresis()->loss().value_bounds().largest() / *radius : 0.0;
+        return {common.lower - loss, common.upper + loss + stuck};
     }
 
     /// The narrowest width 1 / alpha of its wavelets; the travel when it has none (d = 1).

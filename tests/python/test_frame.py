@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frame bounds against a published estimate and its printed digits, and the truncated frame."""
+
+import numpy as np
+import pytest
+
+from palpate import InputError, frame_bounds
+from palpate.identification.frame import truncated_frame
+
+# Unit-norm Mexican hat, a0 = 2: b0 -> (A, B) for 1, 2 and 4 voices; the frame table of section 2 of the
+# mathematics that the product follows (Daubechies 1990, table of the Mexican hat).
+TABLE = {
+    0.25: [(13.091, 14.184), (27.273, 27.278), (54.552, 54.552)],
+    0.50: [(6.545, 7.092), (13.637, 13.639), (27.276, 27.276)],
+    1.00: [(3.223, 3.596), (6.768, 6.870), (13.586, 13.690)],
+    1.50: [(0.325, 4.221), (2.608, 6.484), (6.593, 11.591)],
+}
+
+
+@pytest.mark.parametrize("b0", TABLE)
+@pytest.mark.parametrize("voices", [1, 2, 4])
+def test_frame_bounds_are_those_of_the_published_table_to_every_printed_digit(b0: float, voices: int) -> None:
+    expected = TABLE[b0][{1: 0, 2: 1, 4: 2}[voices]]
+    assert frame_bounds(2.0, b0, voices) == pytest.approx(expected, abs=5.01e-4)
+
+
+def test_bounds_enclose_the_energy_of_a_function_in_the_frame() -> None:
+    """A |f|^2 <= sum |<f, psi_mk>|^2 <= B |f|^2: the law behind the table, summed on a grid."""
+    x = np.linspace(-60.0, 60.0, 24001)
+    f = np.exp(-0.5 * (x - 0.3) ** 2) * np.cos(1.7 * x)
+    dx = x[1] - x[0]
+    energy = 0.0
+    for m in range(-6, 7):
+        scale = 2.0**m
+        for k in np.arange(-np.floor(50 / scale), np.floor(50 / scale) + 1):
+            u = x / scale - k
+            psi = scale**-0.5 * 2 / np.sqrt(3) * np.pi**-0.25 * (1 - u * u) * np.exp(-0.5 * u * u)
+            energy += (np.sum(psi * f) * dx) ** 2
+    low, high = frame_bounds(2.0, 1.0)
+    assert low <= energy / (np.sum(f * f) * dx) <= high
+
+
+def test_three_vectors_of_the_plane_are_a_tight_frame() -> None:
+    """The paper's example, section 2.4: T'T = 1.5 I, and (1, 1) comes back from its three coefficients."""
+    half, root = 0.5, np.sqrt(3.0) / 2.0
+    frame = np.array([[0.0, 1.0], [root, half], [root, -half]])
+    np.testing.assert_allclose(frame.T @ frame, 1.5 * np.eye(2), atol=1e-15)
+    dual = np.linalg.pinv(frame)
+    third = np.sqrt(3.0) / 3.0
+    np.testing.assert_allclose(dual, [[0.0, third, third], [2 / 3, 1 / 3, -1 / 3]], atol=1e-15)
+    np.testing.assert_allclose(dual @ [1.0, root + half, root - half], [1.0, 1.0], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"), [((1.0, 1.0), "a0"), ((2.0, 0.0), "b0"), ((2.0, 1.0, 0), "voices")]
+)
+def test_an_impossible_frame_is_refused_by_name(arguments: tuple[float, ...], named: str) -> None:
+    with pytest.raises(InputError, match=named):
+        frame_bounds(*arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("dimension", [1, 2])
+def test_every_member_of_the_truncated_frame_has_data_within_it(dimension: int) -> None:
+    positions = np.random.default_rng(4).uniform(size=(50, dimension)) ** 3
+    frame = truncated_frame(
+        positions, coarsest=1.0, finest=64.0, frame_scale=2.0, frame_step=0.5, max_candidates=10**6
+    )
+    assert set(frame.alpha[:, 0]) == {1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0}
+    u = frame.alpha[:, None] * (positions - frame.beta[:, None])
+    nearest = np.linalg.norm(u, axis=2).min(axis=1)
+    assert nearest.max() <= 0.75 * np.sqrt(dimension) + 1e-12
+
+
+def test_the_truncated_frame_leaves_out_the_levels_that_would_not_fit() -> None:
+    positions = np.linspace(0.0, 1.0, 1000)[:, None]
+    frame = truncated_frame(
+        positions, coarsest=1.0, finest=400.0, frame_scale=2.0, frame_step=0.5, max_candidates=100
+    )
+    assert len(frame) <= 100
+    assert frame.alpha.max() == 16.0
