@@ -120,9 +120,6 @@ TEST(Resolvent, AgreesWithNewtonInsideAndBeyondTheDomain) {
                 ASSERT_NEAR(table.environment.force, newton.environment.force, 1e-11 * (p + std::abs(q)));
                 if (std::min(std::abs(table.position), std::abs(table.position - 1.0)) > 1e-9) {
                     ASSERT_EQ(table.environment.extrapolated, newton.environment.extrapolated) << q;
-                    if (!table.environment.extrapolated) {
-                        ASSERT_NEAR(table.environment.slope, newton.environment.slope, 1e-5 * (p + 1e3));
-                    }
                 }
             }
         }

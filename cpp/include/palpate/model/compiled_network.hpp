@@ -99,7 +99,8 @@ class CompiledCurve {
     [[nodiscard]] double value_error() const noexcept { return value_error_; }
     [[nodiscard]] double slope_error() const noexcept { return slope_error_; }
 
-    [[nodiscard]] Curve at(double x) const noexcept {
+    /// Inlined, so that a caller pays for what it uses of the answer.
+    [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         if (x >= table_from_ && x <= table_to_) {
             return table_.at(x);
         }
@@ -109,7 +110,7 @@ class CompiledCurve {
     [[nodiscard]] bool extrapolated(double x) const noexcept { return curve_.extrapolated(x); }
 
   private:
-    [[nodiscard]] Curve elsewhere(double x) const noexcept {
+    [[nodiscard, gnu::noinline]] Curve elsewhere(double x) const noexcept {
         if (!compiled() || !std::isfinite(x)) {
             return curve_.at(x);
         }
@@ -217,7 +218,8 @@ class CompiledNetwork {
 
     [[nodiscard]] const CompiledCurve& curve() const noexcept { return curve_; }
 
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+    [[nodiscard, gnu::always_inline]] inline EnvironmentSample at(double x,
+                                                                  const State& /*stateless*/) const noexcept {
         const Curve here = curve_.at(x);
         return {here.value, here.slope, here.integral, curve_.extrapolated(x)};
     }

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/continuation.hpp"
+#include "palpate/model/hat_sum.hpp"
 #include "palpate/model/parameters.hpp"
-#include "palpate/model/wavelet.hpp"
 
 namespace palpate {
 
@@ -18,6 +19,7 @@ class NetworkCurve {
   public:
     NetworkCurve(const NetworkParameters& network, const Domain& domain)
         : network_{network},
+          hats_{network},
           lower_{domain.lower[0]},
           upper_{domain.upper[0]},
           periodic_{domain.period.has_value()} {
@@ -67,17 +69,28 @@ class NetworkCurve {
         const double c = network_.linear[0];
         const double b = network_.bias;
         Curve sum{c * x + b, c, (0.5 * c * x + b) * x, (c * x / 6.0 + 0.5 * b) * x * x};
-        for (std::size_t i = 0; i < network_.weight.size(); ++i) {
-            const double alpha = network_.alpha[i];
-            const double width = 1.0 / alpha;
-            const double weight = network_.weight[i];
-            const MexicanHat psi = mexican_hat(alpha * (x - network_.beta[i]));
-            sum.value += weight * psi.value;
-            sum.slope += weight * alpha * psi.slope;
-            sum.integral += weight * width * psi.integral;
-            sum.double_integral += weight * width * width * psi.double_integral;
-        }
+        hats_.add(x, sum);
         return sum;
+    }
+
+    /// One quantity at many positions, continuation included; both spans have the same size.
+    void at(HatQuantity quantity, std::span<const double> x, std::span<double> result) const noexcept {
+        const double c = network_.linear[0];
+        const double b = network_.bias;
+        for (std::size_t k = 0; k < x.size(); ++k) {
+            result[k] = quantity == HatQuantity::Value   ? c * x[k] + b
+                        : quantity == HatQuantity::Slope ? c
+                                                         : (0.5 * c * x[k] + b) * x[k];
+        }
+        hats_.add(quantity, x, result);
+        for (std::size_t k = 0; k < x.size(); ++k) {
+            if (!(x[k] >= lower_ && x[k] <= upper_) || periodic_) {
+                const Curve here = at(x[k]);
+                result[k] = quantity == HatQuantity::Value   ? here.value
+                            : quantity == HatQuantity::Slope ? here.slope
+                                                             : here.integral;
+            }
+        }
     }
 
     /// Proved bounds inside the domain, within 1 % of their largest.
@@ -118,6 +131,7 @@ class NetworkCurve {
     }
 
     NetworkParameters network_;
+    HatSum hats_;
     double lower_;
     double upper_;
     bool periodic_;

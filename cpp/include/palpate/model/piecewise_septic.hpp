@@ -57,7 +57,7 @@ class PiecewiseSeptic {
         return pieces_[k].c;
     }
 
-    [[nodiscard]] double value(double x) const noexcept {
+    [[nodiscard, gnu::always_inline]] inline double value(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
         const double t = at.t;
@@ -66,14 +66,8 @@ class PiecewiseSeptic {
                ((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) * (t2 * t2);
     }
 
-    /// Slope alone.
-    [[nodiscard]] double slope(double x) const noexcept {
-        const Place at = place(x);
-        return slope(pieces_[at.piece].c, at.t) * scale_;
-    }
-
     /// Value, slope and both antiderivatives from one look-up, after `integrate`.
-    [[nodiscard]] Curve at(double x) const noexcept {
+    [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
         const double t = at.t;
@@ -83,10 +77,13 @@ class PiecewiseSeptic {
             ((c[0] + c[1] * t) + (c[2] + c[3] * t) * t2) + ((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) * t4;
         const auto [first, second] = integrals_[at.piece];
         // Powers of t below: the antiderivatives of t^j are t^(j+1)/(j+1) and t^(j+2)/((j+1)(j+2)).
-        const double once = ((c[0] + c[1] / 2.0 * t) + (c[2] / 3.0 + c[3] / 4.0 * t) * t2) +
-                            ((c[4] / 5.0 + c[5] / 6.0 * t) + (c[6] / 7.0 + c[7] / 8.0 * t) * t2) * t4;
-        const double twice = ((c[0] / 2.0 + c[1] / 6.0 * t) + (c[2] / 12.0 + c[3] / 20.0 * t) * t2) +
-                             ((c[4] / 30.0 + c[5] / 42.0 * t) + (c[6] / 56.0 + c[7] / 72.0 * t) * t2) * t4;
+        const double once =
+            ((c[0] + 1.0 / 2.0 * c[1] * t) + (1.0 / 3.0 * c[2] + 1.0 / 4.0 * c[3] * t) * t2) +
+            ((1.0 / 5.0 * c[4] + 1.0 / 6.0 * c[5] * t) + (1.0 / 7.0 * c[6] + 1.0 / 8.0 * c[7] * t) * t2) * t4;
+        const double twice =
+            ((1.0 / 2.0 * c[0] + 1.0 / 6.0 * c[1] * t) + (1.0 / 12.0 * c[2] + 1.0 / 20.0 * c[3] * t) * t2) +
+            ((1.0 / 30.0 * c[4] + 1.0 / 42.0 * c[5] * t) + (1.0 / 56.0 * c[6] + 1.0 / 72.0 * c[7] * t) * t2) *
+                t4;
         const double along = t * width_;
         return {value, slope(c, t) * scale_, first + along * once, second + along * (first + along * twice)};
     }

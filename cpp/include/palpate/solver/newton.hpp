@@ -21,11 +21,13 @@ struct Solution {
 
 /// What the last step leaves to the next: the solution moved with the load line, to first order.
 struct WarmStart {
-    double position = 0.0;                                   ///< the last solution
-    double intercept = 0.0;                                  ///< its q
-    double slope = std::numeric_limits<double>::infinity();  ///< its p + f'; infinite: the solution stays
+    double position = 0.0;    ///< the last solution
+    double intercept = 0.0;   ///< its q
+    double compliance = 0.0;  ///< its 1 / (p + f'); 0: the solution is taken to stay
 
-    [[nodiscard]] double predicted(double q) const noexcept { return position + (q - intercept) / slope; }
+    [[nodiscard]] double predicted(double q) const noexcept {
+        return position + (q - intercept) * compliance;
+    }
 };
 
 /// Newton's method on f(y) + p y = q, kept inside a bracket, warm-started and bounded in evaluations.
@@ -54,7 +56,7 @@ struct LoadLineSolver {
     [[nodiscard]] WarmStart remember(LoadLine line, const Solution& solution) const noexcept {
         const double slope = line.slope + solution.environment.slope;
         if (least_slope > 0.0 && std::isfinite(slope)) {
-            return {solution.position, line.intercept, std::fmax(slope, least_slope)};
+            return {solution.position, line.intercept, 1.0 / std::fmax(slope, least_slope)};
         }
         return {solution.position};
     }

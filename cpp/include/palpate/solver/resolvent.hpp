@@ -77,14 +77,15 @@ class Resolvent {
         return tabulated() ? WarmStart{solution.position} : solver_.remember(line, solution);
     }
 
+    /// Inlined, so that a step pays for what it uses of the answer.
     template <Environment E>
-    [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
-                                 const WarmStart& start) const noexcept {
+    [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
+                                                            const typename E::State& state, LoadLine line,
+                                                            const WarmStart& start) const noexcept {
         const double q = line.intercept;
         if (q >= from_ && q <= to_ && line.slope == slope_) {
-            const double x = q - origin_;
-            const double y = table_.value(x);
-            return {y, {q - slope_ * y, 1.0 / table_.slope(x) - slope_, unknown_energy, false}};
+            const double y = table_.value(q - origin_);
+            return {y, {q - slope_ * y, unknown, unknown, false}};
         }
         if (tabulated() && line.slope == slope_ && std::isfinite(q)) {
             return beyond(q);
@@ -93,18 +94,19 @@ class Resolvent {
     }
 
   private:
-    static constexpr double unknown_energy = std::numeric_limits<double>::quiet_NaN();
+    /// The table gives position and force. Slope and energy would cost as much again, and no structure asks.
+    static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
     /// The edge line, or nothing but p y = q where contact is lost.
-    [[nodiscard]] Solution beyond(double q) const noexcept {
+    [[nodiscard, gnu::noinline]] Solution beyond(double q) const noexcept {
         const EdgeLine& line = q < from_ ? below_ : above_;
         const double slope = slope_ + line.at_edge.slope;
         const double distance = (q - (line.at_edge.value + slope_ * line.edge)) / slope;
         if (std::abs(distance) < line.reach) {
             const double y = line.edge + distance;
-            return {y, {q - slope_ * y, line.at_edge.slope, unknown_energy, true}};
+            return {y, {q - slope_ * y, unknown, unknown, true}};
         }
-        return {q / slope_, {0.0, 0.0, unknown_energy, true}};
+        return {q / slope_, {0.0, unknown, unknown, true}};
     }
 
     /// One attempt: a table of some number of cells, and what is certified about it.
