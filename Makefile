@@ -3,6 +3,7 @@
 #
 #   make demo         identify, verify and render the sample scene; pictures in demo/
 #   make test         build, C++ tests, Python tests, lint                        (minutes)
+#   make control      build palpate-control, the real-time program: build/control/palpate-control
 #   make test-full    the same tests with long counts, under the sanitizers, and as installed  (an hour)
 #   make bench        all benchmarks, JSON in build/bench/
 #   make lint | format | stubs | clean
@@ -37,7 +38,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree hold absolute paths: in a folder that was moved, start again.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo test test-full test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs \
+.PHONY: help demo control test test-full test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs \
         setup clean moved
 
 help:
@@ -75,8 +76,13 @@ demo: $(stamps)/core
 test: lint test-cpp | setup
 	$(MAKE) --no-print-directory test-python
 
-test-python: setup
+test-python: setup control
 	$(python) -m pytest
+
+# The real-time program; the build tool knows what is up to date.
+control: $(stamps)/develop
+	cmake --preset control >/dev/null
+	cmake --build --preset control
 
 test-cpp: setup
 	tools/cpp_tests.sh dev
@@ -86,7 +92,7 @@ test-full: setup
 	sanitized=$$(( (PALPATE_TEST_SCALE + 9) / 10 )); for preset in asan tsan; do \
 	  PALPATE_TEST_SCALE=$$sanitized tools/cpp_tests.sh $$preset; done
 	tools/install_tests.sh
-	$(python) -m pytest
+	$(MAKE) --no-print-directory test-python
 
 bench: setup
 	tools/bench.sh

@@ -29,3 +29,13 @@ for source in bench/*.cpp; do
     fi
 done
 echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."
+
+echo "Lateness of the real-time loop beside cyclictest"
+cmake --preset control >/dev/null
+cmake --build --preset control >/dev/null
+if command -v cyclictest >/dev/null; then
+    .venv/bin/python tools/lateness.py build/control/palpate-control tests/models/good/position.json \
+        build/bench/lateness.json --seconds "$(awk -v scale="$scale" 'BEGIN { print 20 * scale }')"
+else
+    echo "skipped: needs cyclictest (Debian: rt-tests)"
+fi

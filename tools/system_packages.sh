@@ -22,6 +22,8 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
     if [ "$purpose" = test ]; then
         compiles '#include <gtest/gtest.h>' || echo libgtest-dev
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
+        compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
+        compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
     fi
 }
 

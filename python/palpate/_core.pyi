@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -28,9 +28,15 @@ class Status:
     
       Fault : the device reported a fault or is gone; the force sent is zero
     
-      Limited : the force was clipped to the limit
+      Limited : the force was clipped to the limit of the host or of the device
+    
+      Jump : the position moved farther in one sample than the device can; the force sent is zero
+    
+      Frozen : the position stood still at once out of full motion; the force sent is zero
     """
     Fault: typing.ClassVar[Status]
+    Frozen: typing.ClassVar[Status]
+    Jump: typing.ClassVar[Status]
     Limited: typing.ClassVar[Status]
     Lost: typing.ClassVar[Status]
     MaxIterations: typing.ClassVar[Status]
@@ -391,6 +397,14 @@ def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radi
     State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
     otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).
     """
+def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1) -> dict:
+    """
+    The model rendered in real time on a simulated device: the loop of palpate-control.
+    
+    Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the
+    recording, which grows as record.part; a `telemetry_port` of this machine gets JSON lines over UDP.
+    Returns the summary by name; ValueError where it is refused before anything moves.
+    """
 def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     The model rendered on a simulated device held by a simulated hand, in virtual time.
@@ -431,7 +445,7 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     """
 __version__: str = '0.1.0'
 paper_sample_time_s: float = 0.001
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit'}
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero'}
 structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit')
 wavelet_curvature_bound: float = 3.0
 wavelet_jerk_bound: float = 5.7831

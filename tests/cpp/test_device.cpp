@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 
@@ -146,12 +147,15 @@ class ScriptedDevice {
     Opened open() { return {}; }
     Reading exchange(const Command& command) noexcept {
         sent = command.force;
-        return next;
+        Reading reading = next;
+        reading.sequence = ++sequence;
+        return reading;
     }
     void close() noexcept {}
 
     Reading next;
     double sent = 0.0;
+    std::uint64_t sequence = 0;
 };
 
 TEST(Controller, SendsZeroForceOnAnyReadingThatIsNotSound) {

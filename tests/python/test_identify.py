@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import palpate
-from palpate import InputError, Model, Recording, identify
+from palpate import InputError, Model, Recording, _core, identify
 from palpate.recording.sample import sample_recording
 
 
@@ -56,7 +56,8 @@ def test_play_starts_at_rest_in_every_recording() -> None:
     random = np.random.default_rng(1)
     t = np.linspace(0.0, 4.0 * np.pi, 1600)
     x = 0.5 - 0.5 * np.cos(t)
-    y = x + 0.2 * np.sign(np.sin(t)) + random.normal(0.0, 0.01, len(t))
+    sliding = np.clip((x - _core.play(x, 0.01)) / 0.01, -1.0, 1.0)
+    y = x + 0.2 * sliding + random.normal(0.0, 0.01, len(t))
     recordings = [Recording.from_arrays(x, y, time=t)]
     for place in random.uniform(0.1, 0.9, 20):
         rest = place + random.uniform(-1e-4, 1e-4, 40)

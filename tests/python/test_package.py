@@ -62,7 +62,7 @@ def command_lines() -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("way", command_lines())
-@pytest.mark.parametrize("verb", ["", "identify", "verify", "simulate", "show", "demo"])
+@pytest.mark.parametrize("verb", ["", "identify", "verify", "simulate", "render", "show", "demo"])
 def test_the_command_explains_itself(way: str, verb: str) -> None:
     command = [*command_lines()[way], *([verb] if verb else []), "--help"]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)

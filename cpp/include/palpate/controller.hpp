@@ -5,6 +5,7 @@
 
 #include "palpate/device/device.hpp"
 #include "palpate/guard/limits.hpp"
+#include "palpate/guard/reading_guard.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/status.hpp"
 
@@ -18,13 +19,25 @@ struct Tick {
     Status status = Status::Ok;  ///< the first thing that was not Ok on the way
 };
 
+/// What a sample passes before it is believed, and a force before it is sent. Made of nothing but a force
+/// limit it is the guard of a simulation, where nothing else can go wrong.
+struct Guards {
+    ForceLimit limit;
+    SlewLimit slew;
+    ForceRamp ramp;
+    ReadingGuard reading;
+};
+
 /// One tick of rendering: read, compute, limit, send. No allocation, lock, exception, log or system call but
 /// the device's own. Whatever is wrong with a reading, the force sent is zero.
 template <Device D, Structure S>
 class Controller {
   public:
+    Controller(D& device, S structure, Guards guards)
+        : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
+
     Controller(D& device, S structure, ForceLimit limit)
-        : device_{device}, structure_{std::move(structure)}, limit_{limit} {}
+        : Controller{device, std::move(structure), Guards{limit, {}, {}, {}}} {}
 
     /// Takes a first sample with zero force and puts the virtual object at rest there.
     [[nodiscard]] Status start() noexcept {
@@ -35,24 +48,44 @@ class Controller {
 
     /// Computes the force for the last reading, sends it and takes the next one.
     [[nodiscard]] Tick tick() noexcept {
-        Tick tick{reading_, {}, {}, reading_.status};
-        if (reading_.status == Status::Ok) {
+        const Status believed = guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
+        Tick tick{reading_, {}, {}, believed};
+        if (sends_force(believed)) {
             tick.rendered = structure_.step(reading_.position);
-            tick.status = tick.rendered.status;
-            tick.command.force = tick.rendered.force;
-            const Status limited = limit_.apply(tick.command.force);
-            tick.status = tick.status == Status::Ok ? limited : tick.status;
+            tick.status = guarded(tick.rendered, tick.command.force, believed);
+        } else {
+            guards_.slew.zeroed();
         }
         reading_ = device_.exchange(tick.command);
         return tick;
     }
 
+    /// Zero force, and the device is let go. What happens afterwards can take its time.
+    void stop() noexcept {
+        (void)device_.exchange({});
+        device_.close();
+    }
+
     [[nodiscard]] S& structure() noexcept { return structure_; }
+    [[nodiscard]] const ReadingGuard& reading_guard() const noexcept { return guards_.reading; }
 
   private:
+    /// The order of every output: ramp, limit, slew. The limit answers for numbers that are none.
+    [[nodiscard]] Status guarded(const Rendered& rendered, double& force, Status believed) noexcept {
+        force = guards_.ramp.next() * rendered.force;
+        const Status limited = guards_.limit.apply(force);
+        const Status slewed = guards_.slew.apply(force);
+        for (const Status status : {rendered.status, limited, slewed}) {
+            if (status != Status::Ok) {
+                return status;
+            }
+        }
+        return believed;
+    }
+
     D& device_;
     S structure_;
-    ForceLimit limit_;
+    Guards guards_;
     Reading reading_;
 };
 

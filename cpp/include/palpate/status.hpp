@@ -18,6 +18,8 @@ enum class Status : std::uint8_t {
     Lost,
     Fault,
     Limited,
+    Jump,
+    Frozen,
 };
 
 struct StatusText {
@@ -26,7 +28,7 @@ struct StatusText {
 };
 
 /// Word and meaning of every status, in the order of the enumeration.
-inline constexpr std::array<StatusText, 8> status_texts{{
+inline constexpr std::array<StatusText, 10> status_texts{{
     {"Ok", "the step is exact to its tolerance"},
     {"MaxIterations", "the solver used all its evaluations; the position is its best one"},
     {"NotUnique", "the load line meets the environment where it falls faster than the line rises"},
@@ -34,11 +36,24 @@ inline constexpr std::array<StatusText, 8> status_texts{{
     {"Timeout", "the device did not answer in time"},
     {"Lost", "a sample of the device was lost or came twice"},
     {"Fault", "the device reported a fault or is gone; the force sent is zero"},
-    {"Limited", "the force was clipped to the limit"},
+    {"Limited", "the force was clipped to the limit of the host or of the device"},
+    {"Jump", "the position moved farther in one sample than the device can; the force sent is zero"},
+    {"Frozen", "the position stood still at once out of full motion; the force sent is zero"},
 }};
 
 [[nodiscard]] constexpr const StatusText& text(Status status) noexcept {
     return status_texts[static_cast<std::size_t>(status)];
+}
+
+/// Whether a tick of this status sends a force. The others send zero.
+[[nodiscard]] constexpr bool sends_force(Status status) noexcept {
+    return status == Status::Ok || status == Status::MaxIterations || status == Status::NotUnique ||
+           status == Status::Limited;
+}
+
+/// Whether nothing can follow a tick of this status: the device, or what it says, is not to be trusted again.
+[[nodiscard]] constexpr bool is_final(Status status) noexcept {
+    return status == Status::Fault || status == Status::Jump || status == Status::Frozen;
 }
 
 }  // namespace palpate

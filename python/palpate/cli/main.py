@@ -16,6 +16,7 @@ _VERBS = {
     "identify": "Identify a model from recordings.",
     "verify": "Compare a model with a recording.",
     "simulate": "Render a model on a simulated device.",
+    "render": "Render a model live, tick by tick.",
     "show": "Print a model for a person.",
     "demo": "Identify, verify and render a simulated sample.",
 }

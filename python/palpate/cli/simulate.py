@@ -9,15 +9,13 @@ from typing import Any
 
 import click
 
-from .._core import Scheme, structure_names
 from .arguments import PATH, json_option, plot_option
 from .ending import WorkError
 from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_rendering
+from .scheme_options import scheme_options
 from .verb import Verb
-
-_DEFAULT = Scheme()
 
 
 @click.command(
@@ -26,43 +24,7 @@ _DEFAULT = Scheme()
     epilog="Example: palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv",
 )
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
-@click.option(
-    "--structure",
-    type=click.Choice(structure_names),
-    default=_DEFAULT.structure,
-    help="How the force is computed.",
-)
-@click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model.")
-@click.option(
-    "--coupling-stiffness",
-    type=float,
-    show_default=f"{_DEFAULT.coupling_stiffness:g} N*m/rad, scaled to the model",
-    help="K_c, in force per position of the model's units.",
-)
-@click.option(
-    "--coupling-damping",
-    type=float,
-    show_default=f"{_DEFAULT.coupling_damping:g} N*m*s/rad, scaled",
-    help="B_c, in force per velocity.",
-)
-@click.option(
-    "--mass",
-    type=float,
-    show_default=f"{_DEFAULT.mass:g} kg*m^2, scaled",
-    help="m of implicit and explicit, in force per acceleration.",
-)
-@click.option(
-    "--damping",
-    type=float,
-    show_default=f"{_DEFAULT.damping:g} N*m*s/rad, scaled",
-    help="B_o of implicit and explicit, in force per velocity.",
-)
-@click.option(
-    "--play-radius",
-    type=float,
-    show_default="the model's, or 1 % of its travel",
-    help="r of a model with hysteresis, in its position unit.",
-)
+@scheme_options
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time.")
 @click.option("-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Write what was rendered.")
 @plot_option("rendered force beside the model's, differences beneath")

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
@@ -54,7 +55,10 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
         side = np.concatenate([np.asarray(part.direction, dtype=float) for part in recordings])
     elif all(part.time is not None for part in recordings):
         starts = np.concatenate([[0], np.cumsum([len(part.position) for part in recordings])[:-1]]).tolist()
-    return _model_of(fit_environment(positions, force, side, settings, starts=starts), recordings, settings)
+    # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
+    with threadpool_limits(limits=1, user_api="blas"):
+        network = fit_environment(positions, force, side, settings, starts=starts)
+    return _model_of(network, recordings, settings)
 
 
 def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> Model:

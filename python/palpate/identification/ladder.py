@@ -268,9 +268,10 @@ class _Ladder:
         gain = below.criterion(self._options) - above.criterion(self._options)
         if gain >= self._options.rung_evidence:
             return above
+        changes = f"falls by {gain:.4g}" if gain > 0 else f"rises by {-gain:.4g}"
         self._notes.append(
-            f"{above.name} refused: {self._options.criterion} falls by {gain:.4g}, "
-            f"{self._options.rung_evidence:g} is asked for"
+            f"{above.name} refused: {self._options.criterion} {changes}, "
+            f"it has to fall by {self._options.rung_evidence:g} or more"
         )
         return below
 

@@ -111,4 +111,9 @@ class SimulatedDevice {
 
 static_assert(Device<SimulatedDevice>);
 
+/// Substeps of a tick that keep the inner step of the simulation at 1/20 ms, whatever the rate.
+[[nodiscard]] inline int simulated_substeps(double period_s) noexcept {
+    return std::max(1, static_cast<int>(std::lround(20e3 * period_s)));
+}
+
 }  // namespace palpate

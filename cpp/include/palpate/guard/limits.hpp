@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include "palpate/status.hpp"
 
@@ -21,6 +23,34 @@ struct ForceLimit {
         const double wanted = force;
         force = std::clamp(force, -largest, largest);
         return force == wanted ? Status::Ok : Status::Limited;
+    }
+};
+
+/// How far a force may move from one tick to the next. Zero, the safe command, is always in reach.
+struct SlewLimit {
+    double largest_step = std::numeric_limits<double>::infinity();  ///< a tick [N or N*m], > 0
+    double last = 0.0;                                              ///< what was sent before
+
+    [[nodiscard]] Status apply(double& force) noexcept {
+        const double wanted = force;
+        force = std::clamp(force, last - largest_step, last + largest_step);
+        last = force;
+        return force == wanted ? Status::Ok : Status::Limited;
+    }
+
+    void zeroed() noexcept { last = 0.0; }
+};
+
+/// The way from no force to all of it: the first `ticks` forces are scaled by 0, 1/ticks, 2/ticks, ...
+struct ForceRamp {
+    std::uint64_t ticks = 0;
+    std::uint64_t done = 0;
+
+    [[nodiscard]] double next() noexcept {
+        if (done >= ticks) {
+            return 1.0;
+        }
+        return static_cast<double>(done++) / static_cast<double>(ticks);
     }
 };
 

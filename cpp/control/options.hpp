@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/guard/guard_settings.hpp"
+#include "palpate/loop.hpp"
+#include "palpate/realtime/privileges.hpp"
+#include "palpate/rendering/scheme.hpp"
+
+namespace palpate::control {
+
+/// What stands on the command line. What is not given follows the model: its unit and its size.
+struct Options {
+    std::string model;
+    std::string device = "simulated";
+    LoopSettings loop;
+    std::string record;
+    std::optional<std::uint16_t> telemetry_port;
+    double telemetry_hz = 50.0;
+
+    std::string structure{structure_names[static_cast<std::size_t>(Scheme{}.structure)]};
+    bool compensated = false;
+    std::optional<double> coupling_stiffness;
+    std::optional<double> coupling_damping;
+    std::optional<double> mass;
+    std::optional<double> damping;
+    std::optional<double> play_radius;
+
+    std::optional<double> force_limit;
+    std::optional<double> largest_speed;
+    double slew_s = GuardSettings{}.slew_s;
+    double ramp_s = GuardSettings{}.ramp_s;
+    double frozen_s = GuardSettings{}.frozen_s;
+
+    RealTimeOptions real_time;
+    std::vector<std::string> faults;
+    bool as_json = false;
+};
+
+/// Reads the command line. Where the program is to end at once (help, version, a wrong option) the text has been
+/// printed and the exit code is returned.
+[[nodiscard]] std::optional<int> read_options(int count, char** words, Options& options);
+
+}  // namespace palpate::control

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "telling.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <iostream>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/session_text.hpp"
+
+namespace palpate::control {
+
+namespace {
+
+constexpr std::size_t shown_ticks = 8;
+constexpr int calls_a_line = 5;  ///< the live line changes ten times a second
+
+nlohmann::json microseconds(const DurationHistogram& histogram) {
+    return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
+            {"p99_us", 1e-3 * histogram.quantile(0.99)},
+            {"p999_us", 1e-3 * histogram.quantile(0.999)},
+            {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
+}
+
+nlohmann::json statuses(const LoopReport& loop) {
+    nlohmann::json counts = nlohmann::json::object();
+    for (std::size_t k = 0; k < status_texts.size(); ++k) {
+        if (loop.ticks_by_status[k] > 0) {
+            counts[status_texts[k].word] = loop.ticks_by_status[k];
+        }
+    }
+    return counts;
+}
+
+}  // namespace
+
+LiveView::LiveView(const LoopSettings& settings, RecordUnits units)
+    : settings_{settings}, units_{std::move(units)}, terminal_{isatty(STDERR_FILENO) == 1} {}
+
+void LiveView::say(const std::string& sentence) {
+    end();
+    std::cerr << sentence << "\n";
+}
+
+void LiveView::end() {
+    if (line_is_open_) {
+        std::cerr << "\r\033[K";
+        line_is_open_ = false;
+    }
+}
+
+void LiveView::show(const SessionView& view) {
+    if (view.refused != nullptr && !std::exchange(told_privileges_, true)) {
+        for (const std::string& sentence : *view.refused) {
+            say("warning: " + sentence);
+        }
+    }
+    if (view.disk_error != 0 && !std::exchange(told_disk_, true)) {
+        say(std::string("warning: the recording stopped, the loop goes on: ") +
+            std::generic_category().message(view.disk_error));
+    }
+    const double rate = view.progress.rate.rate_hz();
+    const bool is_short = rate > 0.0 && rate < 0.99 * settings_.rate_hz;
+    if (is_short && !std::exchange(short_of_rate_, is_short)) {
+        say("warning: the loop runs at " + readable(rate) + " Hz, asked for " + readable(settings_.rate_hz) +
+            " Hz");
+    }
+    short_of_rate_ = is_short;
+    if (terminal_ && ++calls_ % calls_a_line == 0) {
+        const auto ticks = view.progress.ticks.load(std::memory_order_relaxed);
+        const auto missed = view.progress.missed.load(std::memory_order_relaxed);
+        std::cerr << "\r\033[K" << readable(static_cast<double>(ticks + missed) / settings_.rate_hz) << " s  "
+                  << readable(rate) << " Hz  position " << readable(view.progress.position.load()) << " "
+                  << units_.position << "  force " << readable(view.progress.force.load()) << " "
+                  << units_.force << "  missed " << missed << std::flush;
+        line_is_open_ = true;
+    }
+}
+
+void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
+                  const std::string& record, bool as_json) {
+    const LoopReport& loop = report.loop;
+    const RecordingFile& file = outlets.file;
+    const std::string ending = ending_text(loop, settings.loop);
+    if (as_json) {
+        nlohmann::json summary{{"ended", ending},
+                               {"status", text(loop.status).word},
+                               {"ticks", loop.timing.ticks()},
+                               {"rate_hz", loop.timing.rate_hz()},
+                               {"wanted_rate_hz", settings.loop.rate_hz},
+                               {"period", microseconds(loop.timing.period)},
+                               {"lateness", microseconds(loop.timing.lateness)},
+                               {"missed_deadlines", loop.timing.missed},
+                               {"longest_gap_us", 1e-3 * static_cast<double>(loop.timing.period.largest())},
+                               {"ticks_by_status", statuses(loop)},
+                               {"lost_samples", loop.lost_samples},
+                               {"repeated_samples", loop.repeated_samples},
+                               {"record", record.empty() ? nlohmann::json() : nlohmann::json(record)},
+                               {"recorded", file.written()},
+                               {"lost_records", report.lost_records + file.refused()},
+                               {"telemetry_sent", outlets.telemetry.sent()},
+                               {"telemetry_dropped", outlets.telemetry.dropped()},
+                               {"without", report.refused}};
+        std::cout << summary.dump() << std::endl;
+        return;
+    }
+    std::string counted;
+    const nlohmann::json counts = statuses(loop);
+    for (const auto& [word, count] : counts.items()) {
+        counted += (counted.empty() ? "" : ", ") + std::to_string(count.get<std::uint64_t>()) + " " + word;
+    }
+    std::cout << "ended      " << ending << "\n"
+              << "rate       " << readable(loop.timing.rate_hz()) << " Hz of "
+              << readable(settings.loop.rate_hz) << " Hz, " << loop.timing.missed << " deadlines missed\n"
+              << "period     " << percentiles(loop.timing.period) << " (the longest gap)\n"
+              << "late by    " << percentiles(loop.timing.lateness) << "\n"
+              << "ticks      " << counted << "\n"
+              << "samples    " << loop.lost_samples << " lost, " << loop.repeated_samples << " repeated\n";
+    if (!record.empty()) {
+        std::cout << "recorded   " << record << ": " << file.written() << " rows, "
+                  << report.lost_records + file.refused() << " lost\n";
+    }
+    if (outlets.telemetry.sent() + outlets.telemetry.dropped() > 0) {
+        std::cout << "telemetry  " << outlets.telemetry.sent() << " lines sent, "
+                  << outlets.telemetry.dropped() << " dropped\n";
+    }
+    std::cout << std::flush;
+}
+
+void tell_last_ticks(const SessionReport& report, const RecordUnits& units) {
+    const std::size_t count = std::min(shown_ticks, report.last_ticks.size());
+    std::string rows;
+    for (std::size_t k = report.last_ticks.size() - count; k < report.last_ticks.size(); ++k) {
+        append_row(rows, report.last_ticks[k]);
+    }
+    std::cerr << "the last " << count << " ticks:\n" << column_names(units) << "\n" << rows << std::flush;
+}
+
+}  // namespace palpate::control

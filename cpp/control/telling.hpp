@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "palpate/io/outlets.hpp"
+#include "palpate/session.hpp"
+
+namespace palpate::control {
+
+/// What a person is told while it runs, on standard error: what was refused, what falls short, and, on a
+/// terminal only, one line that is alive.
+class LiveView {
+  public:
+    LiveView(const LoopSettings& settings, RecordUnits units);
+    void show(const SessionView& view);
+    void end();
+
+  private:
+    void say(const std::string& sentence);
+
+    LoopSettings settings_;
+    RecordUnits units_;
+    bool terminal_;
+    bool told_privileges_ = false;
+    bool told_disk_ = false;
+    bool short_of_rate_ = false;
+    bool line_is_open_ = false;
+    int calls_ = 0;
+};
+
+/// The summary on standard output, as lines or as one JSON object.
+void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
+                  const std::string& record, bool as_json);
+
+/// The last ticks before a fault, on standard error.
+void tell_last_ticks(const SessionReport& report, const RecordUnits& units);
+
+}  // namespace palpate::control

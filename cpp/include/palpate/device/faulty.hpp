@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "palpate/device/device.hpp"
+
+namespace palpate {
+
+/// What can go wrong between a host and a device.
+enum class FaultKind : std::uint8_t {
+    Late,        ///< no answer in time: Timeout; the sample itself is skipped
+    Lost,        ///< one more sample was taken that nobody saw
+    Repeated,    ///< the last sample comes again
+    NotANumber,  ///< the position is NaN
+    Frozen,      ///< the encoder repeats its value, everything else goes on
+    Jump,        ///< the encoder is off by `jump`
+    Saturated,   ///< the motor makes half of the force, and says Limited
+    Gone,        ///< Fault, for good, and no force
+};
+
+inline constexpr std::array<std::string_view, 8> fault_names{"late",   "lost", "repeated",  "nan",
+                                                             "frozen", "jump", "saturated", "gone"};
+
+/// One fault: from which exchange on, and for how many.
+struct Fault {
+    FaultKind kind = FaultKind::Late;
+    std::uint64_t exchange = 0;
+    std::uint64_t samples = 1;
+};
+
+/// A device with scripted faults, for tests and for seeing what a program does with them. The faults speak as a
+/// real device does: by status, by sequence number, or by nothing but wrong numbers. It does not model the time
+/// that a late answer takes.
+template <Device D>
+class Faulty {
+  public:
+    /// `jump`: by how much a jumping encoder is off [m or rad].
+    Faulty(D device, std::vector<Fault> script, double jump)
+        : device_{std::move(device)}, script_{std::move(script)}, jump_{jump} {
+        std::stable_sort(script_.begin(), script_.end(),
+                         [](const Fault& a, const Fault& b) { return a.exchange < b.exchange; });
+    }
+
+    Opened open() {
+        exchanges_ = 0;
+        next_ = 0;
+        gone_ = false;
+        return device_.open();
+    }
+
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        const Fault* fault = fault_of(exchanges_++);
+        gone_ = gone_ || (fault != nullptr && fault->kind == FaultKind::Gone);
+        if (gone_) {
+            last_ = device_.exchange({});
+            last_.status = Status::Fault;
+            return last_;
+        }
+        if (fault == nullptr) {
+            last_ = device_.exchange(command);
+            return last_;
+        }
+        return faulty(*fault, command);
+    }
+
+    void close() noexcept { device_.close(); }
+    [[nodiscard]] const D& device() const noexcept { return device_; }
+
+  private:
+    [[nodiscard]] const Fault* fault_of(std::uint64_t exchange) noexcept {
+        while (next_ < script_.size() && exchange >= script_[next_].exchange + script_[next_].samples) {
+            ++next_;
+        }
+        return next_ < script_.size() && exchange >= script_[next_].exchange ? &script_[next_] : nullptr;
+    }
+
+    [[nodiscard]] Reading faulty(const Fault& fault, const Command& command) noexcept {
+        const bool half = fault.kind == FaultKind::Saturated;
+        Reading now = device_.exchange({half ? 0.5 * command.force : command.force});
+        Reading told = now;
+        switch (fault.kind) {
+            case FaultKind::Late:
+                told = now = last_;
+                told.status = Status::Timeout;
+                break;
+            case FaultKind::Lost:
+                told = now = device_.exchange(command);
+                break;
+            case FaultKind::Repeated:
+                told = now = last_;
+                break;
+            case FaultKind::NotANumber:
+                told.position = std::numeric_limits<double>::quiet_NaN();
+                break;
+            case FaultKind::Frozen:
+                told.position = last_.position;
+                told.velocity = 0.0;
+                now.position = last_.position;
+                break;
+            case FaultKind::Jump:
+                told.position += jump_;
+                break;
+            case FaultKind::Saturated:
+                told.status = command.force == 0.0 ? told.status : Status::Limited;
+                break;
+            case FaultKind::Gone:
+                break;
+        }
+        last_ = now;
+        return told;
+    }
+
+    D device_;
+    std::vector<Fault> script_;
+    double jump_;
+    std::uint64_t exchanges_ = 0;
+    std::size_t next_ = 0;
+    bool gone_ = false;
+    Reading last_;
+};
+
+/// Reads "KIND@SECONDS" or "KIND@SECONDSxSAMPLES", such as late@1.5 or frozen@2x200.
+/// Throws std::invalid_argument with what would be right.
+[[nodiscard]] inline Fault parse_fault(const std::string& text, double period_s) {
+    const auto refuse = [&] {
+        std::string names;
+        for (const std::string_view name : fault_names) {
+            names += (names.empty() ? "" : ", ") + std::string(name);
+        }
+        throw std::invalid_argument("fault is '" + text +
+                                    "', must be KIND@SECONDS or KIND@SECONDSxSAMPLES with one of " + names);
+    };
+    const std::size_t at = text.find('@');
+    const auto kind = std::find(fault_names.begin(), fault_names.end(), text.substr(0, at));
+    if (at == std::string::npos || kind == fault_names.end()) {
+        refuse();
+    }
+    const auto number = [&](const std::string& word) {
+        std::size_t used = 0;
+        double value = -1.0;
+        try {
+            value = std::stod(word, &used);
+        } catch (const std::logic_error&) {
+            refuse();
+        }
+        if (used != word.size() || !std::isfinite(value) || value < 0.0 || value > 1e6) {
+            refuse();
+        }
+        return value;
+    };
+    const std::size_t times = text.find('x', at);
+    const double seconds = number(text.substr(at + 1, times == std::string::npos ? times : times - at - 1));
+    const double samples = times == std::string::npos ? 1.0 : number(text.substr(times + 1));
+    return {static_cast<FaultKind>(kind - fault_names.begin()),
+            static_cast<std::uint64_t>(std::llround(seconds / period_s)),
+            static_cast<std::uint64_t>(std::max(1LL, std::llround(samples)))};
+}
+
+}  // namespace palpate

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "palpate/guard/limits.hpp"
+#include "palpate/guard/reading_guard.hpp"
+
+namespace palpate {
+
+/// The guards of a live rendering, in units of time instead of ticks.
+struct GuardSettings {
+    double force_limit = 5.0;      ///< [N or N*m]
+    double slew_s = 0.005;         ///< time from no force to the limit; 0 = no slew limit [s]
+    double ramp_s = 0.2;           ///< from no force to all of it, at the start [s]
+    double largest_speed = 100.0;  ///< of the handle: beyond, the encoder jumped [m/s or rad/s]
+    double frozen_speed = 0.3;     ///< a handle this fast cannot stand still at once [m/s or rad/s]
+    double frozen_s = 0.05;        ///< how long it may seem to; 0 = not looked at [s]
+};
+
+/// Throws std::invalid_argument: the field, its value, what would be right.
+inline void validate(const GuardSettings& settings) {
+    const auto require = [](bool holds, const char* field, double value, const char* right) {
+        if (!holds) {
+            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
+                                        right);
+        }
+    };
+    const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
+    require(std::isfinite(settings.force_limit) && settings.force_limit > 0.0, "force_limit",
+            settings.force_limit, "> 0");
+    require(not_negative(settings.slew_s), "slew_s", settings.slew_s, ">= 0");
+    require(not_negative(settings.ramp_s), "ramp_s", settings.ramp_s, ">= 0");
+    require(settings.largest_speed > 0.0, "largest_speed", settings.largest_speed, "> 0");
+    require(not_negative(settings.frozen_speed), "frozen_speed", settings.frozen_speed, ">= 0");
+    require(not_negative(settings.frozen_s), "frozen_s", settings.frozen_s, ">= 0");
+}
+
+inline constexpr std::uint64_t fewest_frozen_samples = 5;
+
+[[nodiscard]] inline ForceLimit force_limit(const GuardSettings& settings) noexcept {
+    return {settings.force_limit};
+}
+
+[[nodiscard]] inline SlewLimit slew_limit(const GuardSettings& settings, double period_s) noexcept {
+    const double step = settings.slew_s > 0.0 ? settings.force_limit * period_s / settings.slew_s
+                                              : std::numeric_limits<double>::infinity();
+    return {step, 0.0};
+}
+
+[[nodiscard]] inline ForceRamp force_ramp(const GuardSettings& settings, double period_s) noexcept {
+    return {static_cast<std::uint64_t>(std::llround(settings.ramp_s / period_s)), 0};
+}
+
+[[nodiscard]] inline ReadingGuard reading_guard(const GuardSettings& settings, double period_s) noexcept {
+    const auto samples = static_cast<std::uint64_t>(std::llround(settings.frozen_s / period_s));
+    return ReadingGuard{{settings.largest_speed * period_s, settings.frozen_speed * period_s,
+                         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0}};
+}
+
+}  // namespace palpate

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "palpate/status.hpp"
+
+namespace palpate {
+
+/// Whether a device's sample can be believed: its own status, its sequence number, its position.
+///
+/// The sequence number has to advance by one an exchange. A larger step means lost samples, none means that a
+/// sample came twice. An exchange that ended in a timeout counts as well: its sample may come late.
+///
+/// A handle slows down before it stands. A position that moves by `frozen_step` or more in one sample and then
+/// repeats to the last bit for `frozen_samples` is an encoder that died. One that dies while the handle rests
+/// cannot be told from a resting handle.
+class ReadingGuard {
+  public:
+    struct Limits {
+        double largest_step =
+            std::numeric_limits<double>::infinity();  ///< of the position, a sample [m or rad]
+        double frozen_step = 0.0;                     ///< see above [m or rad]
+        std::uint64_t frozen_samples = 0;             ///< see above; 0 = not looked at
+    };
+
+    ReadingGuard() = default;
+    explicit ReadingGuard(const Limits& limits) noexcept : limits_{limits} {}
+
+    [[nodiscard]] Status check(double position, std::uint64_t sequence, Status reported) noexcept {
+        ++exchanges_;
+        if (!sends_force(reported)) {
+            return reported;
+        }
+        const std::uint64_t advanced = sequence - last_sequence_;
+        const std::uint64_t expected = exchanges_;
+        if (started_ && static_cast<std::int64_t>(advanced) <= 0) {  // again, or one from before
+            ++repeated_;
+            return Status::Lost;
+        }
+        const bool lost = started_ && advanced > expected;
+        lost_ += lost ? advanced - expected : 0;
+        last_sequence_ = sequence;
+        exchanges_ = advanced < expected ? std::min(expected - advanced, most_late) : 0;
+        if (!std::isfinite(position)) {
+            return Status::NonFinite;
+        }
+        const Status moved = followed(position, static_cast<double>(started_ ? advanced : 1));
+        started_ = true;
+        if (moved != Status::Ok) {
+            return moved;
+        }
+        return lost ? Status::Lost : reported;
+    }
+
+    /// Samples that the device took and nobody saw, and samples that came again.
+    [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+    [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
+
+  private:
+    static constexpr std::uint64_t most_late = 2;  ///< samples that may come later than their exchange
+
+    [[nodiscard]] Status followed(double position, double samples) noexcept {
+        const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);
+        last_position_ = position;
+        if (step > limits_.largest_step * samples) {
+            return Status::Jump;
+        }
+        if (step > 0.0) {
+            was_fast_ = step >= limits_.frozen_step * samples;
+            still_ = 0;
+            return Status::Ok;
+        }
+        ++still_;
+        const bool died = limits_.frozen_samples > 0 && was_fast_ && still_ >= limits_.frozen_samples;
+        return died ? Status::Frozen : Status::Ok;
+    }
+
+    Limits limits_;
+    bool started_ = false;
+    bool was_fast_ = false;
+    std::uint64_t last_sequence_ = 0;
+    std::uint64_t exchanges_ = 0;  ///< whose sample has not come yet
+    std::uint64_t still_ = 0;      ///< samples without motion
+    std::uint64_t lost_ = 0;
+    std::uint64_t repeated_ = 0;
+    double last_position_ = std::numeric_limits<double>::quiet_NaN();
+};
+
+}  // namespace palpate

@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/model/force_model.hpp"
+
+namespace palpate {
+
+/// What a rendering needs of a model file.
+struct ModelFile {
+    ForceModel model;
+    std::string kind;
+    std::string position_unit;        ///< rad, m, count or "" (unstated)
+    std::string force_unit;           ///< N*m, N, A or ""
+    std::vector<std::string> inputs;  ///< one name for each input
+    std::string data_sha256;          ///< of the recordings it was identified on
+};
+
+namespace detail {
+
+/// A value of a JSON file together with its path: it answers with what was asked for, or throws
+/// std::invalid_argument with path, value and what would be right.
+class JsonField {
+  public:
+    using Json = nlohmann::json;
+
+    JsonField(const Json& value, std::string path) : value_{value}, path_{std::move(path)} {}
+
+    [[noreturn]] void refuse(const std::string& right) const {
+        std::string shown = value_.dump();
+        shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
+        throw std::invalid_argument((path_.empty() ? "the file holds " : path_ + " is ") + shown +
+                                    ": must be " + right);
+    }
+    void require(bool holds, const std::string& right) const {
+        if (!holds) {
+            refuse(right);
+        }
+    }
+    void require_length(std::size_t length, const char* meaning) const {
+        if (value_.size() != length) {
+            throw std::invalid_argument(path_ + " has " + std::to_string(value_.size()) +
+                                        " values: must have " + std::to_string(length) + ", " + meaning);
+        }
+    }
+
+    [[nodiscard]] bool is_null() const { return value_.is_null(); }
+
+    /// A member of an object.
+    [[nodiscard]] JsonField operator[](const char* key) const {
+        const std::string path = path_.empty() ? key : path_ + "." + key;
+        require(value_.is_object(), "an object");
+        const auto found = value_.find(key);
+        if (found == value_.end()) {
+            throw std::invalid_argument(path + " is missing");
+        }
+        return {*found, path};
+    }
+    /// An object with no key but these.
+    const JsonField& only(std::initializer_list<std::string_view> keys) const {
+        require(value_.is_object(), "an object");
+        for (const auto& item : value_.items()) {
+            bool known = false;
+            for (const std::string_view key : keys) {
+                known = known || item.key() == key;
+            }
+            if (!known) {
+                throw std::invalid_argument((path_.empty() ? "" : path_ + ".") + item.key() +
+                                            " is not a key of this format (free keys go under notes)");
+            }
+        }
+        return *this;
+    }
+    [[nodiscard]] std::vector<JsonField> items() const {
+        require(value_.is_array(), "a list");
+        std::vector<JsonField> fields;
+        for (std::size_t k = 0; k < value_.size(); ++k) {
+            fields.emplace_back(value_[k], path_ + "[" + std::to_string(k) + "]");
+        }
+        return fields;
+    }
+
+    [[nodiscard]] double number() const {
+        require(value_.is_number(), "a number");
+        return value_.get<double>();
+    }
+    [[nodiscard]] double positive() const {
+        require(number() > 0.0, "> 0");
+        return number();
+    }
+    [[nodiscard]] double not_negative() const {
+        require(number() >= 0.0, ">= 0");
+        return number();
+    }
+    [[nodiscard]] std::uint64_t count(std::uint64_t least) const {
+        require(value_.is_number_integer(), "a whole number");
+        require(number() >= static_cast<double>(least), ">= " + std::to_string(least));
+        return value_.get<std::uint64_t>();
+    }
+    [[nodiscard]] std::string words() const {
+        require(value_.is_string(), "text");
+        return value_.get<std::string>();
+    }
+    [[nodiscard]] std::string one_of(std::initializer_list<const char*> choices) const {
+        std::string right;
+        for (const char* choice : choices) {
+            if (value_.is_string() && value_.get<std::string>() == choice) {
+                return choice;
+            }
+            right += (right.empty() ? "'" : ", '") + std::string(choice) + "'";
+        }
+        refuse(choices.size() > 1 ? "one of " + right : right);
+    }
+    [[nodiscard]] std::vector<double> numbers() const {
+        std::vector<double> values;
+        for (const JsonField& item : items()) {
+            values.push_back(item.number());
+        }
+        return values;
+    }
+    void require_object_or_null() const { require(value_.is_null() || value_.is_object(), "an object"); }
+    void require_object() const { require(value_.is_object(), "an object"); }
+    [[nodiscard]] const Json& value() const { return value_; }
+
+  private:
+    const Json& value_;
+    std::string path_;
+};
+
+/// N rows of d numbers, one after the other.
+[[nodiscard]] inline std::vector<double> matrix(const JsonField& field, std::size_t d, bool positive) {
+    std::vector<double> values;
+    for (const JsonField& row : field.items()) {
+        for (const JsonField& item : row.items()) {
+            values.push_back(positive ? item.positive() : item.number());
+        }
+        row.require_length(d, "one for each dimension");
+    }
+    return values;
+}
+
+inline void check_fit(const JsonField& fit, std::size_t wavelets) {
+    fit.only({"rung", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
+    (void)fit["rung"].words();
+    (void)fit["stop_reason"].words();
+    (void)fit["nrmse"].not_negative();
+    (void)fit["n_parameters"].count(0);
+    for (const JsonField& step : fit["path"].items()) {
+        step.only({"n_wavelets", "rmse", "criterion", "rung"});
+        (void)step["n_wavelets"].count(0);
+        (void)step["rmse"].not_negative();
+        (void)(step["criterion"].is_null() ? 0.0 : step["criterion"].number());
+        (void)step["rung"].words();
+    }
+    fit["n_wavelets"].require(fit["n_wavelets"].count(0) == wavelets,
+                              std::to_string(wavelets) + ", the wavelets of the network");
+}
+
+inline void check_data(const JsonField& data) {
+    data.only({"sha256", "files", "rows", "columns"});
+    (void)data["sha256"].words();
+    (void)data["rows"].count(0);
+    for (const JsonField& file : data["files"].items()) {
+        (void)file.words();
+    }
+    data["columns"].require_object();
+    for (const auto& column : data["columns"].value().items()) {
+        (void)data["columns"][column.key().c_str()].words();
+    }
+}
+
+inline Domain read_domain(const JsonField& file, std::size_t d) {
+    const JsonField domain = file["domain"].only({"lower", "upper"});
+    const JsonField beyond = file["continuation"].only({"below", "above", "period"});
+    const auto continuation = [](const JsonField& side) {
+        return side.one_of({"linear", "free"}) == "free" ? Continuation::Free : Continuation::Linear;
+    };
+    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), continuation(beyond["below"]),
+                continuation(beyond["above"]), std::nullopt};
+    domain["lower"].require_length(d, "one for each dimension");
+    domain["upper"].require_length(d, "one for each dimension");
+    for (std::size_t k = 0; k < d; ++k) {
+        domain["lower"].items()[k].require(read.lower[k] < read.upper[k],
+                                           "below domain.upper[" + std::to_string(k) + "]");
+    }
+    if (const JsonField period = beyond["period"]; !period.is_null()) {
+        const double travel = read.upper[0] - read.lower[0];
+        read.period = period.positive();
+        period.require(d == 1, "null in a model of several inputs");
+        period.require(std::abs(*read.period - travel) <= 1e-9 * travel, "domain.upper - domain.lower");
+    }
+    return read;
+}
+
+inline ForceModel read_network(const JsonField& file) {
+    const JsonField network =
+        file["network"].only({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
+                              "linear_hysteresis", "bias_hysteresis"});
+    NetworkParameters read;
+    read.dimension = network["dimension"].count(1);
+    const std::size_t d = read.dimension;
+    read.alpha = matrix(network["alpha"], d, true);
+    read.beta = matrix(network["beta"], d, false);
+    read.weight = network["weight"].numbers();
+    read.linear = network["linear"].numbers();
+    read.bias = network["bias"].number();
+    const std::size_t n = network["alpha"].items().size();
+    network["beta"].require_length(n, "one for each wavelet of alpha");
+    network["weight"].require_length(n, "one for each wavelet of alpha");
+    network["linear"].require_length(d, "one for each dimension");
+    const JsonField loss = network["weight_hysteresis"];
+    for (const char* name : {"linear_hysteresis", "bias_hysteresis"}) {
+        network[name].require(
+            network[name].is_null() == loss.is_null(),
+            loss.is_null() ? "null, because weight_hysteresis is" : "given, because weight_hysteresis is");
+    }
+    const std::string kind = file["kind"].one_of({"position", "hysteresis", "position_velocity", "general"});
+    file["kind"].require(kind != "hysteresis" || !loss.is_null(), "another kind: weight_hysteresis is null");
+    file["kind"].require(kind != "position" || loss.is_null(), "hysteresis: weight_hysteresis is given");
+    const JsonField radius = file["play_radius"];
+    const std::optional<double> play_radius =
+        radius.is_null() ? std::nullopt : std::optional{radius.positive()};
+    radius.require(radius.is_null() || !loss.is_null(), "null in a model without hysteresis");
+    network["dimension"].require(loss.is_null() || d == 1, "1 in a model with hysteresis");
+    const Domain domain = read_domain(file, d);
+    if (loss.is_null()) {
+        return {read, domain};
+    }
+    const std::vector<double> linear = network["linear_hysteresis"].numbers();
+    loss.require(loss.value().is_array(), "a list");
+    loss.require_length(n, "one for each wavelet of alpha");
+    network["linear_hysteresis"].require_length(d, "one for each dimension");
+    return {read, {loss.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
+}
+
+}  // namespace detail
+
+/// The model in the text of a model file. Throws std::invalid_argument: field path, value, what would be right.
+[[nodiscard]] inline ModelFile parse_model(const nlohmann::json& content) {
+    const detail::JsonField file{content, ""};
+    file.require_object();
+    // A file of another version may differ in every other field.
+    const detail::JsonField version = file["version"];
+    version.require(version.value().is_number_integer() && version.number() == 1.0,
+                    "1, the version that this palpate reads");
+    file.only({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
+               "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate",
+               "notes"});
+    (void)file["format"].one_of({"palpate-model"});
+    (void)file["created_by"].words();
+    const detail::JsonField units = file["units"].only({"position", "force"});
+    ModelFile read{detail::read_network(file),
+                   file["kind"].words(),
+                   units["position"].one_of({"rad", "m", "count", ""}),
+                   units["force"].one_of({"N*m", "N", "A", ""}),
+                   {},
+                   ""};
+    for (const detail::JsonField& input : file["inputs"].items()) {
+        read.inputs.push_back(input.words());
+    }
+    file["inputs"].require_length(read.model.parameters().dimension, "one for each dimension");
+    for (const char* name : {"mass", "damping"}) {
+        (void)(file[name].is_null() ? 0.0 : file[name].not_negative());
+    }
+    if (const detail::JsonField bounds = file["slope_bounds"]; !bounds.is_null()) {
+        bounds.only({"min", "max"});
+        bounds["min"].require(bounds["min"].number() <= bounds["max"].number(), "at most slope_bounds.max");
+    }
+    detail::check_data(file["data"]);
+    read.data_sha256 = file["data"]["sha256"].words();
+    detail::check_fit(file["fit"], read.model.parameters().weight.size());
+    for (const char* name : {"plan", "certificate"}) {
+        file[name].require_object_or_null();
+    }
+    if (content.contains("notes")) {
+        file["notes"].require_object();
+    }
+    return read;
+}
+
+/// Reads a model file. Throws std::invalid_argument: one sentence that begins with the file's name.
+[[nodiscard]] inline ModelFile load_model_file(const std::string& path) {
+    std::ifstream stream{path};
+    if (!stream || std::filesystem::is_directory(path)) {
+        throw std::invalid_argument(path + ": there is no such file, or it cannot be read");
+    }
+    nlohmann::json content;
+    try {
+        content = nlohmann::json::parse(stream);
+    } catch (const nlohmann::json::exception& error) {
+        const std::string reason = error.what();
+        throw std::invalid_argument(path + ": this is not JSON: " + reason.substr(reason.find("] ") + 2));
+    }
+    try {
+        return parse_model(content);
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(path + ": " + error.what());
+    }
+}
+
+}  // namespace palpate

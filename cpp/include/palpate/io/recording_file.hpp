@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "palpate/io/growing_file.hpp"
+#include "palpate/io/tick_record.hpp"
+
+namespace palpate {
+
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+
+/// A flight record: a CSV recording like any other, with `#` lines of metadata, a header of names that end in
+/// a unit, and one row a tick. How the run ended and how punctual it was is known at the end only, but stands
+/// at the top: room for it is kept there.
+class RecordingFile {
+  public:
+    /// Opens NAME.part and writes its head; gives the reason where that is not possible.
+    [[nodiscard]] std::string open(const std::string& name, RecordUnits units, const Metadata& metadata) {
+        units_ = std::move(units);
+        if (std::string reason = file_.open(name); !reason.empty()) {
+            return reason;
+        }
+        std::string head;
+        for (const auto& [key, value] : metadata) {
+            head += line(key, value);
+        }
+        head +=
+            line("palpate-columns", R"({"time": "time_s", "position": "position)" + suffix(units_.position) +
+                                        R"(", "force": "force)" + suffix(units_.force) + R"("})");
+        ending_at_ = static_cast<off_t>(head.size());
+        head += padded(line("ended", "not yet: the recording was cut off, or is still growing"));
+        timing_at_ = static_cast<off_t>(head.size());
+        head += padded(line("timing", "not known"));
+        head += column_names(units_) + "\n";
+        if (file_.append(head) < head.size()) {
+            const int error = file_.error();
+            file_.discard();
+            return name + " cannot be written: " + std::generic_category().message(error);
+        }
+        return "";
+    }
+
+    /// Appends one row a tick. From one thread at a time.
+    void take(std::span<const TickRecord> ticks) noexcept {
+        rows_.clear();
+        for (const TickRecord& tick : ticks) {
+            append_row(rows_, tick);
+        }
+        const std::size_t kept = file_.append(rows_);
+        const auto whole = static_cast<std::uint64_t>(
+            std::count(rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(kept), '\n'));
+        written_ += whole;
+        refused_ += ticks.size() - whole;
+    }
+
+    /// Writes how it ended, and gives the file its name. Returns 0 or an errno.
+    [[nodiscard]] int finish(const std::string& ending, const std::string& timing) {
+        file_.overwrite(ending_at_, padded(line("ended", ending)));
+        file_.overwrite(timing_at_, padded(line("timing", timing)));
+        return file_.finish();
+    }
+
+    [[nodiscard]] const GrowingFile& file() const noexcept { return file_; }
+    /// errno of the write after which nothing was written; 0 while all is well. From any thread.
+    [[nodiscard]] int error() const noexcept { return file_.error(); }
+    [[nodiscard]] bool is_open() const noexcept { return file_.is_open(); }
+    [[nodiscard]] std::uint64_t written() const noexcept { return written_; }
+    /// Rows that the disk did not take.
+    [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+
+  private:
+    static constexpr std::size_t room = 512;  ///< for each line that is written at the end
+
+    [[nodiscard]] static std::string suffix(const std::string& unit) {
+        return unit.empty() ? "" : "_" + unit;
+    }
+
+    [[nodiscard]] static std::string line(const std::string& key, std::string value) {
+        for (char& letter : value) {
+            letter = letter == '\n' || letter == '\r' ? ' ' : letter;
+        }
+        return "# " + key + ": " + value + "\n";
+    }
+
+    [[nodiscard]] static std::string padded(std::string whole) {
+        whole.resize(room, ' ');
+        whole[room - 1] = '\n';
+        if (const std::size_t end = whole.find('\n'); end < room - 1) {
+            whole[end] = ' ';
+        }
+        return whole;
+    }
+
+    RecordUnits units_;
+    GrowingFile file_;
+    std::string rows_;
+    off_t ending_at_ = 0;
+    off_t timing_at_ = 0;
+    std::uint64_t written_ = 0;
+    std::uint64_t refused_ = 0;
+};
+
+}  // namespace palpate

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/mman.h>
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <string>
+#include <system_error>
+#include <vector>
+
+namespace palpate {
+
+/// What a thread asks of the operating system to be on time. What is refused costs punctuality, not
+/// correctness: it is said in a sentence, and the loop runs all the same.
+struct RealTimeOptions {
+    int priority = 80;  ///< of SCHED_FIFO, 1 to 99; 0 = ordinary scheduling
+    int cpu = -1;       ///< the core to stay on; -1 = the last one allowed, -2 = none in particular
+};
+
+/// Memory that is never swapped out while this lives.
+class LockedMemory {
+  public:
+    LockedMemory() noexcept : error_{mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno} {}
+    ~LockedMemory() {
+        if (error_ == 0) {
+            munlockall();
+        }
+    }
+    LockedMemory(const LockedMemory&) = delete;
+    LockedMemory& operator=(const LockedMemory&) = delete;
+
+    /// 0, or why the memory is not locked.
+    [[nodiscard]] int error() const noexcept { return error_; }
+
+  private:
+    int error_;
+};
+
+namespace detail {
+
+[[nodiscard]] inline int last_allowed_cpu() noexcept {
+    cpu_set_t allowed;
+    CPU_ZERO(&allowed);
+    sched_getaffinity(0, sizeof allowed, &allowed);
+    int last = 0;
+    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+        last = CPU_ISSET(cpu, &allowed) ? cpu : last;
+    }
+    return last;
+}
+
+/// Touches the stack that a loop may use, so that no page of it is missing later.
+inline void touch_stack() noexcept {
+    constexpr std::size_t bytes = 65'536;
+    std::array<volatile char, bytes> page{};
+    for (std::size_t k = 0; k < page.size(); k += 1024) {
+        page[k] = 1;
+    }
+}
+
+}  // namespace detail
+
+/// Makes the calling thread a real-time one: no signals but its own mistakes, one core, first-in-first-out scheduling, a stack that
+/// is there. Returns a sentence for each thing that was refused.
+[[nodiscard]] inline std::vector<std::string> become_real_time(const RealTimeOptions& options,
+                                                               const LockedMemory& memory) {
+    std::vector<std::string> refused;
+    sigset_t others;
+    sigfillset(&others);
+    for (const int own : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGSYS}) {
+        sigdelset(&others, own);
+    }
+    pthread_sigmask(SIG_SETMASK, &others, nullptr);
+    if (memory.error() != 0) {
+        refused.push_back(std::string("memory is not locked (") +
+                          std::generic_category().message(memory.error()) +
+                          "): swapping can delay a tick; raise the limit with ulimit -l");
+    }
+    if (options.cpu != -2) {
+        const int cpu = options.cpu == -1 ? detail::last_allowed_cpu() : options.cpu;
+        cpu_set_t one;
+        CPU_ZERO(&one);
+        CPU_SET(static_cast<unsigned>(cpu), &one);
+        if (const int error = pthread_setaffinity_np(pthread_self(), sizeof one, &one); error != 0) {
+            refused.push_back("the loop is not kept on core " + std::to_string(cpu) + " (" +
+                              std::generic_category().message(error) + ")");
+        }
+    }
+    if (options.priority > 0) {
+        const sched_param priority{options.priority};
+        if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority); error != 0) {
+            refused.push_back(std::string("no real-time priority (") +
+                              std::generic_category().message(error) +
+                              "): other programs can delay a tick; allow it with an rtprio line in "
+                              "/etc/security/limits.conf");
+        }
+    }
+    detail::touch_stack();
+    return refused;
+}
+
+}  // namespace palpate

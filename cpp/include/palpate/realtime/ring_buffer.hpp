@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <bit>
+#include <cstddef>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace palpate {
+
+/// A queue between two threads, one that writes and one that reads. Neither ever waits for the other: both
+/// calls end after a fixed number of steps, whatever the other thread does. A full queue refuses.
+template <class T>
+    requires std::is_trivially_copyable_v<T>
+// NOLINTNEXTLINE(clang-analyzer-optin.performance.Padding): the padding keeps two cores off one cache line
+class RingBuffer {
+  public:
+    /// Room for at least `capacity` elements; all memory is taken here.
+    explicit RingBuffer(std::size_t capacity) : slots_(std::bit_ceil(capacity)), mask_{slots_.size() - 1} {}
+
+    /// By the writing thread. False: full, and nothing was written.
+    [[nodiscard]] bool push(const T& value) noexcept {
+        const std::size_t head = head_.load(std::memory_order_relaxed);
+        if (head - tail_.load(std::memory_order_acquire) == slots_.size()) {
+            return false;
+        }
+        slots_[head & mask_] = value;
+        head_.store(head + 1, std::memory_order_release);
+        return true;
+    }
+
+    /// By the reading thread: takes as many elements as there are and `out` holds, oldest first.
+    [[nodiscard]] std::size_t pop(std::span<T> out) noexcept {
+        const std::size_t tail = tail_.load(std::memory_order_relaxed);
+        const std::size_t there = head_.load(std::memory_order_acquire) - tail;
+        const std::size_t count = there < out.size() ? there : out.size();
+        for (std::size_t k = 0; k < count; ++k) {
+            out[k] = slots_[(tail + k) & mask_];
+        }
+        tail_.store(tail + count, std::memory_order_release);
+        return count;
+    }
+
+    [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
+
+  private:
+    static constexpr std::size_t cache_line = 64;  ///< what two cores must not write to at once
+
+    std::vector<T> slots_;
+    std::size_t mask_;
+    alignas(cache_line) std::atomic<std::size_t> head_{0};  ///< elements ever written
+    alignas(cache_line) std::atomic<std::size_t> tail_{0};  ///< elements ever read
+};
+
+}  // namespace palpate

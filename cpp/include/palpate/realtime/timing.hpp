@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "palpate/realtime/periodic.hpp"
+
+namespace palpate {
+
+/// A histogram of durations of fixed size: exact to 1/256 of the value from 0 ns to 18 minutes, no allocation.
+/// Each power of two is cut into 128 equal cells; below 256 ns each nanosecond has its own.
+class DurationHistogram {
+  public:
+    void add(Nanoseconds duration) noexcept {
+        const auto value = static_cast<std::uint64_t>(std::clamp<Nanoseconds>(duration, 0, longest));
+        ++cells_[cell_of(value)];
+        ++count_;
+        largest_ = std::max(largest_, static_cast<Nanoseconds>(value));
+    }
+
+    /// The duration that a share of all do not exceed [ns]: the middle of its cell, the exact one at share 1.
+    [[nodiscard]] double quantile(double share) const noexcept {
+        const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
+        if (wanted >= count_) {
+            return static_cast<double>(largest_);
+        }
+        std::uint64_t seen = 0;
+        for (std::size_t cell = 0; cell < cells; ++cell) {
+            seen += cells_[cell];
+            if (seen >= std::max<std::uint64_t>(wanted, 1)) {
+                return std::min(middle_of(cell), static_cast<double>(largest_));
+            }
+        }
+        return static_cast<double>(largest_);
+    }
+
+    [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+    [[nodiscard]] Nanoseconds largest() const noexcept { return largest_; }
+
+  private:
+    static constexpr unsigned bits = 7;
+    static constexpr std::size_t in_octave = std::size_t{1} << bits;
+    static constexpr unsigned octaves = 40 - bits;
+    static constexpr std::size_t cells = in_octave * (octaves + 1);
+    static constexpr Nanoseconds longest = 1'099'511'627'775;  ///< 2^40 - 1
+
+    [[nodiscard]] static std::size_t cell_of(std::uint64_t value) noexcept {
+        const auto width = static_cast<unsigned>(std::bit_width(value));
+        const unsigned shift = width > bits + 1 ? width - bits - 1 : 0;
+        return static_cast<std::size_t>(shift) * in_octave + static_cast<std::size_t>(value >> shift);
+    }
+
+    [[nodiscard]] static double middle_of(std::size_t cell) noexcept {
+        const std::size_t shift = cell < 2 * in_octave ? 0 : cell / in_octave - 1;
+        const auto low = static_cast<double>((cell - shift * in_octave) << shift);
+        return low + 0.5 * (static_cast<double>(std::uint64_t{1} << shift) - 1.0);
+    }
+
+    std::array<std::uint64_t, cells> cells_{};
+    std::uint64_t count_ = 0;
+    Nanoseconds largest_ = 0;
+};
+
+/// How punctual a loop was.
+struct LoopTiming {
+    DurationHistogram period;    ///< from wake-up to wake-up
+    DurationHistogram lateness;  ///< from deadline to wake-up
+    std::uint64_t missed = 0;    ///< deadlines that had no tick of their own
+    Nanoseconds first = 0;       ///< first and last wake-up
+    Nanoseconds last = 0;
+
+    void add(const Wake& wake) noexcept {
+        if (lateness.count() == 0) {
+            first = wake.now;
+        } else {
+            period.add(wake.now - last);
+        }
+        last = wake.now;
+        lateness.add(wake.now - wake.deadline);
+        missed += wake.skipped;
+    }
+
+    [[nodiscard]] std::uint64_t ticks() const noexcept { return lateness.count(); }
+    /// Ticks a second over the whole run.
+    [[nodiscard]] double rate_hz() const noexcept {
+        return last > first ? static_cast<double>(ticks() - 1) * 1e9 / static_cast<double>(last - first)
+                            : 0.0;
+    }
+};
+
+/// The rate over each half second, as it happens: whoever watches knows of a shortfall within a second.
+class RateCheck {
+  public:
+    explicit RateCheck(Nanoseconds window = nanoseconds_a_second / 2) noexcept : window_{window} {}
+
+    /// True when a window has just ended; its rate is then in `rate_hz`.
+    [[nodiscard]] bool add(Nanoseconds now) noexcept {
+        if (start_ == 0) {
+            start_ = now;
+            return false;
+        }
+        ++ticks_;
+        if (now - start_ < window_) {
+            return false;
+        }
+        rate_hz_.store(static_cast<double>(ticks_) * 1e9 / static_cast<double>(now - start_),
+                       std::memory_order_relaxed);
+        start_ = now;
+        ticks_ = 0;
+        return true;
+    }
+
+    /// Of the last window [Hz]; 0 before the first has ended. From any thread.
+    [[nodiscard]] double rate_hz() const noexcept { return rate_hz_.load(std::memory_order_relaxed); }
+
+  private:
+    Nanoseconds window_;
+    Nanoseconds start_ = 0;
+    std::uint64_t ticks_ = 0;
+    std::atomic<double> rate_hz_{0.0};
+};
+
+}  // namespace palpate

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <charconv>
+#include <cstddef>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "palpate/bench.hpp"
+#include "palpate/guard/guard_settings.hpp"
+#include "palpate/io/recording_file.hpp"
+#include "palpate/loop.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/session.hpp"
+
+namespace palpate {
+
+/// A number as a person reads it: four significant digits.
+[[nodiscard]] inline std::string readable(double value) {
+    std::array<char, 32> digits{};
+    const auto end =
+        std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::general, 4).ptr;
+    return {digits.data(), end};
+}
+
+/// "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us"
+[[nodiscard]] inline std::string percentiles(const DurationHistogram& histogram) {
+    std::string text;
+    for (const auto& [name, share] :
+         {std::pair{"p50 ", 0.5}, {"p99 ", 0.99}, {"p99.9 ", 0.999}, {"max ", 1.0}}) {
+        text += (text.empty() ? "" : ", ") + std::string(name) + readable(1e-3 * histogram.quantile(share)) +
+                " us";
+    }
+    return text;
+}
+
+/// How punctual a loop was, in one line.
+[[nodiscard]] inline std::string timing_text(const LoopTiming& timing, double wanted_hz) {
+    return readable(timing.rate_hz()) + " Hz of " + readable(wanted_hz) + " Hz over " +
+           std::to_string(timing.ticks()) + " ticks; period " + percentiles(timing.period) + "; late by " +
+           percentiles(timing.lateness) + "; missed deadlines " + std::to_string(timing.missed) +
+           "; longest gap " + readable(1e-3 * static_cast<double>(timing.period.largest())) + " us";
+}
+
+/// Why a loop ended, as a sentence.
+[[nodiscard]] inline std::string ending_text(const LoopReport& report, const LoopSettings& settings) {
+    const StatusText& status = text(report.status);
+    switch (report.ending) {
+        case Ending::TimeUp:
+            return "ran its time";
+        case Ending::Asked:
+            return "stopped because it was asked to";
+        case Ending::Guard:
+            return std::string("stopped by a guard: ") + status.word + ", " + status.meaning;
+        case Ending::DeviceFault:
+            return std::string("stopped by a fault of the device: ") + status.word + ", " + status.meaning;
+        case Ending::RateTooLow:
+            break;
+    }
+    return "stopped because the loop did not hold its rate: less than " +
+           readable(settings.lowest_rate_share * settings.rate_hz) + " Hz of " + readable(settings.rate_hz) +
+           " Hz for half a second";
+}
+
+/// "massless, compensated, K_c = 100, B_c = 0.02"
+[[nodiscard]] inline std::string describe(const Scheme& scheme) {
+    std::string text{structure_names[static_cast<std::size_t>(scheme.structure)]};
+    text += scheme.compensated ? ", compensated" : "";
+    if (scheme.structure != StructureKind::Direct) {
+        text +=
+            ", K_c = " + readable(scheme.coupling.stiffness) + ", B_c = " + readable(scheme.coupling.damping);
+    }
+    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+        text += ", m = " + readable(scheme.inertia.mass) + ", B_o = " + readable(scheme.inertia.damping);
+    }
+    if (scheme.play_radius > 0.0) {
+        text += ", r = " + readable(scheme.play_radius);
+    }
+    return text;
+}
+
+/// The head of a flight record from a simulated device.
+[[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const std::string& model,
+                                              const Scheme& scheme, const Bench& bench,
+                                              const GuardSettings& guards, double rate_hz) {
+    return {
+        {"created_by", created_by},
+        {"simulated", "yes: device and hand; nothing here was measured"},
+        {"model", model},
+        {"structure", describe(scheme)},
+        {"device", bench.device.id},
+        {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
+                     ", to a point between " + readable(bench.hand.lower) + " and " +
+                     readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"},
+        {"guards", "force limit " + readable(guards.force_limit) + ", slew from nothing to the limit in " +
+                       readable(guards.slew_s) + " s, ramp " + readable(guards.ramp_s) + " s"},
+        {"rate_hz", readable(rate_hz)}};
+}
+
+/// Writes how it ended into the recording and gives the file its name; `name` becomes the one that it has. Returns
+/// a sentence for everything that is not as it was asked for.
+[[nodiscard]] inline std::vector<std::string> finish_record(RecordingFile& file, const SessionReport& report,
+                                                            const LoopSettings& settings, std::string& name) {
+    std::vector<std::string> warnings;
+    const int disk = file.error();
+    std::string ending = ending_text(report.loop, settings) + "; zero force sent, device closed";
+    if (disk != 0) {
+        ending +=
+            std::string("; incomplete, the disk took no more: ") + std::generic_category().message(disk);
+        warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +
+                           std::to_string(file.refused()) + " rows are missing at its end");
+    }
+    const std::string timing = timing_text(report.loop.timing, settings.rate_hz) + "; lost records " +
+                               std::to_string(report.lost_records);
+    if (const int error = file.finish(ending, timing); error != 0) {
+        name += ".part";
+        warnings.push_back("the recording keeps its name " + name + ": " +
+                           std::generic_category().message(error));
+    }
+    return warnings;
+}
+
+/// The last ticks before a fault as a recording of their own, beside the whole one: NAME.fault.csv. Returns what
+/// is to be told of it.
+[[nodiscard]] inline std::string write_last_ticks(const std::string& record, const RecordUnits& units,
+                                                  const Metadata& metadata, const SessionReport& report,
+                                                  const LoopSettings& settings) {
+    const std::size_t stem = record.size() - (record.ends_with(".csv") ? 4 : 0);
+    std::string name = record.substr(0, stem) + ".fault.csv";
+    RecordingFile file;
+    if (const std::string reason = file.open(name, units, metadata); !reason.empty()) {
+        return "the last ticks could not be written: " + reason;
+    }
+    file.take(report.last_ticks);
+    const std::vector<std::string> warnings = finish_record(file, report, settings, name);
+    return warnings.empty() ? "the last " + std::to_string(report.last_ticks.size()) + " ticks are in " + name
+                            : warnings.front();
+}
+
+}  // namespace palpate

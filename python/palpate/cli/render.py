@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate render: a model rendered live, by the loop of palpate-control."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .arguments import PATH, json_option
+from .ending import WorkError
+from .output import number, print_json, print_numbers, require_writable, talk
+from .scheme_options import scheme_options
+from .verb import Verb
+
+
+@click.command(
+    cls=Verb,
+    no_args_is_help=True,
+    epilog="Example: palpate render press.json --duration-s 10 --record felt.csv",
+)
+@click.argument("model_file", metavar="MODEL.json", type=PATH)
+@click.option("--rate-hz", type=float, default=1000.0, help="Ticks a second.")
+@click.option("--duration-s", type=float, default=10.0, help="How long; inf: until Ctrl-C.")
+@click.option(
+    "--record",
+    type=PATH,
+    metavar="OUT.csv",
+    default=None,
+    help="Write every tick to this recording; it grows as OUT.csv.part.",
+)
+@click.option(
+    "--telemetry-port",
+    type=click.IntRange(1, 65535),
+    default=None,
+    help="Send JSON lines over UDP to this port of this machine (PlotJuggler: 9870).",
+)
+@click.option("--telemetry-hz", type=click.FloatRange(0.1, 10000), default=50.0, help="Lines a second.")
+@json_option
+@scheme_options
+def render(
+    model_file: Path,
+    rate_hz: float,
+    duration_s: float,
+    record: Path | None,
+    telemetry_port: int | None,
+    telemetry_hz: float,
+    as_json: bool,
+    **scheme: Any,
+) -> None:
+    """Render a model live on a simulated device, tick by tick.
+
+    The loop is that of palpate-control, with real-time priority where the system allows it. Ctrl-C ends it in
+    an orderly way: zero force first, then the recording is closed, then the summary is printed.
+    """
+    from .._core import render as render_live
+    from ..model import load_model
+    from ..planning import Plan, bench_for
+
+    if record is not None:
+        require_writable(record, inputs=(model_file,))
+    model = load_model(model_file)
+    bench = bench_for(model)
+    plan = Plan(model, bench.scheme(model, **scheme))
+    talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated: nothing moves")
+    # A request to terminate is as orderly an end as Ctrl-C.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        summary = render_live(
+            model,
+            plan.scheme,
+            position_unit=model.units["position"],
+            force_unit=model.units["force"],
+            rate_hz=rate_hz,
+            duration_s=duration_s,
+            record="" if record is None else str(record),
+            model_name=str(model_file),
+            telemetry_port=telemetry_port,
+            telemetry_hz=telemetry_hz,
+        )
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    for note in summary["notes"]:
+        talk(f"  {note}")
+    if not summary["orderly"]:
+        raise WorkError(f"{summary['ended']}; zero force sent, device closed")
+    if as_json:
+        print_json(summary)
+        return
+    rows = {
+        "ended": summary["ended"],
+        "rate": f"{number(summary['rate_hz'])} Hz of {number(rate_hz)} Hz, "
+        f"{summary['missed_deadlines']} deadlines missed",
+        "period": _percentiles(summary["period"]),
+        "late by": _percentiles(summary["lateness"]),
+        "ticks": ", ".join(f"{count} {word}" for word, count in summary["ticks_by_status"].items()),
+    }
+    if record is not None:
+        rows["recorded"] = f"{summary['record']}: {summary['recorded']} rows, {summary['lost_records']} lost"
+    print_numbers(rows)
+
+
+def _percentiles(durations: dict[str, float]) -> str:
+    names = {"p50_us": "p50", "p99_us": "p99", "p999_us": "p99.9", "max_us": "max"}
+    return ", ".join(f"{name} {number(durations[key])} us" for key, name in names.items())

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a model is rendered, as options that `simulate` and `render` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import click
+
+from .._core import Scheme, structure_names
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_DEFAULT = Scheme()
+
+
+def scheme_options(command: F) -> F:
+    """Give a verb the fields of `Scheme`; what is not given is None and follows the model."""
+    described: Any = command
+    for option in reversed(
+        (
+            click.option(
+                "--structure",
+                type=click.Choice(structure_names),
+                default=_DEFAULT.structure,
+                help="How the force is computed.",
+            ),
+            click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model."),
+            click.option(
+                "--coupling-stiffness",
+                type=float,
+                show_default=f"{_DEFAULT.coupling_stiffness:g} N*m/rad, scaled to the model",
+                help="K_c, in force per position of the model's units.",
+            ),
+            click.option(
+                "--coupling-damping",
+                type=float,
+                show_default=f"{_DEFAULT.coupling_damping:g} N*m*s/rad, scaled",
+                help="B_c, in force per velocity.",
+            ),
+            click.option(
+                "--mass",
+                type=float,
+                show_default=f"{_DEFAULT.mass:g} kg*m^2, scaled",
+                help="m of implicit and explicit, in force per acceleration.",
+            ),
+            click.option(
+                "--damping",
+                type=float,
+                show_default=f"{_DEFAULT.damping:g} N*m*s/rad, scaled",
+                help="B_o of implicit and explicit, in force per velocity.",
+            ),
+            click.option(
+                "--play-radius",
+                type=float,
+                show_default="the model's, or 1 % of its travel",
+                help="r of a model with hysteresis, in its position unit.",
+            ),
+        )
+    ):
+        described = option(described)
+    return cast(F, described)

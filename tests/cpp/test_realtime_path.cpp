@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inside the loop nothing allocates, locks, throws or calls the system, but for the clock: enforced from outside.
+//
+// Allocations, locks and exceptions are counted by functions of this program that stand before those of the
+// libraries. System calls are forbidden to the loop's thread by a filter of the kernel, whose SIGSYS tells the
+// number of the call. Each watchdog is shown to bark.
+#include <dlfcn.h>
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <pthread.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/device/simulated.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/session.hpp"
+#include "support.hpp"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PALPATE_SANITIZED 1
+#else
+#define PALPATE_SANITIZED 0
+#endif
+
+namespace {
+
+/// Set in the loop's thread while it ticks.
+thread_local bool watched = false;
+
+std::atomic<int> allocations{0};
+std::atomic<int> locks{0};
+std::atomic<int> exceptions{0};
+
+void count_if_watched(std::atomic<int>& counter) {
+    if (watched) {
+        counter.fetch_add(1, std::memory_order_relaxed);
+    }
+}
+
+}  // namespace
+
+#if !PALPATE_SANITIZED
+extern "C" {
+
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void __libc_free(void* memory);
+
+void* malloc(std::size_t size) {
+    count_if_watched(allocations);
+    return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+    count_if_watched(allocations);
+    return __libc_calloc(count, size);
+}
+void* realloc(void* old, std::size_t size) {
+    count_if_watched(allocations);
+    return __libc_realloc(old, size);
+}
+void free(void* memory) {
+    if (memory != nullptr) {
+        count_if_watched(allocations);
+    }
+    __libc_free(memory);
+}
+
+int pthread_mutex_lock(pthread_mutex_t* mutex) noexcept {
+    using Lock = int (*)(pthread_mutex_t*);
+    static const auto lock = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+    count_if_watched(locks);
+    return lock(mutex);
+}
+
+void* __cxa_allocate_exception(std::size_t size) noexcept {
+    using Allocate = void* (*)(std::size_t);
+    static const auto allocate = reinterpret_cast<Allocate>(dlsym(RTLD_NEXT, "__cxa_allocate_exception"));
+    count_if_watched(exceptions);
+    return allocate(size);
+}
+
+}  // extern "C"
+#endif
+
+namespace palpate {
+namespace {
+
+std::mutex a_mutex;
+std::atomic<void*> somewhere{nullptr};
+
+/// A simulated device that does one thing that it must not, in its fifth exchange.
+template <class Sin>
+class Sinful {
+  public:
+    explicit Sinful(Sin sin) : sin_{sin} {}
+    Opened open() { return device_.open(); }
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        if (++exchanges_ == 5) {
+            sin_();
+        }
+        return device_.exchange(command);
+    }
+    void close() noexcept { device_.close(); }
+
+  private:
+    SimulatedDevice device_{DeviceProfile{}};
+    Sin sin_;
+    int exchanges_ = 0;
+};
+
+constexpr auto nothing = [] {};
+constexpr auto allocates = [] {
+    void* memory = std::malloc(16);
+    somewhere = memory;
+    std::free(memory);
+};
+constexpr auto locks_a_mutex = [] { const std::lock_guard guard{a_mutex}; };
+constexpr auto throws = [] {
+    try {
+        throw std::runtime_error{"caught at once"};
+    } catch (const std::runtime_error&) {
+    }
+};
+constexpr auto calls_the_system = [] { (void)syscall(SYS_getppid); };
+
+/// Hands each record on to the real sinks, and lets the watch begin with the first tick.
+template <class Recorder>
+struct WatchedSink {
+    Recorder& recorder;
+    LastRecords<TickRecord>& last;
+    void push(const TickRecord& record) noexcept {
+        recorder.push(record);
+        last.push(record);
+    }
+};
+
+struct Counts {
+    int allocations = 0;
+    int locks = 0;
+    int exceptions = 0;
+    std::uint64_t ticks = 0;
+};
+
+ForceModel model() {
+    test::Random random{7};
+    return {test::random_network(random, 16), test::unit_domain()};
+}
+
+ForceModel hysteresis_model() {
+    test::Random random{7};
+    const NetworkParameters network = test::random_network(random, 16);
+    return {network, {std::vector<double>(16, 0.0), 0.0, 0.1}, test::unit_domain(), 0.01};
+}
+
+/// The real loop at 10 kHz with its real recorder behind it; `before` runs in the loop's thread before it begins,
+/// `after` in that thread when it is over.
+template <class Sin, class Before, class After>
+Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Before before, After after) {
+    Scheme scheme;
+    scheme.structure = kind;
+    LoopSettings settings;
+    settings.rate_hz = 10'000.0;
+    settings.duration_s = 0.1;
+    settings.lowest_rate_share = 0.0;
+    Counts counts;
+    with_structure(rendered, scheme, 1.0 / settings.rate_hz, [&](auto structure) {
+        Sinful<Sin> device{sin};
+        EXPECT_TRUE(device.open());
+        Controller controller{device, std::move(structure), Guards{}};
+        Outlets outlets;
+        using Recorder = FlightRecorder<TickRecord, Outlets>;
+        Recorder recorder{outlets, 4096, std::chrono::milliseconds{5}};
+        LastRecords<TickRecord> last{100};
+        LoopProgress progress;
+        const auto report = std::make_unique<LoopReport>();
+        const std::atomic<bool> asked{false};
+        std::atomic<bool> over{false};
+        std::thread loop{[&] {
+            Periodic clock{100'000};
+            WatchedSink<Recorder> sink{recorder, last};
+            allocations = locks = exceptions = 0;
+            before();
+            watched = true;
+            run_loop(controller, settings, clock, asked, sink, progress, *report);
+            watched = false;
+            over.store(true);
+            after();
+        }};
+        while (!over.load()) {
+            std::this_thread::sleep_for(std::chrono::milliseconds{1});
+        }
+        counts = {allocations, locks, exceptions, report->timing.ticks()};
+        if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
+            loop.join();
+        } else {
+            _exit(counts.ticks > 0 ? 0 : 1);  // the filtered thread cannot even end
+        }
+    });
+    return counts;
+}
+
+template <class Sin>
+Counts counted(Sin sin, StructureKind kind = StructureKind::Massless) {
+    return run_watched(model(), kind, sin, nothing, nothing);
+}
+
+#define SKIP_UNDER_SANITIZERS()                                     \
+    if (PALPATE_SANITIZED) {                                        \
+        GTEST_SKIP() << "the sanitizer itself allocates and calls"; \
+    }
+
+TEST(RealTimePath, AllocatesLocksAndThrowsNothingInAnyStructure) {
+    SKIP_UNDER_SANITIZERS();
+    for (const ForceModel& rendered : {model(), hysteresis_model()}) {
+        for (int kind = 0; kind < 4; ++kind) {
+            const Counts counts =
+                run_watched(rendered, static_cast<StructureKind>(kind), nothing, nothing, nothing);
+            EXPECT_GT(counts.ticks, 0U);
+            EXPECT_EQ(counts.allocations, 0) << structure_names[static_cast<std::size_t>(kind)];
+            EXPECT_EQ(counts.locks, 0) << structure_names[static_cast<std::size_t>(kind)];
+            EXPECT_EQ(counts.exceptions, 0) << structure_names[static_cast<std::size_t>(kind)];
+        }
+    }
+}
+
+TEST(RealTimePath, TheWatchdogsBark) {
+    SKIP_UNDER_SANITIZERS();
+    EXPECT_EQ(counted(allocates).allocations, 2);
+    EXPECT_EQ(counted(locks_a_mutex).locks, 1);
+    EXPECT_GE(counted(throws).exceptions, 1);
+}
+
+/// Where a filtered child leaves the number of the call that it was killed for.
+int* shared_number() {
+    static auto* const number = static_cast<int*>(
+        mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+    return number;
+}
+
+void tell_and_die(int /*signal*/, siginfo_t* info, void* /*context*/) {
+    *shared_number() = info->si_syscall;
+    _exit(99);
+}
+
+/// From now on this thread may sleep until a deadline, read the clock and end the process, nothing else.
+void forbid_system_calls() {
+    struct sigaction action{};
+    action.sa_sigaction = tell_and_die;
+    action.sa_flags = SA_SIGINFO;
+    sigaction(SIGSYS, &action, nullptr);
+    constexpr auto allow = [](unsigned number) {
+        return std::array<sock_filter, 2>{
+            {{BPF_JMP | BPF_JEQ | BPF_K, 0, 1, number}, {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW}}};
+    };
+    const auto sleep = allow(SYS_clock_nanosleep);
+    const auto clock = allow(SYS_clock_gettime);
+    const auto end = allow(SYS_exit_group);
+    std::array<sock_filter, 8> filter{{{BPF_LD | BPF_W | BPF_ABS, 0, 0, offsetof(seccomp_data, nr)},
+                                       sleep[0],
+                                       sleep[1],
+                                       clock[0],
+                                       clock[1],
+                                       end[0],
+                                       end[1],
+                                       {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_TRAP}}};
+    const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+    prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+    ASSERT_EQ(prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program), 0)
+        << "this kernel has no seccomp filters";
+}
+
+void sleep_for_ever() {
+    Periodic clock{1'000'000'000};
+    for (clock.start();;) {
+        (void)clock.wait();
+    }
+}
+
+/// The number of the system call that the loop was caught at; 0: it ran to its end.
+template <class Sin>
+int system_call_in_the_loop(Sin sin, StructureKind kind, const ForceModel& rendered) {
+    *shared_number() = 0;
+    const pid_t child = fork();
+    if (child == 0) {
+        (void)run_watched(rendered, kind, sin, forbid_system_calls, sleep_for_ever);
+        _exit(2);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 99))
+        << "the child ended with status " << status;
+    return WEXITSTATUS(status) == 99 ? *shared_number() : 0;
+}
+
+TEST(RealTimePath, CallsTheSystemForTheClockOnly) {
+    SKIP_UNDER_SANITIZERS();
+    for (const ForceModel& rendered : {model(), hysteresis_model()}) {
+        for (int kind = 0; kind < 4; ++kind) {
+            EXPECT_EQ(system_call_in_the_loop(nothing, static_cast<StructureKind>(kind), rendered), 0)
+                << "system call in the loop of " << structure_names[static_cast<std::size_t>(kind)];
+        }
+    }
+}
+
+TEST(RealTimePath, TheFilterCatchesASystemCallAndTellsWhich) {
+    SKIP_UNDER_SANITIZERS();
+    EXPECT_EQ(system_call_in_the_loop(calls_the_system, StructureKind::Massless, model()), SYS_getppid);
+}
+
+}  // namespace
+}  // namespace palpate

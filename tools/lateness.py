@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How late palpate-control wakes up, beside cyclictest on the same machine at the same priority.
+
+Blocks of both alternate, on an idle machine and with every core loaded, so that what the machine does
+meanwhile happens to both. Printed: the median over the blocks of each block's p99 and p99.9, and their ratio.
+
+python tools/lateness.py PALPATE-CONTROL MODEL.json OUT.json [--seconds 20] [--blocks 10]
+"""
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+PRIORITY = 80
+RATE_HZ = 1000
+LONGEST_NS = 1_000_000
+"""cyclictest counts wake-ups up to this lateness by the nanosecond."""
+
+
+def ours(program: Path, model: Path, seconds: float, cpu: int) -> dict[str, float]:
+    command = [program, model, "--json", "--duration-s", f"{seconds}", "--rate-hz", f"{RATE_HZ}"]
+    command += ["--priority", f"{PRIORITY}", "--cpu", f"{cpu}", "--lowest-rate-share", "0"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    summary = json.loads(answer.stdout)
+    if summary["without"]:
+        sys.exit(f"not comparable without privileges: {summary['without'][0]}")
+    return {"p99_us": summary["lateness"]["p99_us"], "p999_us": summary["lateness"]["p999_us"]}
+
+
+def theirs(seconds: float, cpu: int) -> dict[str, float]:
+    command = ["cyclictest", "-q", "-m", "-N", "-t", "1", "-a", f"{cpu}", "-p", f"{PRIORITY}"]
+    command += ["-i", f"{10**6 // RATE_HZ}", "-h", f"{LONGEST_NS}", "-l", f"{round(seconds * RATE_HZ)}"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    counts: list[tuple[int, int]] = []
+    beyond = 0
+    for line in answer.stdout.splitlines():
+        words = line.split()
+        if len(words) == 2 and words[0].isdigit() and int(words[1]) > 0:
+            counts.append((int(words[0]), int(words[1])))
+        if line.startswith("# Histogram Overflows:"):
+            beyond = int(words[-1])
+    counts.append((LONGEST_NS, beyond))
+    return {"p99_us": quantile(counts, 0.99), "p999_us": quantile(counts, 0.999)}
+
+
+def quantile(counts: list[tuple[int, int]], share: float) -> float:
+    """The lateness that a share of all wake-ups does not exceed [us]."""
+    wanted = share * sum(count for _, count in counts)
+    seen = 0
+    for lateness, count in counts:
+        seen += count
+        if seen >= wanted:
+            return 1e-3 * lateness
+    return 1e-3 * counts[-1][0]
+
+
+def load() -> list[subprocess.Popen[bytes]]:
+    """One busy process for every core."""
+    return [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in os.sched_getaffinity(0)]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", type=Path)
+    parser.add_argument("model", type=Path)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--seconds", type=float, default=20.0, help="length of a block")
+    parser.add_argument(
+        "--blocks", type=int, default=10, help="of each program, in each state of the machine"
+    )
+    given = parser.parse_args()
+    cpu = max(os.sched_getaffinity(0))
+    result: dict[str, object] = {"machine": platform.platform(), "priority": PRIORITY, "rate_hz": RATE_HZ}
+    result |= {"seconds": given.seconds, "blocks": given.blocks}
+    print(
+        f"{'':8}{'':8}{'palpate':>10}{'cyclictest':>12}{'ratio':>8}   (us, median of {given.blocks} blocks)"
+    )
+    for state in ("idle", "loaded"):
+        busy = load() if state == "loaded" else []
+        blocks: dict[str, list[dict[str, float]]] = {"palpate-control": [], "cyclictest": []}
+        try:
+            for _ in range(given.blocks):
+                blocks["palpate-control"].append(ours(given.program, given.model, given.seconds, cpu))
+                blocks["cyclictest"].append(theirs(given.seconds, cpu))
+        finally:
+            for process in busy:
+                process.kill()
+                process.wait()
+        result[state] = blocks
+        for key, name in (("p99_us", "p99"), ("p999_us", "p99.9")):
+            mine, other = (statistics.median(block[key] for block in blocks[who]) for who in blocks)
+            result[f"{state}_{name}_ratio"] = mine / other
+            print(f"{state:8}{name:8}{mine:10.2f}{other:12.2f}{mine / other:8.2f}")
+    given.output.parent.mkdir(parents=True, exist_ok=True)
+    given.output.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
