@@ -154,7 +154,7 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
     detail::require_size(copied(*linear_hysteresis), 1, "linear_hysteresis");
     return {network,
             {copied(*weight_hysteresis), linear_hysteresis->data()[0], *bias_hysteresis},
-            std::move(domain),
+            domain,
             play_radius};
 }
 

@@ -57,8 +57,8 @@ struct Frame {
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
         constexpr std::size_t block = 256;
-        std::array<double, block> square;
-        std::array<double, block> gaussian;
+        std::array<double, block> square{};
+        std::array<double, block> gaussian{};
         for (std::size_t first = 0; first < samples; first += block) {
             const std::size_t size = std::min(block, samples - first);
             for (std::size_t k = 0; k < size; ++k) {
