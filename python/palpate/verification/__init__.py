@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verify a model: on fresh recordings row by row, and in closed loop."""
+"""Verify a model: on fresh recordings row by row, in closed loop, and beside another model."""
 
+from .agreement import Stroke, compare
 from .closed_loop import ClosedLoop, force_driven, motion_driven
 from .verification import Verification, verify
 
-__all__ = ["ClosedLoop", "Verification", "force_driven", "motion_driven", "verify"]
+__all__ = ["ClosedLoop", "Stroke", "Verification", "compare", "force_driven", "motion_driven", "verify"]
