@@ -79,6 +79,12 @@ void require_inputs(const ForceModel& model, bool direction, bool play) {
 
 using Member = double EnvironmentSample::*;
 
+constexpr HatQuantity quantity_of(Member member) {
+    return member == &EnvironmentSample::force   ? HatQuantity::Value
+           : member == &EnvironmentSample::slope ? HatQuantity::Slope
+                                                 : HatQuantity::Integral;
+}
+
 template <Member member>
 double scalar(const ForceModel& model, double position, const py::object& /*velocity*/,
               const py::object& /*acceleration*/, std::optional<double> direction,
@@ -100,6 +106,11 @@ py::array_t<double> batch(const ForceModel& model, const Array& position, const 
     double* out = result.mutable_data();
     const py::ssize_t size = position.size();
     const py::gil_scoped_release unlocked;
+    if (const WaveletNetwork* network = model.network()) {
+        network->curve().at(quantity_of(member), {in, static_cast<std::size_t>(size)},
+                            {out, static_cast<std::size_t>(size)});
+        return result;
+    }
     for (py::ssize_t k = 0; k < size; ++k) {
         out[k] = sample(model, in[k], directions[k], plays[k]).*member;
     }
@@ -143,7 +154,7 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
     detail::require_size(copied(*linear_hysteresis), 1, "linear_hysteresis");
     return {network,
             {copied(*weight_hysteresis), linear_hysteresis->data()[0], *bias_hysteresis},
-            std::move(domain),
+            domain,
             play_radius};
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/wavelet.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <tuple>
 #include <vector>
@@ -9,6 +11,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "palpate/model/hat_sum.hpp"
 
 namespace palpate::bindings {
 
@@ -49,13 +52,30 @@ struct Frame {
         return alpha[i * dimension + j] * (x[k * dimension + j] - beta[i * dimension + j]);
     }
 
-    [[nodiscard]] RadialMexicanHat radial(std::size_t i, std::size_t k) const noexcept {
-        double square = 0.0;
-        for (std::size_t j = 0; j < dimension; ++j) {
-            const double u = scaled(i, k, j);
-            square += u * u;
+    /// Calls visit(k, psi) for every sample k with the radial hat of wavelet i there, a block at a time: the
+    /// exponentials of a block are vectorised.
+    template <class Visitor>
+    void radial(std::size_t i, Visitor visit) const {
+        constexpr std::size_t block = 256;
+        std::array<double, block> square{};
+        std::array<double, block> gaussian{};
+        for (std::size_t first = 0; first < samples; first += block) {
+            const std::size_t size = std::min(block, samples - first);
+            for (std::size_t k = 0; k < size; ++k) {
+                double sum = 0.0;
+                for (std::size_t j = 0; j < dimension; ++j) {
+                    const double u = scaled(i, first + k, j);
+                    sum += u * u;
+                }
+                square[k] = std::min(sum, detail::hat_reach * detail::hat_reach);
+            }
+            detail::hat_kernel().gaussians(square.data(), size, gaussian.data());
+            const auto d = static_cast<double>(dimension);
+            for (std::size_t k = 0; k < size; ++k) {
+                visit(first + k,
+                      RadialMexicanHat{(square[k] - d) * gaussian[k], (d + 2.0 - square[k]) * gaussian[k]});
+            }
         }
-        return radial_mexican_hat(square, static_cast<double>(dimension));
     }
 };
 
@@ -72,9 +92,7 @@ Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
     for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        for (std::size_t k = 0; k < frame.samples; ++k) {
-            *out++ = frame.radial(i, k).value;
-        }
+        frame.radial(i, [&](std::size_t /*k*/, const RadialMexicanHat& psi) { *out++ = psi.value; });
     }
     return result;
 }
@@ -98,18 +116,18 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
     {
         const py::gil_scoped_release unlocked;
         for (std::size_t i = 0; i < frame.wavelets; ++i) {
-            for (std::size_t k = 0; k < frame.samples; ++k) {
+            frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
                 const std::size_t at = i * frame.samples + k;
-                const RadialMexicanHat psi = frame.radial(i, k);
                 value_out[at] = psi.value;
                 for (std::size_t j = 0; j < frame.dimension; ++j) {
                     const double dilation = frame.alpha[i * frame.dimension + j];
-                    const double by_u = psi.gradient_over_u * frame.scaled(i, k, j);
-                    alpha_out[j][at] =
-                        by_u * (frame.x[k * frame.dimension + j] - frame.beta[i * frame.dimension + j]);
+                    // Far away the hat is zero whatever u is, even if it is infinite.
+                    const double u = std::clamp(frame.scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
+                    const double by_u = psi.gradient_over_u * u;
+                    alpha_out[j][at] = by_u * (u / dilation);
                     beta_out[j][at] = -dilation * by_u;
                 }
-            }
+            });
         }
     }
     return {std::move(value), std::move(by_alpha), std::move(by_beta)};

@@ -68,6 +68,31 @@ def test_columns_and_jacobian_agree_with_differences(dimension: int) -> None:
             assert derivative == pytest.approx(difference, abs=1e-8)
 
 
+def test_columns_are_safe_for_every_number_and_any_length() -> None:
+    rng = np.random.default_rng(12)
+    alpha, beta = rng.uniform(1, 50, 6), rng.uniform(0, 1, 6)
+    for n in (0, 1, 7, 255, 256, 257, 1000):
+        x = rng.uniform(-1, 2, n)
+        expected = hat((alpha * (x[:, None] - beta))[:, :, None])
+        assert _core.wavelet_columns(x, alpha, beta) == pytest.approx(expected, abs=1e-13)
+    far = np.array([1e300, -1e300, np.inf, -np.inf, 1e10])
+    value, by_alpha, by_beta = _core.wavelet_jacobian(far, alpha, beta)
+    for columns in (value, by_alpha[0], by_beta[0]):
+        assert np.all(np.abs(columns) < 1e-280)
+    assert np.all(np.isnan(_core.wavelet_columns(np.array([np.nan]), alpha, beta)))
+
+
+def test_a_batch_is_its_single_positions() -> None:
+    rng = np.random.default_rng(13)
+    for size in (0, 1, 5, 16, 33):
+        model = _core.ForceModel(**network(rng, size))
+        x = np.concatenate([rng.uniform(-0.5, 1.5, 1001), [0.0, 1.0, 1e10, -1e10]])
+        for quantity in (model.force, model.slope, model.energy):
+            assert quantity(x) == pytest.approx(
+                np.array([quantity(float(at)) for at in x]), rel=1e-12, abs=1e-12
+            )
+
+
 def test_slope_and_integral_columns_belong_to_the_wavelets() -> None:
     rng = np.random.default_rng(3)
     x, alpha, beta, h = rng.uniform(0, 1, 30), rng.uniform(1, 9, 4), rng.uniform(0, 1, 4), 1e-6

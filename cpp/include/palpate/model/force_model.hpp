@@ -24,9 +24,9 @@ class ForceModel {
     ForceModel(NetworkParameters network, Domain domain)
         : kind_{make_network(std::move(network), std::move(domain))} {}
 
-    ForceModel(const NetworkParameters& network, const LossParameters& loss, Domain domain,
+    ForceModel(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
                std::optional<double> play_radius)
-        : kind_{make_hysteresis(network, loss, std::move(domain), play_radius)}, play_radius_{play_radius} {}
+        : kind_{make_hysteresis(network, loss, domain, play_radius)}, play_radius_{play_radius} {}
 
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
     [[nodiscard]] const WaveletNetwork* network() const noexcept {
@@ -88,11 +88,11 @@ class ForceModel {
     }
 
     static HysteresisNetwork make_hysteresis(const NetworkParameters& network, const LossParameters& loss,
-                                             Domain domain, std::optional<double> play_radius) {
+                                             const Domain& domain, std::optional<double> play_radius) {
         detail::require(domain.lower.size() == 1 && domain.upper.size() == 1,
                         "a hysteresis network has one input");
         const double radius = play_radius.value_or(0.01 * std::abs(domain.upper[0] - domain.lower[0]));
-        return {network, loss, std::move(domain), radius};
+        return {network, loss, domain, radius};
     }
 
     Kind kind_;

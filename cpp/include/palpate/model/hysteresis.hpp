@@ -33,28 +33,23 @@ struct LossParameters {
 ///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1].
 ///
 /// While h >= 0 no loop generates energy: with the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi
-/// sticking (|s| < 1) is lossless and sliding loses.
-class HysteresisNetwork {
+/// sticking (|s| < 1) is lossless and sliding loses. `C` is how g and h are computed.
+template <class C>
+class HysteresisPair {
   public:
     struct State {
         double play = 0.0;  ///< the play operator's position
     };
 
-    HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, Domain domain,
-                      double play_radius)
-        : domain_{std::move(domain)},
-          play_radius_{play_radius},
-          force_{(check(network, loss, domain_, play_radius), continued_force(network, domain_))},
-          loss_{continued_loss(network, loss)} {}
+    HysteresisPair(C force, C loss, double play_radius)
+        : force_{std::move(force)}, loss_{std::move(loss)}, play_radius_{play_radius} {}
 
-    [[nodiscard]] const NetworkParameters& parameters() const noexcept { return force_.parameters(); }
-    [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
     [[nodiscard]] double play_radius() const noexcept { return play_radius_; }
 
     /// g, what press and release have in common.
-    [[nodiscard]] const NetworkCurve& force() const noexcept { return force_; }
+    [[nodiscard]] const C& force() const noexcept { return force_; }
     /// h, half of what they differ by.
-    [[nodiscard]] const NetworkCurve& loss() const noexcept { return loss_; }
+    [[nodiscard]] const C& loss() const noexcept { return loss_; }
 
     /// Force, slope and energy at x for a given s: +1 pressing, -1 releasing.
     [[nodiscard]] EnvironmentSample sliding(double x, double s) const noexcept {
@@ -83,6 +78,27 @@ class HysteresisNetwork {
     [[nodiscard]] State start(double x) const noexcept { return {x}; }
 
   private:
+    C force_;
+    C loss_;
+    double play_radius_;
+};
+
+/// The hysteresis pair of two networks that share their wavelets, and their domain.
+class HysteresisNetwork : public HysteresisPair<NetworkCurve> {
+  public:
+    HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
+                      double play_radius)
+        : HysteresisNetwork{network, loss, domain, play_radius,
+                            (check(network, loss, domain, play_radius), continued_force(network, domain))} {}
+
+    [[nodiscard]] const NetworkParameters& parameters() const noexcept { return force().parameters(); }
+    [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
+
+  private:
+    HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
+                      double play_radius, const NetworkCurve& force)
+        : HysteresisPair{force, continued_loss(network, loss, domain, force), play_radius}, domain_{domain} {}
+
     static void check(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
                       double play_radius) {
         validate(network, domain);
@@ -95,29 +111,27 @@ class HysteresisNetwork {
                         "play_radius is " + std::to_string(play_radius) + ", must be > 0");
     }
 
-    [[nodiscard]] NetworkCurve continued_loss(const NetworkParameters& network,
-                                              const LossParameters& loss) const {
+    [[nodiscard]] static NetworkCurve continued_loss(const NetworkParameters& network,
+                                                     const LossParameters& loss, const Domain& domain,
+                                                     const NetworkCurve& force) {
         NetworkParameters h = network;
         h.weight = loss.weight;
         h.linear = {loss.linear};
         h.bias = loss.bias;
-        NetworkCurve curve{h, domain_};
-        const double travel = domain_.upper[0] - domain_.lower[0];
+        NetworkCurve curve{h, domain};
+        const double travel = domain.upper[0] - domain.lower[0];
         // h dies out together with g, but never over less than 2 % of the travel: no jump, no steep flank.
         const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
                               Continuation continuation) {
             return continue_loss(edge.edge, edge.at_edge, outward, continuation,
                                  std::max(g.reach, 0.02 * travel));
         };
-        curve.continue_with(line(force_.below(), curve.below(), -1.0, domain_.below),
-                            line(force_.above(), curve.above(), +1.0, domain_.above));
+        curve.continue_with(line(force.below(), curve.below(), -1.0, domain.below),
+                            line(force.above(), curve.above(), +1.0, domain.above));
         return curve;
     }
 
     Domain domain_;
-    double play_radius_;
-    NetworkCurve force_;
-    NetworkCurve loss_;
 };
 
 static_assert(Environment<HysteresisNetwork>);

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/continuation.hpp"
+#include "palpate/model/hat_sum.hpp"
 #include "palpate/model/parameters.hpp"
-#include "palpate/model/wavelet.hpp"
 
 namespace palpate {
 
@@ -18,6 +19,7 @@ class NetworkCurve {
   public:
     NetworkCurve(const NetworkParameters& network, const Domain& domain)
         : network_{network},
+          hats_{network},
           lower_{domain.lower[0]},
           upper_{domain.upper[0]},
           periodic_{domain.period.has_value()} {
@@ -33,12 +35,21 @@ class NetworkCurve {
     }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept { return network_; }
+    [[nodiscard]] double lower() const noexcept { return lower_; }
+    [[nodiscard]] double upper() const noexcept { return upper_; }
+    [[nodiscard]] bool periodic() const noexcept { return periodic_; }
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 
     [[nodiscard]] Curve at(double x) const noexcept {
+        return continued(x, [this](double within) noexcept { return inside(within); });
+    }
+
+    /// The curve with `inside` in place of eq. 4 within the domain.
+    template <class Inside>
+    [[nodiscard]] Curve continued(double x, Inside inside) const noexcept {
         if (periodic_) {
-            return wrapped(x);
+            return wrapped(x, inside);
         }
         if (x < lower_) {
             return below_.at(x);
@@ -58,17 +69,28 @@ class NetworkCurve {
         const double c = network_.linear[0];
         const double b = network_.bias;
         Curve sum{c * x + b, c, (0.5 * c * x + b) * x, (c * x / 6.0 + 0.5 * b) * x * x};
-        for (std::size_t i = 0; i < network_.weight.size(); ++i) {
-            const double alpha = network_.alpha[i];
-            const double width = 1.0 / alpha;
-            const double weight = network_.weight[i];
-            const MexicanHat psi = mexican_hat(alpha * (x - network_.beta[i]));
-            sum.value += weight * psi.value;
-            sum.slope += weight * alpha * psi.slope;
-            sum.integral += weight * width * psi.integral;
-            sum.double_integral += weight * width * width * psi.double_integral;
-        }
+        hats_.add(x, sum);
         return sum;
+    }
+
+    /// One quantity at many positions, continuation included; both spans have the same size.
+    void at(HatQuantity quantity, std::span<const double> x, std::span<double> result) const noexcept {
+        const double c = network_.linear[0];
+        const double b = network_.bias;
+        for (std::size_t k = 0; k < x.size(); ++k) {
+            result[k] = quantity == HatQuantity::Value   ? c * x[k] + b
+                        : quantity == HatQuantity::Slope ? c
+                                                         : (0.5 * c * x[k] + b) * x[k];
+        }
+        hats_.add(quantity, x, result);
+        for (std::size_t k = 0; k < x.size(); ++k) {
+            if (!(x[k] >= lower_ && x[k] <= upper_) || periodic_) {
+                const Curve here = at(x[k]);
+                result[k] = quantity == HatQuantity::Value   ? here.value
+                            : quantity == HatQuantity::Slope ? here.slope
+                                                             : here.integral;
+            }
+        }
     }
 
     /// Proved bounds inside the domain, within 1 % of their largest.
@@ -85,7 +107,8 @@ class NetworkCurve {
 
   private:
     /// Value and slope repeat; the antiderivatives gain what each turn adds.
-    [[nodiscard]] Curve wrapped(double x) const noexcept {
+    template <class Inside>
+    [[nodiscard]] Curve wrapped(double x, Inside inside) const noexcept {
         const double period = upper_ - lower_;
         const double turns = std::floor((x - lower_) / period);
         const double along = x - turns * period - lower_;
@@ -108,6 +131,7 @@ class NetworkCurve {
     }
 
     NetworkParameters network_;
+    HatSum hats_;
     double lower_;
     double upper_;
     bool periodic_;

@@ -19,34 +19,42 @@ namespace palpate {
 ///
 /// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit
 /// equation of section 4.3, with the damping of figure 14.
-template <Environment E>
+template <Environment E, class Solver = LoadLineSolver>
 class Implicit {
   public:
-    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period,
-             LoadLineSolver solver = {})
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver = {})
         : environment_{std::move(environment)},
-          inertia_{inertia},
           coupling_{coupling},
           period_{period},
-          solver_{solver} {
+          inertial_{inertia.mass / (period * period)},
+          coupled_{load_line_slope(inertia, coupling, period)},
+          alone_{load_line_slope(inertia, {0.0, 0.0}, period)},
+          coupled_memory_{inertial_ + coupled_ - coupling.stiffness},
+          alone_memory_{inertial_ + alone_},
+          solver_{std::move(solver)} {
         reset(0.0);
+    }
+
+    /// p of every step behind the coupling.
+    [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
+                                                double period) noexcept {
+        return coupling.stiffness + coupling.damping / period +
+               (inertia.mass / (period * period) + inertia.damping / period);
     }
 
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
+        memory_ = {position};
         before_ = position;
     }
 
     /// Behind the coupling: the device's measured position in, the coupling's force out.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double velocity = (device - device_) / period_;
-        const double damping = coupling_.damping / period_;
         const double last = position_;
-        const LoadLine coupled{coupling_.stiffness + damping,
-                               coupling_.stiffness * device + coupling_.damping * velocity + damping * last};
-        Rendered rendered = advance(coupled);
+        Rendered rendered = advance(coupled_, coupling_.force(device, velocity), coupled_memory_);
         if (rendered.status == Status::NonFinite) {
             return rendered;
         }
@@ -57,34 +65,38 @@ class Implicit {
 
     /// Without the coupling: a given force drives the environment (paper figure 12).
     [[nodiscard]] Rendered drive(double force) noexcept {
-        Rendered rendered = advance({0.0, force});
+        Rendered rendered = advance(alone_, force, alone_memory_);
         rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;
         return rendered;
     }
 
   private:
-    /// Adds the environment's own inertia and damping to a load line, solves it and moves on.
-    [[nodiscard]] Rendered advance(LoadLine line) noexcept {
-        const double inertia = inertia_.mass / (period_ * period_);
-        const double damping = inertia_.damping / period_;
-        line.slope += inertia + damping;
-        line.intercept += inertia * (2.0 * position_ - before_) + damping * position_;
-        const Solution solution = solver_.solve(environment_, state_, line, position_);
+    /// Solves the load line of slope p and moves on. `push` is what drives an environment at rest at 0,
+    /// `memory` what of q goes with the last position.
+    [[nodiscard]] Rendered advance(double p, double push, double memory) noexcept {
+        const LoadLine line{p, push - inertial_ * before_ + memory * position_};
+        const Solution solution = solver_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
         environment_.advance(solution.position, state_);
+        memory_ = solver_.remember(line, solution);
         before_ = position_;
         position_ = solution.position;
         return {0.0, position_, solution.evaluations, solution.status, solution.environment.extrapolated};
     }
 
     E environment_;
-    Inertia inertia_;
     VirtualCoupling coupling_;
     double period_;
-    LoadLineSolver solver_;
+    double inertial_;        ///< m/T^2
+    double coupled_;         ///< p behind the coupling
+    double alone_;           ///< p without it
+    double coupled_memory_;  ///< the factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
+    double alone_memory_;    ///< and without the coupling: 2m/T^2 + B_o/T
+    Solver solver_;
     typename E::State state_;
+    typename Solver::Memory memory_;
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}
     double before_ = 0.0;    ///< y_{k-2}

@@ -14,29 +14,39 @@ namespace palpate {
 /// load line with
 ///
 ///     p = K_c + B_c / T,   q = K_c x_k + (B_c / T)(x_k - x_{k-1} + y_{k-1});   then F = f(y).
-template <Environment E>
+template <Environment E, class Solver = LoadLineSolver>
 class Massless {
   public:
-    Massless(E environment, VirtualCoupling coupling, double period, LoadLineSolver solver = {})
-        : environment_{std::move(environment)}, coupling_{coupling}, period_{period}, solver_{solver} {
+    Massless(E environment, VirtualCoupling coupling, double period, Solver solver = {})
+        : environment_{std::move(environment)},
+          coupling_{coupling},
+          period_{period},
+          solver_{std::move(solver)} {
         reset(0.0);
+    }
+
+    /// p of every step.
+    [[nodiscard]] static double load_line_slope(VirtualCoupling coupling, double period) noexcept {
+        return coupling.stiffness + coupling.damping / period;
     }
 
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
+        memory_ = {position};
     }
 
     [[nodiscard]] Rendered step(double device) noexcept {
         const double damping = coupling_.damping / period_;
         const LoadLine line{coupling_.stiffness + damping,
                             coupling_.stiffness * device + damping * (device - device_ + position_)};
-        const Solution solution = solver_.solve(environment_, state_, line, position_);
+        const Solution solution = solver_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
         environment_.advance(solution.position, state_);
+        memory_ = solver_.remember(line, solution);
         device_ = device;
         position_ = solution.position;
         return {solution.environment.force, position_, solution.evaluations, solution.status,
@@ -47,8 +57,9 @@ class Massless {
     E environment_;
     VirtualCoupling coupling_;
     double period_;
-    LoadLineSolver solver_;
+    Solver solver_;
     typename E::State state_;
+    typename Solver::Memory memory_;
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}
 };

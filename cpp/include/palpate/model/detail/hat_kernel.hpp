@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums of Mexican hats for one instruction set. Included by hat_sum.hpp once for each, with
+//   PALPATE_KERNEL  the namespace,  PALPATE_LANES  doubles in a register,  PALPATE_TARGET  a function attribute.
+// No include guard: that is the point. Every function carries the attribute itself: only then are its vectors
+// kept in registers of that width.
+
+namespace PALPATE_KERNEL {
+
+using Lanes = double __attribute__((vector_size(8 * PALPATE_LANES)));
+using Integers = std::int64_t __attribute__((vector_size(8 * PALPATE_LANES)));
+
+PALPATE_TARGET inline void load(Lanes& lanes, const double* from) noexcept {
+    __builtin_memcpy(&lanes, from, sizeof(Lanes));
+}
+
+/// e^{-s/2} for 0 <= s <= hat_reach^2: 2^n e^r, n an integer, |r| <= ln 2 / 2, e^r a polynomial. Without
+/// branches; larger s are taken for hat_reach^2, NaN stays NaN.
+PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
+    const Lanes farthest = Lanes{} + hat_reach * hat_reach;
+    square = square > farthest ? farthest : square;
+    const Lanes exponent = -0.5 * square;
+    const Lanes rounded = exponent * 0x1.71547652b82fep+0 + 0x1.8p52;  // log2(e)
+    const Lanes n = rounded - 0x1.8p52;
+    // ln 2 in two parts, the first short enough for an exact product.
+    const Lanes r = (exponent - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
+    const Lanes r2 = r * r;
+    const Lanes r4 = r2 * r2;
+    const auto& c = exponential;
+    const Lanes low = (c[0] + c[1] * r) + (c[2] + c[3] * r) * r2;
+    const Lanes middle = (c[4] + c[5] * r) + (c[6] + c[7] * r) * r2;
+    const Lanes high = (c[8] + c[9] * r) + (c[10] + c[11] * r) * r2;
+    // The integer n stands in the low bits of `rounded`; n >= -1010, so that 2^n is a normal number.
+    Integers bits;
+    __builtin_memcpy(&bits, &rounded, sizeof(bits));
+    bits = (bits << 52) + 0x3ff0000000000000;
+    Lanes power;
+    __builtin_memcpy(&power, &bits, sizeof(power));
+    e = (low + (middle + high * r4) * r4) * power;
+}
+
+/// u within +-hat_reach, its square and e^{-u^2/2}.
+PALPATE_TARGET inline void gaussian(Lanes& u, Lanes& square, Lanes& e) noexcept {
+    const Lanes reach = Lanes{} + hat_reach;
+    u = u > reach ? reach : u;
+    u = u < -reach ? -reach : u;
+    square = u * u;
+    gaussian(square, e);
+}
+
+PALPATE_TARGET inline double total(const Lanes& lanes) noexcept {
+    double sums[PALPATE_LANES];
+    __builtin_memcpy(sums, &lanes, sizeof(sums));
+    for (int half = PALPATE_LANES / 2; half > 0; half /= 2) {
+        for (int k = 0; k < half; ++k) {
+            sums[k] += sums[k + half];
+        }
+    }
+    return sums[0];
+}
+
+/// All sums at one x, a register of wavelets at a time. `size` is a multiple of the lanes.
+PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexcept {
+    Lanes value{};
+    Lanes slope{};
+    Lanes integral{};
+    Lanes double_integral{};
+    for (std::size_t i = 0; i < of.size; i += PALPATE_LANES) {
+        Lanes alpha, beta, weight, steep, flat, flatter, square, e;
+        load(alpha, of.alpha + i);
+        load(beta, of.beta + i);
+        load(weight, of.weight + i);
+        load(steep, of.weight_by_width + i);
+        load(flat, of.weight_width + i);
+        load(flatter, of.weight_width_squared + i);
+        Lanes u = alpha * (x - beta);
+        gaussian(u, square, e);
+        const Lanes ue = u * e;
+        value += weight * ((square - 1.0) * e);
+        slope += steep * ((3.0 - square) * ue);
+        integral -= flat * ue;
+        double_integral += flatter * e;
+    }
+    sum.value += total(value);
+    sum.slope += total(slope);
+    sum.integral += total(integral);
+    sum.double_integral += total(double_integral);
+}
+
+/// One of the sums at a register of positions.
+template <HatQuantity quantity>
+PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, Lanes& sum) noexcept {
+    for (std::size_t i = 0; i < of.count; ++i) {
+        Lanes u = of.alpha[i] * (position - of.beta[i]);
+        Lanes square, e;
+        gaussian(u, square, e);
+        if constexpr (quantity == HatQuantity::Value) {
+            sum += of.weight[i] * ((square - 1.0) * e);
+        } else if constexpr (quantity == HatQuantity::Slope) {
+            sum += of.weight_by_width[i] * ((3.0 - square) * (u * e));
+        } else {
+            sum -= of.weight_width[i] * (u * e);
+        }
+    }
+}
+
+/// One of the sums at many x: added to `sum`.
+template <HatQuantity quantity>
+PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept {
+    Lanes position, total;
+    std::size_t k = 0;
+    for (; k + PALPATE_LANES <= n; k += PALPATE_LANES) {
+        load(position, x + k);
+        load(total, sum + k);
+        sum_at<quantity>(of, position, total);
+        __builtin_memcpy(sum + k, &total, sizeof(total));
+    }
+    double rest[2][PALPATE_LANES] = {};
+    for (std::size_t j = 0; k + j < n; ++j) {
+        rest[0][j] = x[k + j];
+        rest[1][j] = sum[k + j];
+    }
+    load(position, rest[0]);
+    load(total, rest[1]);
+    sum_at<quantity>(of, position, total);
+    for (std::size_t j = 0; k + j < n; ++j) {
+        sum[k + j] = total[j];
+    }
+}
+
+/// e^{-s/2} for many s >= 0.
+PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
+    for (std::size_t k = 0; k < n; k += PALPATE_LANES) {
+        const std::size_t here = n - k < PALPATE_LANES ? n - k : PALPATE_LANES;
+        double padded[PALPATE_LANES] = {};
+        for (std::size_t j = 0; j < here; ++j) {
+            padded[j] = square[k + j];
+        }
+        Lanes s, result;
+        load(s, padded);
+        gaussian(s, result);
+        for (std::size_t j = 0; j < here; ++j) {
+            e[k + j] = result[j];
+        }
+    }
+}
+
+[[nodiscard]] inline HatKernel kernel() noexcept {
+    return {
+        at, {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>}, gaussians};
+}
+
+}  // namespace PALPATE_KERNEL

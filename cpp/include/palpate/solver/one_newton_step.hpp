@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+#include "palpate/model/environment.hpp"
+#include "palpate/solver/newton.hpp"
+
+namespace palpate {
+
+/// One step of Newton's method and no more, from the last position: with it `Implicit` is the linearly
+/// implicit Euler scheme. One evaluation a step, exact for a line, no certificate for anything else.
+struct OneNewtonStep {
+    using Memory = WarmStart;
+
+    [[nodiscard]] WarmStart remember(LoadLine /*line*/, const Solution& solution) const noexcept {
+        return {solution.position};
+    }
+
+    template <Environment E>
+    [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
+                                 const WarmStart& start) const noexcept {
+        const double y = start.position;
+        const EnvironmentSample at = environment.at(y, state);
+        const double slope = line.slope + at.slope;
+        const double step = (line.intercept - line.slope * y - at.force) / slope;
+        if (!std::isfinite(step)) {
+            return {y, at, step, 1, Status::NonFinite};
+        }
+        EnvironmentSample there = at;
+        there.force = at.force + at.slope * step;
+        return {y + step, there, 0.0, 1, slope > 0.0 ? Status::Ok : Status::NotUnique};
+    }
+};
+
+}  // namespace palpate

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/model/compiled_network.hpp"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::cases;
+using test::Random;
+using test::uniform;
+
+/// f^(n) in extended precision: psi^(n) = (-1)^n He_{n+2} E.
+long double exact(const NetworkParameters& network, double x, int order) {
+    const long double c = network.linear[0];
+    long double sum = order == 0 ? c * x + network.bias : order == 1 ? c : 0.0L;
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        const long double alpha = network.alpha[i];
+        const long double u = alpha * (static_cast<long double>(x) - network.beta[i]);
+        long double before = 1.0L;
+        long double hermite = u;
+        for (int n = 1; n < order + 2; ++n) {
+            const long double next = u * hermite - n * before;
+            before = hermite;
+            hermite = next;
+        }
+        const long double sign = order % 2 == 0 ? 1.0L : -1.0L;
+        sum += sign * network.weight[i] * std::pow(alpha, static_cast<long double>(order)) * hermite *
+               std::exp(-0.5L * u * u);
+    }
+    return sum;
+}
+
+WaveletNetwork random_scene(Random& random, std::size_t wavelets, Domain domain = test::unit_domain()) {
+    return {test::random_network(random, wavelets), std::move(domain)};
+}
+
+TEST(DerivativeBounds, HoldAtEveryPointOfRandomNetworks) {
+    Random random{41};
+    for (int k = 0; k < cases(200); ++k) {
+        const NetworkParameters network = test::random_network(random, static_cast<std::size_t>(k % 9));
+        const double from = uniform(random, -2.0, 2.0);
+        const double to = from + std::exp(uniform(random, -8.0, 1.0));
+        const DerivativeBounds bounds = derivative_bounds(network, from, to);
+        for (int order = 0; order <= 8; ++order) {
+            for (int j = 0; j < 20; ++j) {
+                const double x = uniform(random, from, to);
+                ASSERT_LE(std::abs(exact(network, x, order)), bounds[static_cast<std::size_t>(order)])
+                    << order << " " << x;
+            }
+        }
+    }
+}
+
+TEST(DerivativeBounds, AreReachedAtTheCentreOfAWavelet) {
+    const NetworkParameters one{1, {3.0}, {0.5}, {-2.0}, {0.0}, 0.0};
+    for (const int order : {0, 2, 4, 6, 8}) {
+        const double bound = derivative_bounds(one, 0.4, 0.6)[static_cast<std::size_t>(order)];
+        EXPECT_NEAR(std::abs(exact(one, 0.5, order)) / bound, 1.0, 1e-8) << order;
+    }
+}
+
+TEST(PiecewiseSeptic, IsExactForPolynomialsOfDegreeSeven) {
+    // x^7 + x^4 - x on cells of width 1/2, where the highest powers count.
+    const auto jet = [](double x) noexcept {
+        return Jet{std::pow(x, 7) + std::pow(x, 4) - x, 7.0 * std::pow(x, 6) + 4.0 * std::pow(x, 3) - 1.0,
+                   42.0 * std::pow(x, 5) + 12.0 * x * x, 210.0 * std::pow(x, 4) + 24.0 * x};
+    };
+    const auto integrals = [](double x) noexcept {
+        return std::array{std::pow(x, 8) / 8.0 + std::pow(x, 5) / 5.0 - x * x / 2.0,
+                          std::pow(x, 9) / 72.0 + std::pow(x, 6) / 30.0 - x * x * x / 6.0};
+    };
+    PiecewiseSeptic table{-2, 4, 0.5, jet};
+    table.integrate(integrals);
+    Random random{49};
+    for (int k = 0; k < cases(1000); ++k) {
+        const double x = uniform(random, -1.0, 2.0);
+        const Curve here = table.at(x);
+        EXPECT_NEAR(here.value, jet(x)[0], 1e-12) << x;
+        EXPECT_EQ(here.value, table.value(x)) << x;
+        EXPECT_NEAR(here.slope, jet(x)[1], 1e-12) << x;
+        EXPECT_NEAR(here.integral, integrals(x)[0], 1e-12) << x;
+        EXPECT_NEAR(here.double_integral, integrals(x)[1], 1e-12) << x;
+    }
+}
+
+TEST(CompiledCurve, KeepsItsCertifiedErrorEverywhere) {
+    Random random{42};
+    int compiled = 0;
+    for (int k = 0; k < cases(60); ++k) {
+        const WaveletNetwork network = random_scene(random, static_cast<std::size_t>(2 + k % 40));
+        const CompiledCurve curve{network.curve()};
+        compiled += curve.compiled() ? 1 : 0;
+        const double asked = 1e-12 * network.curve().value_bounds().largest();
+        EXPECT_LE(curve.value_error(), asked);
+        for (int j = 0; j < 2000; ++j) {
+            const double x = uniform(random, 0.0, 1.0);
+            const Curve here = curve.at(x);
+            ASSERT_LE(std::abs(here.value - exact(network.parameters(), x, 0)),
+                      curve.compiled() ? curve.value_error() : asked)
+                << k << " " << x;
+            if (curve.compiled()) {
+                ASSERT_LE(std::abs(here.slope - exact(network.parameters(), x, 1)), curve.slope_error())
+                    << k << " " << x;
+            }
+        }
+    }
+    EXPECT_GE(compiled, cases(60) * 9 / 10);
+}
+
+TEST(CompiledCurve, AsksForMoreCellsWhenMoreIsAsked) {
+    Random random{43};
+    const WaveletNetwork network = random_scene(random, 12);
+    std::size_t before = 0;
+    for (const double error : {1e-4, 1e-6, 1e-9, 1e-12}) {
+        const CompiledCurve curve{network.curve(), {error}};
+        ASSERT_TRUE(curve.compiled());
+        EXPECT_GE(curve.cells(), before);
+        EXPECT_LE(curve.value_error(), error * network.curve().value_bounds().largest());
+        before = curve.cells();
+    }
+    EXPECT_GT(before, CompiledCurve(network.curve(), {1e-4}).cells());
+}
+
+// What cannot be certified is not compiled, and is then the network itself, bit by bit.
+TEST(CompiledCurve, DoesNotPretend) {
+    Random random{44};
+    NetworkParameters cancelling = test::random_network(random, 8);
+    for (std::size_t i = 0; i + 1 < 8; i += 2) {
+        cancelling.alpha[i + 1] = cancelling.alpha[i] * (1.0 + 1e-6);
+        cancelling.beta[i + 1] = cancelling.beta[i];
+        cancelling.weight[i] = 1e6;
+        cancelling.weight[i + 1] = -1e6;
+    }
+    NetworkParameters needle = test::random_network(random, 8);
+    needle.alpha[3] = 1e6;
+    NetworkParameters far = test::random_network(random, 8);
+    const Domain distant{{1e13}, {1e13 + 1.0}, Continuation::Linear, Continuation::Linear, std::nullopt};
+    for (double& beta : far.beta) {
+        beta += 1e13;
+    }
+    for (const auto& [parameters, domain] :
+         {std::pair{cancelling, test::unit_domain()}, std::pair{needle, test::unit_domain()},
+          std::pair{far, distant}, std::pair{test::random_network(random, 1), test::unit_domain()},
+          std::pair{test::random_network(random, 0), test::unit_domain()}}) {
+        const WaveletNetwork network{parameters, domain};
+        const CompiledCurve curve{network.curve()};
+        EXPECT_FALSE(curve.compiled()) << parameters.weight.size();
+        for (int j = 0; j < 100; ++j) {
+            const double x = domain.lower[0] + uniform(random, -0.5, 1.5);
+            EXPECT_EQ(curve.at(x).value, network.curve().at(x).value);
+            EXPECT_EQ(curve.at(x).slope, network.curve().at(x).slope);
+        }
+    }
+}
+
+TEST(CompiledCurve, ContinuesAsTheNetworkDoes) {
+    Random random{45};
+    for (const auto continuation : {Continuation::Linear, Continuation::Free}) {
+        const WaveletNetwork network = random_scene(random, 9, test::unit_domain(continuation, continuation));
+        const CompiledCurve curve{network.curve()};
+        ASSERT_TRUE(curve.compiled());
+        for (const double x : {-1e300, -3.0, -0.1, -1e-9, 1.0 + 1e-9, 1.2, 5.0, 1e300}) {
+            EXPECT_EQ(curve.at(x).value, network.curve().at(x).value) << x;
+            EXPECT_EQ(curve.at(x).integral, network.curve().at(x).integral) << x;
+            EXPECT_TRUE(curve.extrapolated(x));
+        }
+        for (const double edge : {0.0, 1.0}) {
+            EXPECT_NEAR(curve.at(edge).value, network.curve().at(edge).value, curve.value_error());
+            EXPECT_FALSE(curve.extrapolated(edge));
+        }
+        const double infinity = std::numeric_limits<double>::infinity();
+        EXPECT_TRUE(std::isnan(curve.at(std::nan("")).value));
+        EXPECT_EQ(curve.at(infinity).value, network.curve().at(infinity).value);
+    }
+}
+
+TEST(CompiledCurve, RepeatsAsTheNetworkDoes) {
+    Random random{46};
+    const Domain knob{{0.1}, {0.8}, Continuation::Linear, Continuation::Linear, 0.8 - 0.1};
+    const WaveletNetwork network = random_scene(random, 9, knob);
+    const CompiledCurve curve{network.curve()};
+    ASSERT_TRUE(curve.compiled());
+    for (int k = 0; k < cases(2000); ++k) {
+        const double x = uniform(random, -5.0, 5.0);
+        EXPECT_NEAR(curve.at(x).value, network.curve().at(x).value, 2e-12 * (1.0 + std::abs(x))) << x;
+        EXPECT_NEAR(curve.at(x).integral, network.curve().at(x).integral, 1e-11) << x;
+    }
+    // So far away that a position no longer knows its place in the period, the force is still one of f's.
+    const Interval bounds = network.curve().value_bounds();
+    for (int k = 0; k < cases(2000); ++k) {
+        const double x = uniform(random, -1.0, 1.0) * std::pow(10.0, uniform(random, 10.0, 300.0));
+        EXPECT_LE(curve.at(x).value, bounds.upper) << x;
+        EXPECT_GE(curve.at(x).value, bounds.lower) << x;
+    }
+    EXPECT_TRUE(std::isnan(curve.at(std::numeric_limits<double>::infinity()).value));
+}
+
+TEST(CompiledCurve, EnergyIsTheAntiderivativeOfTheForce) {
+    Random random{47};
+    const WaveletNetwork network = random_scene(random, 16);
+    const CompiledCurve curve{network.curve()};
+    ASSERT_TRUE(curve.compiled());
+    for (int k = 0; k < cases(2000); ++k) {
+        const double x = uniform(random, 0.0, 1.0);
+        EXPECT_NEAR(curve.at(x).integral, network.curve().at(x).integral, 1e-13) << x;
+        EXPECT_NEAR(curve.at(x).double_integral, network.curve().at(x).double_integral, 1e-13) << x;
+    }
+}
+
+TEST(CompiledHysteresis, AnswersAsTheNetworkDoes) {
+    Random random{48};
+    NetworkParameters network = test::random_network(random, 10);
+    const LossParameters loss{std::vector<double>(10, 0.02), 0.0, 0.5};
+    const HysteresisNetwork both{network, loss, test::unit_domain(Continuation::Free), 0.01};
+    const CompiledHysteresis compiled{both};
+    ASSERT_TRUE(compiled.force().compiled());
+    ASSERT_TRUE(compiled.loss().compiled());
+    auto state = both.start(0.5);
+    auto compiled_state = compiled.start(0.5);
+    double x = 0.5;
+    for (int k = 0; k < cases(2000); ++k) {
+        x += uniform(random, -0.02, 0.02);
+        x = std::clamp(x, -0.2, 1.2);
+        const EnvironmentSample expected = both.at(x, state);
+        const EnvironmentSample sample = compiled.at(x, compiled_state);
+        ASSERT_NEAR(sample.force, expected.force, 2e-11) << x;
+        ASSERT_NEAR(sample.slope, expected.slope, 1e-8) << x;
+        ASSERT_NEAR(sample.energy, expected.energy, 1e-11) << x;
+        both.advance(x, state);
+        compiled.advance(x, compiled_state);
+    }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/solver/resolvent.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "palpate/model/network.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::cases;
+using test::Random;
+using test::uniform;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+WaveletNetwork random_scene(Random& random, std::size_t wavelets,
+                            Continuation continuation = Continuation::Linear) {
+    return {test::random_network(random, wavelets), test::unit_domain(continuation, continuation)};
+}
+
+/// A p for which p + f' > 0 everywhere, by little or by much.
+double unique_slope(Random& random, const WaveletNetwork& network) {
+    const double edges =
+        std::min(network.curve().below().at_edge.slope, network.curve().above().at_edge.slope);
+    const Interval slope = network.curve().slope_bounds();
+    return -std::min({slope.lower, edges, 0.0}) +
+           (slope.upper - slope.lower) * std::exp(uniform(random, -2.5, 4.0));
+}
+
+/// f in extended precision, inside the domain.
+long double exact(const NetworkParameters& network, long double x) {
+    long double sum = static_cast<long double>(network.linear[0]) * x + network.bias;
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        const long double u = network.alpha[i] * (x - network.beta[i]);
+        sum += network.weight[i] * (u * u - 1.0L) * std::exp(-0.5L * u * u);
+    }
+    return sum;
+}
+
+/// The solution inside the domain in extended precision, by bisection of a bracket.
+long double exact_solution(const NetworkParameters& network, long double p, long double q) {
+    long double low = 0.0L;
+    long double high = 1.0L;
+    for (int k = 0; k < 64; ++k) {
+        const long double middle = 0.5L * (low + high);
+        (exact(network, middle) + p * middle < q ? low : high) = middle;
+    }
+    return 0.5L * (low + high);
+}
+
+/// Soft, a click that falls with slope -15, and a wall: 10 wavelets over [0, 0.6] rad.
+WaveletNetwork switch_and_wall() {
+    NetworkParameters network{1, {}, {}, {}, {12.0}, 0.0};
+    const auto add = [&](double alpha, double beta, double weight) {
+        network.alpha.push_back(alpha);
+        network.beta.push_back(beta);
+        network.weight.push_back(weight);
+    };
+    add(30.0, 0.15, -0.45);
+    add(25.0, 0.45, 0.3);
+    add(15.0, 0.5, -0.8);
+    add(8.0, 0.62, 1.5);
+    add(40.0, 0.3, 0.02);
+    add(60.0, 0.41, 0.02);
+    return {network, {{0.0}, {0.6}, Continuation::Free, Continuation::Linear, std::nullopt}};
+}
+
+TEST(Resolvent, KeepsItsCertifiedErrorEverywhere) {
+    Random random{61};
+    int tabulated = 0;
+    for (int k = 0; k < cases(25); ++k) {
+        const WaveletNetwork network = random_scene(random, static_cast<std::size_t>(1 + k % 16));
+        const double p = unique_slope(random, network);
+        const Resolvent resolvent{network.curve(), p};
+        if (!resolvent.tabulated()) {
+            continue;
+        }
+        ++tabulated;
+        EXPECT_LE(resolvent.position_error(), 1e-12);
+        const double from = network.curve().inside(0.0).value;
+        const double to = network.curve().inside(1.0).value + p;
+        for (int j = 0; j < 200; ++j) {
+            const double q = uniform(random, from, to);
+            const Solution solution = resolvent.solve(network, {}, {p, q}, {});
+            ASSERT_EQ(solution.evaluations, 0);
+            ASSERT_LE(std::abs(solution.position - exact_solution(network.parameters(), p, q)),
+                      resolvent.position_error())
+                << k << " p = " << p << " q = " << q;
+        }
+    }
+    EXPECT_GE(tabulated, cases(25) * 7 / 10);
+}
+
+TEST(Resolvent, AgreesWithNewtonInsideAndBeyondTheDomain) {
+    Random random{62};
+    for (const auto continuation : {Continuation::Linear, Continuation::Free}) {
+        for (int k = 0; k < cases(20); ++k) {
+            const WaveletNetwork network = random_scene(random, 6, continuation);
+            const double p = unique_slope(random, network);
+            const Resolvent resolvent{network.curve(), p};
+            if (!resolvent.tabulated()) {
+                continue;
+            }
+            for (int j = 0; j < 200; ++j) {
+                const double q = uniform(random, -2.0, 3.0) * p;
+                const Solution table = resolvent.solve(network, {}, {p, q}, {});
+                const Solution newton = LoadLineSolver{}.solve(network, {}, {p, q}, 0.5);
+                ASSERT_EQ(table.status, Status::Ok);
+                ASSERT_NEAR(table.position, newton.position, 4e-12 * (1.0 + std::abs(newton.position)))
+                    << p << " " << q;
+                ASSERT_NEAR(table.environment.force, newton.environment.force, 1e-11 * (p + std::abs(q)));
+                if (std::min(std::abs(table.position), std::abs(table.position - 1.0)) > 1e-9) {
+                    ASSERT_EQ(table.environment.extrapolated, newton.environment.extrapolated) << q;
+                }
+            }
+        }
+    }
+}
+
+TEST(Resolvent, AtTheEdgesIsTheEdge) {
+    Random random{63};
+    const WaveletNetwork network = random_scene(random, 7);
+    const double p = 2000.0;
+    const Resolvent resolvent{network.curve(), p};
+    ASSERT_TRUE(resolvent.tabulated());
+    for (const double edge : {0.0, 1.0}) {
+        const double q = network.curve().inside(edge).value + p * edge;
+        for (const double near : {q, std::nextafter(q, -1e300), std::nextafter(q, 1e300)}) {
+            EXPECT_NEAR(resolvent.solve(network, {}, {p, near}, {}).position, edge, 1e-12);
+        }
+    }
+}
+
+TEST(Resolvent, DoesNotPretend) {
+    Random random{64};
+    const WaveletNetwork network = random_scene(random, 8);
+    const double steepest = network.curve().slope_bounds().lower;
+    // Not unique, not a number, another load line's slope, more exact than doubles are: Newton's answer.
+    const Resolvent folded{network.curve(), -0.5 * steepest};
+    EXPECT_FALSE(folded.tabulated());
+    EXPECT_EQ(folded.solver().least_slope, 0.0);
+    EXPECT_FALSE((Resolvent{network.curve(), std::nan("")}).tabulated());
+    EXPECT_FALSE((Resolvent{network.curve(), 2000.0, {1e-18}}).tabulated());
+    EXPECT_FALSE((Resolvent{network.curve(), 2000.0, {1e-12, 100}}).tabulated());
+    const Resolvent resolvent{network.curve(), 2000.0};
+    ASSERT_TRUE(resolvent.tabulated());
+    const Solution other = resolvent.solve(network, {}, {3000.0, 1000.0}, {});
+    EXPECT_GT(other.evaluations, 0);
+    EXPECT_NEAR(network.at(other.position, {}).force + 3000.0 * other.position, 1000.0, 1e-8);
+    const double infinity = std::numeric_limits<double>::infinity();
+    for (const double q : {std::nan(""), infinity, -infinity}) {
+        EXPECT_EQ(resolvent.solve(network, {}, {2000.0, q}, {}).status, Status::NonFinite);
+    }
+}
+
+TEST(Resolvent, PromisesOnlyWhatWasAsked) {
+    Random random{65};
+    const WaveletNetwork network = random_scene(random, 8);
+    int tabulated = 0;
+    for (double asked = 1e-6; asked > 1e-18; asked *= 0.5) {
+        const Resolvent resolvent{network.curve(), 500.0, {asked}};
+        EXPECT_LE(resolvent.position_error(), asked);
+        tabulated += resolvent.tabulated() ? 1 : 0;
+    }
+    EXPECT_GE(tabulated, 20);
+    EXPECT_LE(tabulated, 36) << "a few units in the last place are out of reach";
+}
+
+/// A hand that presses and lets go, 1 kHz.
+double hand(int tick) {
+    const double time = 1e-3 * tick;
+    return 0.25 - 0.24 * std::cos(std::numbers::pi * time) + 0.01 * std::sin(14.0 * std::numbers::pi * time);
+}
+
+TEST(Resolvent, RendersWhatNewtonRenders) {
+    const WaveletNetwork network = switch_and_wall();
+    const Inertia inertia{0.001, 0.5};
+    const VirtualCoupling coupling{100.0, 0.02};
+    const LoadLineSolver exact_solver;
+    Implicit newton{network, inertia, coupling, 1e-3, exact_solver};
+    const Resolvent resolvent{network.curve(), decltype(newton)::load_line_slope(inertia, coupling, 1e-3)};
+    ASSERT_TRUE(resolvent.tabulated());
+    Implicit table{network, inertia, coupling, 1e-3, resolvent};
+    Massless massless_newton{network, coupling, 1e-3};
+    const Resolvent massless_resolvent{network.curve(),
+                                       decltype(massless_newton)::load_line_slope(coupling, 1e-3)};
+    ASSERT_TRUE(massless_resolvent.tabulated());
+    Massless massless_table{network, coupling, 1e-3, massless_resolvent};
+    for (int k = 0; k < 4000; ++k) {
+        const Rendered expected = newton.step(hand(k));
+        const Rendered rendered = table.step(hand(k));
+        ASSERT_EQ(rendered.evaluations, 0) << k;
+        ASSERT_NEAR(rendered.environment_position, expected.environment_position, 1e-11) << k;
+        ASSERT_NEAR(rendered.force, expected.force, 1e-9) << k;
+        const Rendered massless_expected = massless_newton.step(hand(k));
+        const Rendered massless = massless_table.step(hand(k));
+        ASSERT_EQ(massless.evaluations, 0) << k;
+        ASSERT_NEAR(massless.environment_position, massless_expected.environment_position, 1e-12) << k;
+        ASSERT_NEAR(massless.force, massless_expected.force, 1e-10) << k;
+    }
+}
+
+// spec section 5: "with the predictor ..., 1.008 evaluations a step (textbook: 2.5 to 3.4)"
+TEST(CertifiedSolver, NeedsOneEvaluationAStep) {
+    const WaveletNetwork network = switch_and_wall();
+    const Inertia inertia{0.001, 0.5};
+    const VirtualCoupling coupling{100.0, 0.02};
+    const double p = Implicit<WaveletNetwork>::load_line_slope(inertia, coupling, 1e-3);
+    Implicit quick{network, inertia, coupling, 1e-3, certified_solver(network.curve(), p)};
+    Implicit slow{network, inertia, coupling, 1e-3};
+    int evaluations = 0;
+    for (int k = 0; k < 4000; ++k) {
+        const Rendered rendered = quick.step(hand(k));
+        const Rendered expected = slow.step(hand(k));
+        evaluations += rendered.evaluations;
+        ASSERT_EQ(rendered.status, Status::Ok);
+        ASSERT_NEAR(rendered.environment_position, expected.environment_position, 1e-11) << k;
+        ASSERT_NEAR(rendered.force, expected.force, 1e-9) << k;
+    }
+    EXPECT_LE(evaluations, 4000 * 105 / 100);
+}
+
+TEST(CertifiedSolver, IsNotFooledByTheKinksAtTheEdges) {
+    Random random{66};
+    for (int k = 0; k < cases(100); ++k) {
+        const WaveletNetwork network =
+            random_scene(random, 8, k % 2 == 0 ? Continuation::Linear : Continuation::Free);
+        const double p = unique_slope(random, network);
+        const LoadLineSolver solver = certified_solver(network.curve(), p);
+        for (int j = 0; j < 100; ++j) {
+            const double edge = j % 2 == 0 ? 0.0 : 1.0;
+            const double start = edge + 1e-6 * uniform(random, -1.0, 1.0);
+            const double wanted = edge + 1e-6 * uniform(random, -1.0, 1.0);
+            const double q = network.at(wanted, {}).force + p * wanted;
+            ASSERT_NEAR(solver.solve(network, {}, {p, q}, start).position, wanted, 1e-12)
+                << p << " " << start;
+        }
+    }
+}
+
+// 401 x 401 pairs of start and right-hand side, for load lines from just unique to steep.
+TEST(CertifiedSolver, EndsWithinSixteenEvaluationsForEveryStartAndRightHandSide) {
+    const WaveletNetwork network = switch_and_wall();
+    const double lowest = -network.curve().slope_bounds().lower;
+    for (const double p : {1.02 * lowest, 1.3 * lowest, 120.0, 1620.0}) {
+        const LoadLineSolver solver = certified_solver(network.curve(), p);
+        ASSERT_GT(solver.least_slope, 0.0) << p;
+        const Resolvent resolvent{network.curve(), p};
+        ASSERT_TRUE(resolvent.tabulated() || p < 1.1 * lowest) << p;
+        int worst = 0;
+        for (int i = 0; i <= 400; ++i) {
+            const double start = -0.3 + 1.2 * i / 400.0;
+            for (int j = 0; j <= 400; ++j) {
+                const double q = p * (-0.3 + 1.2 * j / 400.0) + 5.0 * j / 400.0;
+                const Solution solution = solver.solve(network, {}, {p, q}, start);
+                ASSERT_EQ(solution.status, Status::Ok) << p << " " << start << " " << q;
+                const double residual = network.at(solution.position, {}).force + p * solution.position - q;
+                ASSERT_LE(std::abs(residual), 3e-13 * (p + 70.0) + 16.0 * epsilon * std::abs(q))
+                    << p << " " << start << " " << q;
+                if (i == 0) {
+                    ASSERT_NEAR(resolvent.solve(network, {}, {p, q}, {}).position, solution.position,
+                                1e-12 + 2e-13 * (p + 70.0) / solver.least_slope);
+                }
+                worst = std::max(worst, solution.evaluations);
+            }
+        }
+        EXPECT_LE(worst, 16) << p;
+    }
+}
+
+}  // namespace
+}  // namespace palpate
