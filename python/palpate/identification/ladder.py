@@ -264,7 +264,9 @@ class _Ladder:
         if not named and self._better(below, free) is below:
             return below
         kept = self._constrained(free)
-        return kept if named or kept is free else self._better(self._single_valued(kept), kept)
+        if named or kept is free:
+            return kept
+        return self._better(self._single_valued(kept) if len(below.solution.basis) else below, kept)
 
     def _single_valued(self, hysteresis: _Rung) -> _Rung:
         """A force of position alone on the wavelets of a hysteresis rung, those it does not need removed.
@@ -279,10 +281,9 @@ class _Ladder:
         problem.set_prior(start.rss)
         solution = prune(problem, problem.solve(start.basis), self._options)
         n_parameters = problem.n_parameters(len(solution.basis))
+        name = "position" if len(solution.basis) else "linear"
         return self._recorded(
-            self._constrained(
-                _Rung("position", rows, problem, solution, n_parameters, hysteresis.stop_reason)
-            )
+            self._constrained(_Rung(name, rows, problem, solution, n_parameters, hysteresis.stop_reason))
         )
 
     def _best_play(self, basis: Basis) -> tuple[float, Compressed]:
