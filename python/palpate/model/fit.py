@@ -23,7 +23,7 @@ class Fit:
     """How an identification ended."""
 
     rung: str
-    """The simplest rung of the ladder that earned its place: constant, linear, network, hysteresis, ..."""
+    """The simplest rung of the ladder that earned its place: constant, linear, position, hysteresis, ..."""
     stop_reason: str
     nrmse: float
     """RMSE over the population standard deviation of the force, on the rows it was identified on"""
