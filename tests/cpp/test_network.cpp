@@ -138,6 +138,17 @@ TEST(Network, ClosingTheSeamLeavesTheMiddleOfThePeriod) {
     EXPECT_NEAR(force(knob, 0.7), force(WaveletNetwork{parameters, domain}, 0.7), 1e-12);
 }
 
+TEST(Network, AClosedSeamStaysAsItIs) {
+    Random random{9};
+    for (int k = 0; k < cases(100); ++k) {
+        Domain domain{{-0.3}, {0.7}, {}, {}, 1.0};
+        const WaveletNetwork once{random_network(random, 8), domain};
+        const WaveletNetwork twice{once.parameters(), domain};
+        EXPECT_EQ(twice.parameters().linear, once.parameters().linear);
+        EXPECT_EQ(twice.parameters().bias, once.parameters().bias);
+    }
+}
+
 TEST(Network, NanInIsNanOut) {
     const WaveletNetwork network{{1, {5.0}, {0.5}, {1.0}, {2.0}, 0.0}, unit_domain()};
     EXPECT_TRUE(std::isnan(force(network, std::numeric_limits<double>::quiet_NaN())));

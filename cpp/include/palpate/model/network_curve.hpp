@@ -123,9 +123,19 @@ class NetworkCurve {
         return here;
     }
 
-    /// The jump between the two ends of a period is spread over it as a ramp: the force is continuous.
+    /// The jump between the two ends of a period is spread over it as a ramp: the force is continuous. A jump
+    /// of rounding size is none: a network that was closed once keeps its numbers.
     void close_the_seam() noexcept {
-        const double ramp = (inside(upper_).value - inside(lower_).value) / (upper_ - lower_);
+        double size = std::abs(network_.bias) +
+                      std::abs(network_.linear[0]) * std::max(std::abs(lower_), std::abs(upper_));
+        for (const double weight : network_.weight) {
+            size += std::abs(weight);
+        }
+        const double jump = inside(upper_).value - inside(lower_).value;
+        if (std::abs(jump) <= 1e-12 * size) {
+            return;
+        }
+        const double ramp = jump / (upper_ - lower_);
         network_.linear[0] -= ramp;
         network_.bias += ramp * 0.5 * (lower_ + upper_);
     }
