@@ -107,19 +107,18 @@ void massless_resolvent(benchmark::State& state) {
 /// Newton's method with the predictor and the certified stop.
 void implicit_certified(benchmark::State& state) {
     const auto object = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
-    const double p = palpate::Implicit<palpate::CompiledNetwork>::load_line_slope(inertia, coupling, period);
     tick(state,
          palpate::Implicit{palpate::CompiledNetwork{object}, inertia, coupling, period,
-                           palpate::certified_solver(object.curve(), p)},
+                           palpate::certified_solver(palpate::piecewise(object.curve()))},
          1.5);
 }
 
 /// The same, over the sum of wavelets itself.
 void implicit_certified_network(benchmark::State& state) {
     const auto object = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
-    const double p = palpate::Implicit<palpate::WaveletNetwork>::load_line_slope(inertia, coupling, period);
     tick(state,
-         palpate::Implicit{object, inertia, coupling, period, palpate::certified_solver(object.curve(), p)},
+         palpate::Implicit{object, inertia, coupling, period,
+                           palpate::certified_solver(palpate::piecewise(object.curve()))},
          1.5);
 }
 

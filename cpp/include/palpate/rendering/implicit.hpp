@@ -46,7 +46,7 @@ class Implicit {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
-        memory_ = {position};
+        memory_ = typename Solver::Memory{position};
         before_ = position;
     }
 
@@ -80,7 +80,6 @@ class Implicit {
             return detail::refused(position_);
         }
         environment_.advance(solution.position, state_);
-        memory_ = solver_.remember(line, solution);
         before_ = position_;
         position_ = solution.position;
         return {0.0, position_, solution.evaluations, solution.status, solution.environment.extrapolated};
