@@ -42,6 +42,8 @@ class Implicit {
                (inertia.mass / (period * period) + inertia.damping / period);
     }
 
+    [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;

@@ -30,6 +30,8 @@ class Massless {
         return coupling.stiffness + coupling.damping / period;
     }
 
+    [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;

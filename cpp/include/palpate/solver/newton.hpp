@@ -61,6 +61,8 @@ struct LoadLineSolver {
 
     using Memory = WarmStart;
 
+    [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
+
     /// Whether every load line of this slope is certified to have one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p + least_slope > 0.0; }
 

@@ -13,6 +13,8 @@ namespace palpate {
 struct OneNewtonStep {
     using Memory = WarmStart;
 
+    [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
+
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  WarmStart& memory) const noexcept {

@@ -83,4 +83,19 @@ template <class Slope>
     return force;
 }
 
+/// The force multiplied by a factor.
+[[nodiscard]] inline PiecewiseForce scaled(PiecewiseForce force, double factor) {
+    for (double& weight : force.network.weight) {
+        weight *= factor;
+    }
+    force.network.linear[0] *= factor;
+    force.network.bias *= factor;
+    for (auto* side : {&force.below, &force.above}) {
+        for (OuterLine& line : *side) {
+            line.slope *= factor;
+        }
+    }
+    return force;
+}
+
 }  // namespace palpate

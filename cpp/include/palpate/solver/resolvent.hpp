@@ -167,8 +167,10 @@ class Resolvent {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept) &&
               std::isfinite(memory.newton.position))) {
             const Solution solution = solver_.solve(environment, state, line, memory.newton);
-            memory.branch = 0;
-            memory.turns = 0.0;
+            if (solution.status != Status::NonFinite) {
+                memory.branch = 0;
+                memory.turns = 0.0;
+            }
             return solution;
         }
         Memory next = memory;
