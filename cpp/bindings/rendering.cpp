@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -111,6 +113,18 @@ void bind_rendering(py::module_& module) {
                    ", compensated=" + (s.compensated ? "True" : "False") +
                    ", play_radius=" + std::to_string(s.play_radius) + ")";
         });
+
+    module.def(
+        "solver_name",
+        [](const ForceModel& model, const Scheme& s, double period_s) -> std::optional<std::string> {
+            require_period(period_s);
+            const auto name = solver_name(model, s, period_s);
+            return name ? std::optional<std::string>{*name} : std::nullopt;
+        },
+        "model"_a, "scheme"_a, "period_s"_a,
+        "How the load line is solved: 'table' where certified tables answer, at least in part, else "
+        "'newton';\n"
+        "None where a structure has no load line.");
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,

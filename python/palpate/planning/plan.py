@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._core import DeviceProfile, Scheme
+from .._core import DeviceProfile, Scheme, solver_name
 from ..errors import InputError
 from ..model import Model
 
@@ -53,8 +53,8 @@ class Plan:
 
     @property
     def solver(self) -> str | None:
-        """How the load line is solved; None where there is nothing to solve."""
-        return "newton" if self.structure in ("massless", "implicit") else None
+        """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
+        return solver_name(self.model, self.scheme, DeviceProfile().period_s)
 
     def check_for(self, device: DeviceProfile) -> None:
         """Refuse what is sure to diverge on this device.
