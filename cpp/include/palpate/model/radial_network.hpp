@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "palpate/model/parameters.hpp"
+#include "palpate/model/radial_bounds.hpp"
 #include "palpate/model/wavelet.hpp"
 
 namespace palpate {
@@ -64,6 +65,16 @@ class RadialNetwork {
         for (std::size_t j = 0; j < dimension(); ++j) {
             gradient[j] = x[j] == projected(x, j) ? partial(x, j) : clamped_partial(x, j);
         }
+    }
+
+    /// Proved bounds of the value inside the domain and of the gradient anywhere: outside, its components are
+    /// those at the projection or are clipped towards zero.
+    [[nodiscard]] RadialBounds bounds(double relative = 0.01) const {
+        RadialBounds bounds = radial_bounds(network_, domain_.lower, domain_.upper, relative);
+        for (Interval& component : bounds.gradient) {
+            component = component.with({0.0, 0.0});
+        }
+        return bounds;
     }
 
   private:
