@@ -24,6 +24,7 @@
 #include "palpate/loop.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/model/fingerprint.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/model/hat_sum.hpp"
 #include "palpate/model/hysteresis.hpp"
@@ -51,4 +52,5 @@
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/one_newton_step.hpp"
 #include "palpate/solver/resolvent.hpp"
+#include "palpate/stability/certificate.hpp"
 #include "palpate/status.hpp"
