@@ -74,7 +74,11 @@ void require_period(double period_s) {
 void bind_rendering(py::module_& module) {
     const Scheme scheme;
     const std::string structure{structure_names[static_cast<std::size_t>(scheme.structure)]};
-    module.attr("structure_names") = py::make_tuple("direct", "massless", "implicit", "explicit");
+    py::list names;
+    for (const std::string_view name : structure_names) {
+        names.append(std::string(name));
+    }
+    module.attr("structure_names") = py::tuple(names);
     py::class_<Scheme>(module, "Scheme", "How a model is rendered: the structure and its numbers, SI units.")
         .def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
                          double mass, double damping, bool compensated, double play_radius) {

@@ -32,7 +32,7 @@ INCLUDES = {
     "guard": {"rendering", "solver", "dynamics", "model"},
     "device": set(),
     "realtime": set(),
-    "io": {"model", "device", "realtime"},
+    "io": {"model", "device", "realtime", "rendering", "stability"},
     "bench": {"rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
@@ -41,8 +41,8 @@ INCLUDES = {
     "simulation": {"controller", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
 
-# Headers that need a library beside the standard one; no other header includes them, palpate.hpp neither.
-LEAF_HEADERS = {"device/usb.hpp", "io/model_file.hpp"}
+# Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
+LEAF_HEADERS = {"device/usb.hpp", "io/json_field.hpp", "io/model_file.hpp", "io/plan_file.hpp"}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
 # in realtime; files and sockets in io.
@@ -131,7 +131,8 @@ def test_headers_include_only_what_stands_below_them(path: Path) -> None:
     name = path.relative_to(HEADERS)
     here = name.parts[0].removesuffix(".hpp")
     ours = [include.removeprefix("palpate/") for include in included(path) if include.startswith("palpate/")]
-    assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
+    if name.as_posix() not in LEAF_HEADERS:
+        assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
     if here == "palpate":
         return
     rooms = {include.split("/")[0].removesuffix(".hpp") for include in ours}

@@ -101,6 +101,7 @@ namespace detail {
         bench.length = (model.domain().upper[0] - model.domain().lower[0]) / knob_travel;
         bench.stiffness = force / bench.length;
         bench.device.id += ", scaled";
+        bench.device.position_unit = "m";
         bench.device.inertia *= bench.stiffness;
         bench.device.viscous_damping *= bench.stiffness;
         bench.device.coulomb_friction *= force;

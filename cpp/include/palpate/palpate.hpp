@@ -53,4 +53,5 @@
 #include "palpate/solver/one_newton_step.hpp"
 #include "palpate/solver/resolvent.hpp"
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/certificate_check.hpp"
 #include "palpate/status.hpp"

@@ -78,6 +78,7 @@ def bench_for(model: Model) -> Bench:
         force_step=knob.force_step * force,
         delay_samples=knob.delay_samples,
         force_limit=knob.force_limit * force,
+        position_unit="m",
     )
     return Bench(device, sweeping_hand(model, device, scale=stiffness), stiffness)
 
