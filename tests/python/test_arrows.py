@@ -43,8 +43,8 @@ INCLUDES = {
 # Headers that need a library beside the standard one; no other header includes them, palpate.hpp neither.
 LEAF_HEADERS = {"device/usb.hpp", "io/model_file.hpp"}
 
-# What of the operating system a folder may use, beside the standard library: clock, scheduler, memory, latency
-# in realtime; files and sockets in io.
+# What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
+# and latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
     "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
