@@ -45,9 +45,9 @@ INCLUDES = {
 LEAF_HEADERS = {"device/usb.hpp", "io/json_field.hpp", "io/model_file.hpp", "io/plan_file.hpp"}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
-# in realtime; files and sockets in io.
+# and latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
-    "realtime": {"pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h"},
+    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 
