@@ -30,9 +30,11 @@ LONG_RUN_S = 6.0 * SCALE
 pytestmark = needs_program
 
 
-@pytest.mark.parametrize("rate", [100, 1000, 5000])
-@pytest.mark.parametrize("structure", ["direct", "massless", "implicit"])
-def test_a_run_leaves_a_complete_recording(tmp_path: Path, rate: int, structure: str) -> None:
+@pytest.mark.parametrize(
+    ("structure", "rate"),
+    [("direct", 100), ("direct", 10_000), ("massless", 1000), ("implicit", 1000), ("explicit", 5000)],
+)
+def test_a_run_leaves_a_complete_recording(tmp_path: Path, structure: str, rate: int) -> None:
     out = tmp_path / "felt.csv"
     answer = control(
         MODEL,
@@ -123,7 +125,7 @@ def expect_cut_recording(answer: subprocess.CompletedProcess[str], out: Path, ti
 
 def test_a_file_that_may_not_grow_stops_the_recording_and_not_the_loop(tmp_path: Path) -> None:
     def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 
     out = tmp_path / "felt.csv"
     answer = control(MODEL, "--duration-s", 1, "--record", out, "--json", *PATIENT, preexec_fn=limit)
