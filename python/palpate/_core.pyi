@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'Scheme', 'Status', 'TransferFunction', 'certify', 'certify_bounds', 'coupling_need', 'environment_filters', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'environment_filters', 'explicit_slope_limit', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -33,6 +33,8 @@ class Status:
       Jump : the position moved farther in one sample than the device can; the force sent is zero
     
       Frozen : the position stood still at once out of full motion; the force sent is zero
+    
+      Ramp : the force is still on its way up from zero after the start
     """
     Fault: typing.ClassVar[Status]
     Frozen: typing.ClassVar[Status]
@@ -43,6 +45,7 @@ class Status:
     NonFinite: typing.ClassVar[Status]
     NotUnique: typing.ClassVar[Status]
     Ok: typing.ClassVar[Status]
+    Ramp: typing.ClassVar[Status]
     Timeout: typing.ClassVar[Status]
     __members__: typing.ClassVar[dict[str, Status]]
     @typing.overload
@@ -348,9 +351,15 @@ class Scheme:
         ...
     def __repr__(self) -> str:
         ...
-    def validate(self, model: ForceModel) -> None:
+    def steepest_slope(self, model: ForceModel) -> float:
         """
-        ValueError names the field, its value and what would be right for this model.
+        Largest slope of the model that the structure meets, never below 0; h / r is part of it while a
+        hysteresis model sticks.
+        """
+    def validate(self, model: ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        """
+        ValueError names the field, its value and what would be right for this model; with a period also
+        what is sure to diverge at it.
         """
     @property
     def compensated(self) -> bool:
@@ -519,6 +528,53 @@ class Certificate:
         """
         One sentence.
         """
+class Bench:
+    """
+    A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
+    """
+    def __repr__(self) -> str:
+        ...
+    def scheme(self, model: ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Scheme:
+        """
+        What is given, in the model's own units; what is None follows the model in this bench's scale.
+        """
+    @property
+    def device(self) -> DeviceProfile:
+        ...
+    @property
+    def hand(self) -> Hand:
+        ...
+    @property
+    def length(self) -> float:
+        """
+        Positions, over those of the default knob.
+        """
+    @property
+    def stiffness(self) -> float:
+        """
+        Force per position, over that of the default knob.
+        """
+class LoopSettings:
+    """
+    When a rendering ticks, and when it ends: the defaults.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def duration_s(self) -> float:
+        ...
+    @property
+    def lowest_rate_share(self) -> float:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        ...
+def bench_for(model: ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Bench:
+    """
+    The bench on which a model of one position is tried. An angle is tried on the default knob;
+    for any other unit it is the same knob as a scale model: lengths and forces are multiplied so
+    that travel and largest force stand to the device as in the knob's own scene.
+    """
 def certify(model: ForceModel, scheme: Scheme, device: DeviceProfile) -> Certificate:
     """
     What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason;
@@ -535,6 +591,11 @@ def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, dampin
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
     The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
+    """
+def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
+    """
+    Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
+    driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.
     """
 def fingerprint(model: ForceModel) -> str:
     """
@@ -579,12 +640,13 @@ def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radi
     State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
     otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).
     """
-def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1) -> dict:
+def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8) -> dict:
     """
     The model rendered in real time on a simulated device: the loop of palpate-control.
     
     Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the
     recording, which grows as record.part; a `telemetry_port` of this machine gets JSON lines over UDP.
+    A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.
     Returns the summary by name; ValueError where it is refused before anything moves.
     """
 def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
@@ -628,8 +690,9 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
 __version__: str = '0.1.0'
 longest_delay_samples: int = 16
 paper_sample_time_s: float = 0.001
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero'}
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start'}
 structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')
+usual_telemetry_hz: float = 50.0
 wavelet_curvature_bound: float = 3.0
 wavelet_jerk_bound: float = 5.7831
 wavelet_slope_bound: float = 1.3801190462

@@ -33,7 +33,7 @@ INCLUDES = {
     "device": set(),
     "realtime": set(),
     "io": {"model", "device", "realtime", "rendering", "stability"},
-    "bench": {"rendering", "solver", "dynamics", "model", "device", "guard"},
+    "bench": {"simulation", "rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},

@@ -72,10 +72,11 @@ class Controller {
   private:
     /// The order of every output: ramp, limit, slew. The limit answers for numbers that are none.
     [[nodiscard]] Status guarded(const Rendered& rendered, double& force, Status believed) noexcept {
-        force = guards_.ramp.next() * rendered.force;
+        force = rendered.force;
+        const Status ramped = guards_.ramp.apply(force);
         const Status limited = guards_.limit.apply(force);
         const Status slewed = guards_.slew.apply(force);
-        for (const Status status : {rendered.status, limited, slewed}) {
+        for (const Status status : {rendered.status, ramped, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;
             }

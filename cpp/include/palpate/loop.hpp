@@ -12,6 +12,7 @@
 
 #include "palpate/controller.hpp"
 #include "palpate/io/tick_record.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/timing.hpp"
 #include "palpate/status.hpp"
@@ -33,8 +34,7 @@ inline constexpr double highest_rate_hz = 10'000.0;
 inline void validate(const LoopSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
-                                        right);
+            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
         }
     };
     require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",

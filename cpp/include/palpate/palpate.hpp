@@ -32,6 +32,7 @@
 #include "palpate/model/piecewise_septic.hpp"
 #include "palpate/model/radial_network.hpp"
 #include "palpate/model/wavelet.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/realtime/flight_recorder.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/privileges.hpp"

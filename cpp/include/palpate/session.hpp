@@ -111,6 +111,7 @@ template <Device D, class Watch>
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
+    validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, [&](auto structure) {
         Controller controller{device, std::move(structure),
                               Guards{force_limit(guards), slew_limit(guards, period_s),

@@ -10,6 +10,7 @@
 
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/reading_guard.hpp"
+#include "palpate/readable.hpp"
 
 namespace palpate {
 
@@ -27,8 +28,7 @@ struct GuardSettings {
 inline void validate(const GuardSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
-                                        right);
+            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
         }
     };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
