@@ -22,20 +22,23 @@ from .._typing import Float1D, Float2D
 from ..identification.constraints import slope_limited
 from ..model import Model
 
-_SAMPLES = 2001
+_SAMPLES = 1001
 """Positions over the domain [-]"""
 
-_SMOOTHING = 0.005
-"""Standard deviation of the kernel [share of the travel]"""
+_SMOOTHINGS = (0.005, 0.02)
+"""Standard deviations of the kernel that are tried [share of the travel]"""
 
-_CLOSE = 2e-4
-"""Largest error of the further wavelets at which no more are taken [share of the force's range]"""
+_CLOSE = 5e-5
+"""RMS error at which no further wavelets are taken [share of the force's range]"""
+
+_CLOSE_SLOPE = 0.01
+"""The same of the slope [share of the smaller limit]"""
 
 _MOST = 64
 """Further wavelets at most [-]"""
 
-_ROUNDS = 8
-"""How often the limits are drawn in [-]"""
+_ROUNDS = 4
+"""How often the limits are drawn in before a wider kernel is tried [-]"""
 
 _SCALE_RATIO = 1.6
 _SCALE_STEP = 0.75
@@ -70,15 +73,18 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
     low, high : float
         Slopes of either stroke [force/position]; may be infinite.
     """
-    inner = [low, high]
-    for _ in range(_ROUNDS):
-        if not inner[0] < inner[1]:
-            return None
-        limited = _limited_once(model, inner[0], inner[1])
-        found = sliding_slopes(limited)
-        if found[0] >= low and found[1] <= high:
-            return limited
-        inner = [inner[0] + max(0.0, 1.1 * (low - found[0])), inner[1] - max(0.0, 1.1 * (found[1] - high))]
+    for smoothing in _SMOOTHINGS:
+        sigma = smoothing * float(model.upper[0] - model.lower[0])
+        inner = [low, high]
+        for _ in range(_ROUNDS):
+            if not inner[0] < inner[1]:
+                break
+            limited = _limited_once(model, inner[0], inner[1], sigma)
+            found = sliding_slopes(limited)
+            if found[0] >= low and found[1] <= high:
+                return limited
+            inner[0] += max(0.0, 1.1 * (low - found[0]))
+            inner[1] -= max(0.0, 1.1 * (found[1] - high))
     return None
 
 
@@ -117,16 +123,14 @@ def _strokes(model: Model, x: Float1D) -> Float2D:
     return np.array([model.force(x, direction=side) for side in sides])
 
 
-def _limited_once(model: Model, low: float, high: float) -> Model:
-    lower, upper = float(model.lower[0]), float(model.upper[0])
-    sigma = _SMOOTHING * (upper - lower)
-    x = np.linspace(lower, upper, _SAMPLES)
+def _limited_once(model: Model, low: float, high: float, sigma: float) -> Model:
+    x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
-    changes = [_change(x, stroke, low, high, sigma, model.period is not None) for stroke in strokes]
+    changes = [_change(x, stroke, low, high, sigma, model) for stroke in strokes]
     if len(changes) == 2:  # of g and h
         changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
     alpha, beta = _candidates(x, np.any(np.array(changes) != 0.0, axis=0), sigma)
-    close = _CLOSE * float(np.ptp(strokes))
+    close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
     before = model.alpha[:, 0], model.beta[:, 0]
     chosen, coefficients = _fit(x, np.array(changes), before, (alpha, beta), sigma, close)
     network = model.to_dict()["network"]
@@ -154,25 +158,25 @@ def _least_loss(model: Model) -> float:
     return float(_core.force_bounds(model, float(model.upper[0] - model.lower[0])).loss_min)
 
 
-def _change(x: Float1D, force: Float1D, low: float, high: float, sigma: float, periodic: bool) -> Float1D:
+def _change(x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model) -> Float1D:
     """What has to be added to a force for its slopes to lie within limits, kinks rounded; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
-    margin = n - 1 if periodic else int(np.ceil(6.0 * sigma / step))
-    if periodic:
-        turn = force[-1] - force[0]
-        wide = np.concatenate([force[:-1] - turn, force, force[1:] + turn])
+    margin = int(np.ceil(6.0 * sigma / step))
+    before = after = 0
+    wide = force
+    if model.period is not None:
+        before = after = n - 1
+        wide = np.concatenate([force[:-1] - force[-1] + force[0], force, force[1:] + force[-1] - force[0]])
     else:
-        wide = force
-    grid = x[0] + step * (np.arange(len(wide)) - (margin if periodic else 0))
-    nearest = slope_limited(grid, wide, low, high)
-    difference = nearest - wide
-    if not periodic:
-        nearest = _extended(nearest, margin)
-        difference = np.pad(difference, margin, mode="edge")
-    inside = slice(margin, margin + n)
+        # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
+        before, after = (n if side == "free" else 0 for side in (model.below, model.above))
+        wide = np.pad(force, (before, after))
+    grid = x[0] + step * (np.arange(len(wide)) - before)
+    nearest = _extended(slope_limited(grid, wide, low, high), margin)
+    inside = slice(margin + before, margin + before + n)
     smooth = gaussian_filter1d(nearest, sigma / step, mode="nearest")[inside]
-    touched = np.abs(difference) > 1e-9 * np.ptp(force)
-    near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest")[inside] > 1e-4
+    touched = np.abs(nearest[inside] - force) > 1e-9 * np.ptp(force)
+    near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
     return np.where(near, smooth - force, 0.0)
 
 
@@ -230,19 +234,25 @@ def _fit(
     basis = np.linalg.qr(always)[0]
     residual = targets - basis @ (basis.T @ targets)
     left = columns - basis @ (basis.T @ columns)
-    norms = np.linalg.norm(columns, axis=0)
+    norms = np.square(columns).sum(axis=0)
+    # Everything from here on is in products: a pivoted Cholesky factor of the candidates' Gram matrix.
+    gram, products = left.T @ left, left.T @ residual
+    size = np.diag(gram).copy()
+    rest = float(np.square(residual).sum())
+    factor = np.empty((_MOST, len(size)))
     chosen: list[int] = []
-    while len(chosen) < _MOST and np.abs(residual[: len(x)]).max() > close:
-        size = np.linalg.norm(left, axis=0)
-        new = size > 1e-3 * norms
-        gains = np.where(new, np.square(residual.T @ left).sum(axis=0) / np.where(new, size, 1.0) ** 2, 0.0)
+    while len(chosen) < _MOST and rest > residual.size * close**2:
+        new = size > 1e-6 * norms
+        gains = np.where(new, np.square(products).sum(axis=1) / np.where(new, size, 1.0), 0.0)
         best = int(np.argmax(gains))
         if gains[best] <= 0.0:
             break
+        k, root = len(chosen), np.sqrt(size[best])
+        factor[k] = (gram[best] - factor[:k, best] @ factor[:k]) / root
+        products = products - np.outer(factor[k], products[best] / root)
+        size = size - np.square(factor[k])
+        rest -= float(gains[best])
         chosen.append(best)
-        direction = left[:, best] / size[best]
-        residual = residual - np.outer(direction, direction @ residual)
-        left = left - np.outer(direction, direction @ left)
     design = np.concatenate([always, columns[:, chosen]], axis=1)
     coefficients = np.linalg.lstsq(design, targets, rcond=None)[0]
     return chosen, np.asarray(coefficients.T)
