@@ -6,11 +6,7 @@
 #include <utility>
 
 #include "palpate/device/device.hpp"
-#include "palpate/guard/energy_tank.hpp"
-#include "palpate/guard/limit_cycle_detector.hpp"
-#include "palpate/guard/limits.hpp"
-#include "palpate/guard/passivity_observer.hpp"
-#include "palpate/guard/reading_guard.hpp"
+#include "palpate/guard/guards.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/status.hpp"
 
@@ -24,18 +20,6 @@ struct Tick {
     Status status = Status::Ok;  ///< the first thing that was not Ok on the way
 };
 
-/// What a sample passes before it is believed, and a force before it is sent. Made of nothing but a force
-/// limit it is the guard of a simulation, where nothing else can go wrong.
-struct Guards {
-    ForceLimit limit;
-    SlewLimit slew;
-    ForceRamp ramp;
-    ReadingGuard reading;
-    EnergyTank tank;
-    LimitCycleDetector buzz;
-    PassivityObserver observer;  ///< looks on
-};
-
 /// One tick of rendering: read, compute, limit, send. No allocation, lock, exception, log or system call but
 /// the device's own. Whatever is wrong with a reading, the force sent is zero.
 template <Device D, Structure S>
@@ -45,7 +29,7 @@ class Controller {
         : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
 
     Controller(D& device, S structure, ForceLimit limit)
-        : Controller{device, std::move(structure), Guards{limit, {}, {}, {}, {}, {}, {}}} {}
+        : Controller{device, std::move(structure), Guards{.limit = limit}} {}
 
     /// Takes a first sample with zero force and puts the virtual object at rest there.
     [[nodiscard]] Status start() noexcept {

@@ -18,6 +18,7 @@
 #include "palpate/dynamics/transfer_function.hpp"
 #include "palpate/guard/energy_tank.hpp"
 #include "palpate/guard/guard_settings.hpp"
+#include "palpate/guard/guards.hpp"
 #include "palpate/guard/limit_cycle_detector.hpp"
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/passivity_observer.hpp"
