@@ -32,6 +32,7 @@
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/energy.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/model/fingerprint.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/model/hat_sum.hpp"
 #include "palpate/model/hysteresis.hpp"
@@ -59,4 +60,5 @@
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/one_newton_step.hpp"
 #include "palpate/solver/resolvent.hpp"
+#include "palpate/stability/certificate.hpp"
 #include "palpate/status.hpp"

@@ -14,6 +14,7 @@
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/inertia.hpp"
@@ -21,10 +22,19 @@
 
 namespace palpate {
 
-enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit };
+enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
 
-inline constexpr std::array<std::string_view, 4> structure_names{"direct", "massless", "implicit",
-                                                                 "explicit"};
+inline constexpr std::array<std::string_view, 5> structure_names{"direct", "massless", "implicit", "explicit",
+                                                                 "energy-consistent"};
+
+[[nodiscard]] constexpr std::string_view name_of(StructureKind structure) noexcept {
+    return structure_names[static_cast<std::size_t>(structure)];
+}
+
+/// Whether an object has mass in this structure.
+[[nodiscard]] constexpr bool has_mass(StructureKind structure) noexcept {
+    return structure != StructureKind::Direct && structure != StructureKind::Massless;
+}
 
 [[nodiscard]] inline StructureKind structure_named(std::string_view name) {
     for (std::size_t k = 0; k < structure_names.size(); ++k) {
@@ -33,7 +43,7 @@ inline constexpr std::array<std::string_view, 4> structure_names{"direct", "mass
         }
     }
     throw std::invalid_argument("structure is '" + std::string(name) +
-                                "', must be direct, massless, implicit or explicit");
+                                "', must be direct, massless, implicit, explicit or energy-consistent");
 }
 
 /// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are
@@ -58,7 +68,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
         require(positive(scheme.coupling.stiffness), "coupling_stiffness", scheme.coupling.stiffness, "> 0");
         require(not_negative(scheme.coupling.damping), "coupling_damping", scheme.coupling.damping, ">= 0");
     }
-    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+    if (has_mass(scheme.structure)) {
         require(positive(scheme.inertia.mass), "mass", scheme.inertia.mass, "> 0");
         require(not_negative(scheme.inertia.damping), "damping", scheme.inertia.damping, ">= 0");
     }
@@ -105,6 +115,9 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
                 return visit(Massless{environment, scheme.coupling, period_s, massless});
             case StructureKind::Implicit:
                 return visit(Implicit{environment, scheme.inertia, scheme.coupling, period_s, implicit});
+            case StructureKind::EnergyConsistent:
+                return visit(EnergyConsistent{environment, scheme.inertia, scheme.coupling, period_s,
+                                              1e-2 * model.finest_width()});
             case StructureKind::Explicit:
                 break;
         }
