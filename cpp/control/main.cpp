@@ -62,6 +62,7 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
     guards.slew_s = options.slew_s;
     guards.ramp_s = options.ramp_s;
     guards.frozen_s = options.frozen_s;
+    guards.energy_tank = !options.no_energy_tank;
     validate(guards);
     if (guards.force_limit > bench.device.force_limit) {
         refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +

@@ -80,6 +80,8 @@ void add_guards(CLI::App& app, Options& options) {
               "--frozen-s", options.frozen_s,
               "A position that stands this long out of full motion is an encoder that died, 0 = never"))
         ->capture_default_str();
+    group(app.add_flag("--no-energy-tank", options.no_energy_tank,
+                       "Let the rendering give more energy than the model can hold"));
     group(app.add_option("--tolerated-samples", options.loop.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
         ->capture_default_str();

@@ -32,6 +32,7 @@ struct Options {
     double slew_s = GuardSettings{}.slew_s;
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
+    bool no_energy_tank = false;
 
     RealTimeOptions real_time;
     std::vector<std::string> faults;

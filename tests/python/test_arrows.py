@@ -37,6 +37,7 @@ INCLUDES = {
     "loop": {"controller", "realtime", "io"},
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
+    "closed_loop": {"controller", "guard", "rendering", "solver", "dynamics", "model", "device"},
     "controller": {"guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
     "simulation": {"controller", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
