@@ -13,5 +13,6 @@ void bind_dynamics(pybind11::module_& module);
 void bind_device(pybind11::module_& module);
 void bind_rendering(pybind11::module_& module);
 void bind_session(pybind11::module_& module);
+void bind_measure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

@@ -12,4 +12,5 @@ PYBIND11_MODULE(_core, module) {
     palpate::bindings::bind_device(module);
     palpate::bindings::bind_rendering(module);
     palpate::bindings::bind_session(module);
+    palpate::bindings::bind_measure(module);
 }

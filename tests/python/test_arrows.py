@@ -34,6 +34,7 @@ INCLUDES = {
     "io": {"model", "device", "realtime"},
     "bench": {"rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
+    "measure": {"session", "loop", "controller", "guard", "rendering", "model", "device", "io"},
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
     "controller": {"guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
@@ -41,7 +42,7 @@ INCLUDES = {
 }
 
 # Headers that need a library beside the standard one; no other header includes them, palpate.hpp neither.
-LEAF_HEADERS = {"device/usb.hpp", "io/model_file.hpp"}
+LEAF_HEADERS = {"device/inverse3.hpp", "device/usb.hpp", "io/model_file.hpp"}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
 # in realtime; files and sockets in io.

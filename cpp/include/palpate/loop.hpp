@@ -83,6 +83,7 @@ struct LoopReport {
     record.position = tick.reading.position;
     record.force = tick.command.force;
     record.applied = tick.reading.applied;
+    record.measured = tick.reading.measured;
     record.environment_position = tick.rendered.environment_position;
     record.velocity = tick.reading.velocity;
     record.device_time = tick.reading.device_time;

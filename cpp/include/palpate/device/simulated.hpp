@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -15,11 +16,18 @@
 
 namespace palpate {
 
+/// A real object that is mounted on a simulated device: what a recording is made of.
+struct SimulatedObject {
+    std::function<double(double)>
+        force;               ///< over position, positive out of the object; none: nothing is mounted
+    bool transducer = true;  ///< whether the device measures that force
+};
+
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
-/// friction, encoder, force step and limit, hold over the tick, whole samples of delay.
+/// friction, encoder, force step and limit, hold over the tick, whole samples of delay, and a mounted object.
 ///
 /// It does not model: motor electrical dynamics, torque ripple, backlash, flexible parts, jitter of the
-/// sample time, the noise of a force transducer (it has none).
+/// sample time, the noise of a force transducer.
 class SimulatedDevice {
   public:
     explicit SimulatedDevice(DeviceProfile profile, Hand hand = {}, int substeps = 20, double start = 0.0)
@@ -27,12 +35,16 @@ class SimulatedDevice {
         validate(profile_);
     }
 
+    /// Mounts a real object; its function is called at every substep and must neither throw nor allocate.
+    void mount(SimulatedObject object) { object_ = std::move(object); }
+
     /// Puts the handle at rest at its start position.
     Opened open() {
         position_ = start_;
         velocity_ = 0.0;
         applied_ = 0.0;
         tick_ = 0;
+        mounted_force_ = object_.force ? object_.force(position_) : 0.0;
         pending_.fill(0.0);
         last_reading_ = encoded(position_);
         return {};
@@ -50,8 +62,9 @@ class SimulatedDevice {
         const double measured = encoded(position_);
         const double velocity = (measured - last_reading_) / profile_.period_s;
         last_reading_ = measured;
-        return {measured, velocity, applied_,  std::numeric_limits<double>::quiet_NaN(),
-                time(),   tick_,    Status::Ok};
+        const double transducer =
+            object_.transducer && object_.force ? mounted_force_ : std::numeric_limits<double>::quiet_NaN();
+        return {measured, velocity, applied_, transducer, time(), tick_, Status::Ok};
     }
 
     void close() noexcept { applied_ = 0.0; }
@@ -68,12 +81,13 @@ class SimulatedDevice {
     /// Semi-implicit Euler. Coulomb friction takes away at most the velocity there is: it can stop the handle
     /// but never turn it round.
     void substep(double target, double step) noexcept {
-        const double driving =
-            hand_.force(target, position_, velocity_) - profile_.viscous_damping * velocity_ - applied_;
+        const double driving = hand_.force(target, position_, velocity_) -
+                               profile_.viscous_damping * velocity_ - applied_ - mounted_force_;
         const double free = velocity_ + step / profile_.inertia * driving;
         const double friction = step / profile_.inertia * profile_.coulomb_friction;
         velocity_ = std::copysign(std::max(0.0, std::abs(free) - friction), free);
         position_ += step * velocity_;
+        mounted_force_ = object_.force ? object_.force(position_) : 0.0;
     }
 
     [[nodiscard]] double encoded(double position) const noexcept {
@@ -101,6 +115,8 @@ class SimulatedDevice {
     Hand hand_;
     int substeps_;
     double start_;
+    SimulatedObject object_;
+    double mounted_force_ = 0.0;  ///< of the object, where the handle is
     double position_ = 0.0;
     double velocity_ = 0.0;
     double applied_ = 0.0;

@@ -19,6 +19,7 @@ struct TickRecord {
     double position = 0.0;              ///< measured [m or rad]
     double force = 0.0;                 ///< sent after the guards, positive out of the object [N or N*m]
     double applied = 0.0;               ///< by the device when the position was sampled, same sign
+    double measured = std::numeric_limits<double>::quiet_NaN();  ///< by the transducer, same sign; NaN without
     double environment_position = 0.0;  ///< y, where the object was evaluated [m or rad]
     double velocity = 0.0;              ///< of the device [m/s or rad/s]
     double device_time = 0.0;           ///< the device's clock [s]
