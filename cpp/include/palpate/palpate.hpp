@@ -45,6 +45,7 @@
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/probe.hpp"
+#include "palpate/rendering/pulses.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/rendering/substepped.hpp"
 #include "palpate/rendering/trapezoidal.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
 #include <span>
 #include <vector>
 
@@ -10,12 +9,6 @@
 #include "palpate/io/tick_record.hpp"
 
 namespace palpate {
-
-/// The force of a real object against the handle: what the transducer says, or, without one, what the motor has
-/// to hold against it. The latter holds for slow motion; the friction of the device is in it.
-[[nodiscard]] inline double object_force(const TickRecord& tick) noexcept {
-    return std::isnan(tick.measured) ? -tick.applied : tick.measured;
-}
 
 /// Where ticks go besides the device: a file, a network, memory, all of them or nowhere.
 struct Outlets {
