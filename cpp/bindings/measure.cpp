@@ -173,8 +173,11 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
     watcher.rethrow();
     py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes);
     summary["device"] = bench.device.id;
+    summary["encoder_step"] = bench.device.encoder_step;
     summary["force_limit"] = bench.device.force_limit;
     summary["transducer"] = transducer;
+    summary["position_range"] = std::pair{outlets.positions.lower, outlets.positions.upper};
+    summary["force_range"] = std::pair{outlets.forces.lower, outlets.forces.upper};
     if (wanted.keep) {
         summary["kept"] = columns(outlets.kept);
     }

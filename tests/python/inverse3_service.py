@@ -75,7 +75,13 @@ class Service:
             self.closed = True
 
     def told(
-        self, position: float, velocity: float, force: dict[str, float], *, whole: bool = False, gone: bool = False
+        self,
+        position: float,
+        velocity: float,
+        force: dict[str, float],
+        *,
+        whole: bool = False,
+        gone: bool = False,
     ) -> dict[str, Any]:
         nothing = {"x": 0.0, "y": 0.0, "z": 0.0}
         device: dict[str, Any] = {

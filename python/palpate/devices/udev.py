@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The udev rule that lets somebody who is not root use a device: shipped with the package, installed on request."""
+"""The udev rule that lets somebody who is not root use a device: shipped here, installed on request."""
 
 from __future__ import annotations
 
@@ -35,12 +35,13 @@ def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
         Without root, or where the system refuses: what to do instead.
     """
     target = folder / RULE
-    if not os.access(folder, os.W_OK):
-        why = f"writing {target} needs root" if folder.is_dir() else f"this machine has no folder {folder}"
+    if not folder.is_dir():
         raise DeviceError(
-            f"the udev rule was not installed: {why}; run: sudo {Path(sys.argv[0]).resolve()} devices "
-            "--install-udev-rule"
+            f"this machine has no folder {folder}: udev, which gives users their rights, is not here"
         )
+    if not os.access(folder, os.W_OK):
+        again = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
+        raise DeviceError(f"writing {target} needs root; run: {again}")
     text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
     beside = target.with_suffix(".new")
     beside.write_text(text, encoding="utf-8")

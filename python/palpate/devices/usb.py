@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """USB devices over pyusb: which there are, what they say of themselves, and what is set before a run.
 
-The stream of samples needs two directions at once, which pyusb cannot do: it is the core's (``--device usb``).
+The stream of samples needs both directions at once, which pyusb cannot do: it is the core's.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ class UsbSetup:
 
     def identify(self) -> wire.DeviceInfo:
         """Ask the device who it is: strings and GET_INFO, decoded strictly."""
-        info = wire.decode_info(bytes(self._request(wire.Request.GET_INFO, "asking who it is", wire.INFO_SIZE)))
+        info = wire.decode_info(
+            bytes(self._request(wire.Request.GET_INFO, "asking who it is", wire.INFO_SIZE))
+        )
         for field, index in (("product", self._handle.iProduct), ("serial", self._handle.iSerialNumber)):
             setattr(self, field, self._string(index))
         return info
@@ -77,9 +79,7 @@ class UsbSetup:
     def set_watchdog(self, milliseconds: int) -> None:
         """Set how long the device makes force without a command, 2 to 1000 ms."""
         if not wire.SHORTEST_WATCHDOG_MS <= milliseconds <= wire.LONGEST_WATCHDOG_MS:
-            raise InputError(
-                f"watchdog is {milliseconds} ms, must be {wire.SHORTEST_WATCHDOG_MS} to {wire.LONGEST_WATCHDOG_MS}"
-            )
+            raise InputError(f"watchdog is {milliseconds} ms, must be 2 to 1000")
         self._request(wire.Request.WATCHDOG, "setting its watchdog", value=milliseconds)
 
     def enable(self) -> None:

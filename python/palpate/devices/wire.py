@@ -48,7 +48,8 @@ class DeviceInfo:
 
     firmware: int
     counts_per_rev: int
-    max_torque_Nm: float
+    max_torque: float
+    """[N*m]"""
     rate_hz: int
     watchdog_ms: int
     transducer: bool
@@ -57,7 +58,7 @@ class DeviceInfo:
     uid: int
 
     @property
-    def encoder_step_rad(self) -> float:
+    def encoder_step(self) -> float:
         """One count of the encoder [rad]."""
         return 2.0 * math.pi / self.counts_per_rev
 
@@ -105,14 +106,19 @@ def decode_info(data: bytes) -> DeviceInfo:
     for field, (value, right) in expected.items():
         if value != right:
             raise InputError(f"the answer to GET_INFO: {field} is {value}, must be {right}")
-    positive = {"counts_per_rev": counts, "max_torque_uNm": max_torque, "rate_hz": rate, "watchdog_ms": watchdog}
+    positive = {
+        "counts_per_rev": counts,
+        "max_torque_uNm": max_torque,
+        "rate_hz": rate,
+        "watchdog_ms": watchdog,
+    }
     for field, value in positive.items():
         if value <= 0:
             raise InputError(f"the answer to GET_INFO: {field} is {value}, must be > 0")
     return DeviceInfo(
         firmware=firmware,
         counts_per_rev=counts,
-        max_torque_Nm=1e-6 * max_torque,
+        max_torque=1e-6 * max_torque,
         rate_hz=rate,
         watchdog_ms=watchdog,
         transducer=bool(capabilities & _TRANSDUCER),

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -9,6 +11,17 @@
 #include "palpate/io/tick_record.hpp"
 
 namespace palpate {
+
+/// Least and largest of what was seen; NaN before anything was.
+struct Range {
+    double lower = std::numeric_limits<double>::quiet_NaN();
+    double upper = std::numeric_limits<double>::quiet_NaN();
+
+    void add(double value) noexcept {
+        lower = std::fmin(lower, value);
+        upper = std::fmax(upper, value);
+    }
+};
 
 /// Where ticks go besides the device: a file, a network, memory, all of them or nowhere.
 struct Outlets {
@@ -24,6 +37,8 @@ struct Outlets {
             told_.assign(ticks.begin(), ticks.end());
             for (TickRecord& tick : told_) {
                 tick.force = object_force(tick);
+                positions.add(tick.position);
+                forces.add(tick.force);
             }
             ticks = told_;
         }
@@ -35,6 +50,9 @@ struct Outlets {
             kept.insert(kept.end(), ticks.begin(), ticks.end());
         }
     }
+
+    Range positions;  ///< of a real object, as told
+    Range forces;
 
   private:
     std::vector<TickRecord> told_;
