@@ -53,6 +53,7 @@ class Port {
             return -ENOENT;
         }
         (transfer.endpoint == 0x81 ? in_ : out_).push_back(std::move(transfer));
+        reads_ahead_ = reads_ahead_ || in_.size() >= 2;
         return 0;
     }
 
@@ -74,6 +75,7 @@ class Port {
 
     /// Whoever held the device let it go.
     void forget(const void* owner) {
+        reads_ahead_ = false;
         for (std::deque<Transfer>* queue : {&in_, &out_, &done_}) {
             std::erase_if(*queue, [&](const Transfer& transfer) { return transfer.owner == owner; });
         }
@@ -120,7 +122,8 @@ class Port {
     [[nodiscard]] bool host_is_ready() const {
         return !in_.empty() && !out_.empty() && !in_held_ && !out_held_;
     }
-    [[nodiscard]] std::size_t reads_waiting() const { return in_.size(); }
+    /// Whether the host keeps reads queued, or does one thing after the other.
+    [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
 
@@ -167,6 +170,7 @@ class Port {
     std::deque<Transfer> done_;
     bool in_held_ = false;  ///< a halted endpoint serves nothing until it is cleared
     bool out_held_ = false;
+    bool reads_ahead_ = false;
 };
 
 /// When frames begin.
@@ -194,7 +198,7 @@ class FrameClock {
             return true;
         }
         const bool waits = lock_step_ && in_conversation_ && !by_clock;
-        const bool waits_long = waits && port.reads_waiting() >= 2;
+        const bool waits_long = waits && port.host_reads_ahead();
         until = last_ + (waits_long ? patience_ : (waits ? 5 : port.device().is_slow() ? 3 : 1) * period_);
         if (now < until) {
             return false;
