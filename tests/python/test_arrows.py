@@ -44,9 +44,9 @@ INCLUDES = {
 LEAF_HEADERS = {"device/usb.hpp", "io/model_file.hpp"}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
-# in realtime; files and sockets in io.
+# and latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
-    "realtime": {"pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h"},
+    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 

@@ -78,11 +78,12 @@ template <class Control, class Watch>
     std::atomic<bool> over{false};
     LastRecords<TickRecord> last{settings.last_ticks};
     const LockedMemory memory;
+    const WakefulCores cores;
     using Recorder = FlightRecorder<TickRecord, Outlets>;
     Recorder recorder{outlets, capacity, settings.hand_over_every};
 
     std::thread loop{[&] {
-        report.refused = become_real_time(settings.real_time, memory);
+        report.refused = become_real_time(settings.real_time, memory, cores);
         asked_for_privileges.store(true, std::memory_order_release);
         Periodic clock{period};
         detail::LoopSink<Recorder> sink{recorder, last};

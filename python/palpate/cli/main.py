@@ -18,6 +18,7 @@ _VERBS = {
     "simulate": "Render a model on a simulated device.",
     "render": "Render a model live, tick by tick.",
     "show": "Print a model for a person.",
+    "chart": "Draw the figures of the documentation.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Every verb with its line in the help; its file is imported only when it is used."""
