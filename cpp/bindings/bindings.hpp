@@ -15,5 +15,6 @@ void bind_rendering(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
 void bind_bench(pybind11::module_& module);
 void bind_session(pybind11::module_& module);
+void bind_measure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

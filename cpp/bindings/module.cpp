@@ -14,4 +14,5 @@ PYBIND11_MODULE(_core, module) {
     palpate::bindings::bind_stability(module);
     palpate::bindings::bind_bench(module);
     palpate::bindings::bind_session(module);
+    palpate::bindings::bind_measure(module);
 }

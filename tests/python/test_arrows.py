@@ -35,6 +35,17 @@ INCLUDES = {
     "io": {"model", "device", "realtime", "rendering", "stability"},
     "bench": {"simulation", "rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
+    "measure": {
+        "session",
+        "session_text",
+        "bench",
+        "controller",
+        "guard",
+        "rendering",
+        "model",
+        "device",
+        "io",
+    },
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
     "closed_loop": {"controller", "guard", "rendering", "solver", "dynamics", "model", "device"},
@@ -43,7 +54,13 @@ INCLUDES = {
 }
 
 # Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
-LEAF_HEADERS = {"device/usb.hpp", "io/json_field.hpp", "io/model_file.hpp", "io/plan_file.hpp"}
+LEAF_HEADERS = {
+    "device/inverse3.hpp",
+    "device/usb.hpp",
+    "io/json_field.hpp",
+    "io/model_file.hpp",
+    "io/plan_file.hpp",
+}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
 # and latency in realtime; files and sockets in io.

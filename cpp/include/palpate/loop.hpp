@@ -64,6 +64,7 @@ struct LoopProgress {
     std::atomic<std::uint64_t> missed{0};
     std::atomic<double> position{0.0};
     std::atomic<double> force{0.0};
+    std::atomic<double> object_force{0.0};  ///< of a real object against the handle
     RateCheck rate;
 };
 
@@ -85,6 +86,7 @@ struct LoopReport {
     record.position = tick.reading.position;
     record.force = tick.command.force;
     record.applied = tick.reading.applied;
+    record.measured = tick.reading.measured;
     record.environment_position = tick.rendered.environment_position;
     record.velocity = tick.reading.velocity;
     record.device_time = tick.reading.device_time;
@@ -128,7 +130,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         const Wake wake = clock.wait();
         report.timing.add(wake);
         const Tick tick = controller.tick();
-        sink.push(record_of(tick, wake, report.timing.first));
+        const TickRecord record = record_of(tick, wake, report.timing.first);
+        sink.push(record);
         report.status = tick.status;
         ++report.ticks_by_status[static_cast<std::size_t>(tick.status)];
         bad_in_a_row = sends_force(tick.status) ? 0 : bad_in_a_row + 1;
@@ -137,6 +140,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         progress.missed.store(report.timing.missed, std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
         progress.force.store(tick.command.force, std::memory_order_relaxed);
+        progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);
         if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.ending)) {
