@@ -39,8 +39,8 @@ class Compressed:
     """(m,) variance of the position within a row, summed over the inputs; 0 where positions were equal"""
     within: float
     """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
-    samples: int
-    """Rows of the recording"""
+    samples: float
+    """Rows of the recording, or the sum of their weights"""
 
 
 class Compressor:
@@ -52,11 +52,16 @@ class Compressor:
     force : (n,)
     max_positions : int
         With more distinct positions than this they are gathered in that many cells of a regular grid.
+    weight : (n,), optional
+        Samples that each row stands for, above 0; 1 without it.
     """
 
-    def __init__(self, positions: Float2D, force: Float1D, *, max_positions: int) -> None:
+    def __init__(
+        self, positions: Float2D, force: Float1D, *, max_positions: int, weight: Float1D | None = None
+    ) -> None:
         self._positions = positions
         self._force = force
+        self._weight = np.ones(len(force)) if weight is None else weight
         self._key, self._merged = _position_key(positions, max_positions)
 
     def rows(self, side: Float1D | None = None) -> Compressed:
@@ -65,20 +70,21 @@ class Compressor:
         if side is not None:
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
             key = key + (int(key.max()) + 1) * level
-        group, count = _ranked(key)
-        x = np.column_stack([_mean(group, count, column) for column in self._positions.T])
-        y = _mean(group, count, self._force)
+        weight = self._weight
+        group, count = _ranked(key, weight)
+        x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
+        y = _mean(group, count, weight * self._force)
         dy = self._force - y[group]
-        within = float(dy @ dy)
+        within = float(dy @ (weight * dy))
         spread = np.zeros(len(count))
         if not self._merged:
             dx = self._positions - x[group]
-            spread = _mean(group, count, np.einsum("nd,nd->n", dx, dx))
+            spread = _mean(group, count, weight * np.einsum("nd,nd->n", dx, dx))
             if self._positions.shape[1] == 1:
                 slope = self._slopes(dx[:, 0], dy)
-                within -= float(np.sum(slope * dx[:, 0] * (2.0 * dy - slope * dx[:, 0])))
-        merged_side = None if side is None else _mean(group, count, side)
-        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), len(self._force))
+                within -= float(np.sum(weight * slope * dx[:, 0] * (2.0 * dy - slope * dx[:, 0])))
+        merged_side = None if side is None else _mean(group, count, weight * side)
+        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
 
     def _slopes(self, dx: Float1D, dy: Float1D) -> Float1D:
         """Slope of the force (n,) across each row's cell (d = 1), from deviations within the groups.
@@ -86,10 +92,10 @@ class Compressor:
         All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same few
         degrees of freedom.
         """
-        cell, count = _ranked(self._key)
+        cell, count = _ranked(self._key, self._weight)
         window = np.ones(min(POOLED_CELLS, len(count)))
-        sxx = np.convolve(np.bincount(cell, dx * dx), window, "same")
-        sxy = np.convolve(np.bincount(cell, dx * dy), window, "same")
+        sxx = np.convolve(np.bincount(cell, self._weight * dx * dx), window, "same")
+        sxy = np.convolve(np.bincount(cell, self._weight * dx * dy), window, "same")
         return np.asarray(np.divide(sxy, sxx, out=np.zeros_like(sxy), where=sxx > 0)[cell])
 
 
@@ -120,12 +126,12 @@ def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.in
     return np.ravel_multi_index(tuple(cell.T), (per_axis,) * d), False
 
 
-def _ranked(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], Float1D]:
-    """Group numbers without gaps (n,), and the rows of each group (groups,)."""
-    count = np.bincount(key)
+def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64], Float1D]:
+    """Group numbers without gaps (n,), and the weight of each group (groups,)."""
+    count = np.bincount(key, weight)
     rank = np.cumsum(count > 0) - 1
-    return rank[key], count[count > 0].astype(float)
+    return rank[key], count[count > 0]
 
 
-def _mean(group: NDArray[np.int64], count: Float1D, values: Float1D) -> Float1D:
-    return np.asarray(np.bincount(group, values) / count)
+def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1D:
+    return np.asarray(np.bincount(group, weighted) / count)
