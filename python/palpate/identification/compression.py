@@ -43,8 +43,8 @@ class Compressed:
     """(m, d) variance of the positions within a row; 0 where they were equal"""
     within: float
     """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
-    samples: int
-    """Rows of the recording that are stood for"""
+    samples: float
+    """Rows of the recording that are stood for, or the sum of their weights"""
 
 
 class Compressor:
@@ -56,9 +56,13 @@ class Compressor:
     force : (n,)
     max_positions : int
         With more distinct positions than this they are gathered in that many cells of a regular grid.
+    weight : (n,), optional
+        Samples that each row stands for, above 0; 1 without it.
     """
 
-    def __init__(self, positions: Float2D, force: Float1D, *, max_positions: int) -> None:
+    def __init__(
+        self, positions: Float2D, force: Float1D, *, max_positions: int, weight: Float1D | None = None
+    ) -> None:
         self._key, self._per_axis = _position_key(positions, max_positions)
         self.kept: NDArray[np.int64] | slice = slice(None)
         """The rows that stand for all."""
@@ -67,6 +71,7 @@ class Compressor:
             self._key, self._per_axis = np.arange(max_positions), 0
         self._positions = positions[self.kept]
         self._force = force[self.kept]
+        self._weight = np.ones(len(self._force)) if weight is None else weight[self.kept]
 
     def rows(self, side: Float1D | None = None) -> Compressed:
         """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart."""
@@ -75,18 +80,19 @@ class Compressor:
             side = side[self.kept]
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
             key = key + (int(key.max()) + 1) * level
-        group, count = _ranked(key)
-        x = np.column_stack([_mean(group, count, column) for column in self._positions.T])
-        y = _mean(group, count, self._force)
+        weight = self._weight
+        group, count = _ranked(key, weight)
+        x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
+        y = _mean(group, count, weight * self._force)
         dy = self._force - y[group]
-        within = float(dy @ dy)
+        within = float(dy @ (weight * dy))
         spread = np.zeros_like(x)
         if self._per_axis:
             dx = self._positions - x[group]
-            spread = np.column_stack([_mean(group, count, column * column) for column in dx.T])
+            spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
             within -= self._explained_by_slopes(dx, dy)
-        merged_side = None if side is None else _mean(group, count, side)
-        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), len(self._force))
+        merged_side = None if side is None else _mean(group, count, weight * side)
+        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
 
     def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:
         """Part of the within-sum that slopes across the cells explain, from deviations within the groups.
@@ -98,8 +104,8 @@ class Compressor:
         grid = (self._per_axis,) * d
         together = max(2, round(POOLED_CELLS ** (1.0 / d)))
         pooled = np.array(np.unravel_index(self._key, grid)) // together
-        block, _ = _ranked(np.ravel_multi_index(tuple(pooled), grid))
-        products = [[np.bincount(block, a * b) for b in (*dx.T, dy)] for a in dx.T]
+        block, _ = _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)
+        products = [[np.bincount(block, self._weight * a * b) for b in (*dx.T, dy)] for a in dx.T]
         table = np.array(products).transpose(2, 0, 1)
         slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
         return float(np.sum(slope * table[:, :, d]))
@@ -132,12 +138,12 @@ def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.in
     return np.ravel_multi_index(tuple(cell.T), (per_axis,) * d), per_axis
 
 
-def _ranked(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], Float1D]:
-    """Group numbers without gaps (n,), and the rows of each group (groups,)."""
-    count = np.bincount(key)
+def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64], Float1D]:
+    """Group numbers without gaps (n,), and the weight of each group (groups,)."""
+    count = np.bincount(key, weight)
     rank = np.cumsum(count > 0) - 1
-    return rank[key], count[count > 0].astype(float)
+    return rank[key], count[count > 0]
 
 
-def _mean(group: NDArray[np.int64], count: Float1D, values: Float1D) -> Float1D:
-    return np.asarray(np.bincount(group, values) / count)
+def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1D:
+    return np.asarray(np.bincount(group, weighted) / count)

@@ -114,7 +114,7 @@ class SeparableProblem:
         blocks: Sequence[Block],
         readout: Float2D,
         *,
-        samples: int,
+        samples: float,
         within: float,
         force_range: float,
         resolved_by: int,

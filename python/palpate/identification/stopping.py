@@ -9,7 +9,7 @@ n ln of the score), FPE (Akaike 1970, as n ln of the score). The smallest value 
 import math
 from collections.abc import Callable
 
-CRITERIA: dict[str, Callable[[int, int], float]] = {
+CRITERIA: dict[str, Callable[[float, int], float]] = {
     "bic": lambda n, p: p * math.log(n),
     "aicc": lambda n, p: 2.0 * p + 2.0 * p * (p + 1) / (n - p - 1) if p < n - 1 else math.inf,
     "gcv": lambda n, p: -2.0 * n * math.log1p(-p / n) if p < n else math.inf,
@@ -18,6 +18,6 @@ CRITERIA: dict[str, Callable[[int, int], float]] = {
 """Name of the criterion to its price of p parameters on n samples."""
 
 
-def deviance(criterion: str, rss: float, n: int, p: int) -> float:
+def deviance(criterion: str, rss: float, n: float, p: int) -> float:
     """Value of a criterion: n ln(rss/n) + price(n, p); rss in force squared, over all n samples."""
     return n * math.log(rss / n) + CRITERIA[criterion](n, p)
