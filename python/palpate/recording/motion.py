@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,7 @@ def pieces(recording: Recording) -> list[Piece]:
     steps = np.diff(recording.time)
     edges = [0, *(np.flatnonzero(steps > GAP * period) + 1), len(recording)]
     found = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         rows = slice(int(start), int(stop))
         time, position, force = recording.time[rows], recording.position[rows], recording.force[rows]
         even = bool(np.all(np.abs(np.diff(time) - period) <= UNEVEN * period))
@@ -155,7 +156,8 @@ def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
     """
     parts = pieces(recording)
     period = recording.sample_period
-    assert period is not None and recording.time is not None
+    assert period is not None
+    assert recording.time is not None
     low_pass = quiet_low_pass(parts, period, order=1)
     if low_pass is None:
         raise InputError(
