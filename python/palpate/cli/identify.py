@@ -59,6 +59,7 @@ def identify(
     as the data allows: a constant, a line, a wavelet network, and hysteresis where press and release differ.
     """
     from ..identification import identify as identify_model
+    from ..identification.options import RESERVED_INPUTS
     from ..verification import verify
 
     if plot is not None:
@@ -66,7 +67,8 @@ def identify(
     for target in filter(None, (output, plot)):
         require_writable(target, inputs=recording_files)
     require_distinct(output, plot)
-    recordings = [reading.read(path) for path in recording_files]
+    columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+    recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
     judged_on = recordings
     if hold_out_every is not None:
         parts = [recording.split(hold_out_every) for recording in recordings]
