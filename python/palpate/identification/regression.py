@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Regression over any inputs: weighted rows in, a network out, however few or odd the rows are.
 
-The ladder of :mod:`.ladder` knows what a position and a stroke are; here there are only columns. The rungs are
-constant, linear and network, judged on n = sum of the weights samples, and none is tried that has as many
+The ladder of :mod:`.ladder` knows what a position and a stroke are; here there are only columns. The rungs
+are constant, linear and network, judged on n = sum of the weights samples, and none is tried that has as many
 parameters as there are samples.
 """
 
