@@ -23,12 +23,10 @@ from .options import IdentifyOptions
 from .selection import Library
 from .separable import Basis, SeparableProblem, Solution, problem_of
 from .stopping import deviance
+from .usable import require_usable
 
-LEAST_ROWS = 10
-"""Rows below which nothing is identified."""
-
-LEAST_POSITIONS = 3
-"""Distinct positions below which nothing is identified."""
+VELOCITY_INPUTS = ("position", "velocity")
+"""Inputs of a force that depends on the motion."""
 
 COARSEST_CANDIDATE = 1.0
 """Dilation of the frame's coarsest level [1/box]."""
@@ -50,6 +48,7 @@ def fit_environment(
     options: IdentifyOptions | None = None,
     *,
     starts: Sequence[int] | None = None,
+    names: Sequence[str] | None = None,
 ) -> IdentifiedNetwork:
     """Identify a force law from arrays.
 
@@ -65,6 +64,8 @@ def fit_environment(
     starts : sequence of int, optional
         Rows at which a continuous motion starts. With it, and without side, hysteresis is tried with the play
         operator, s = (x - pi)/r (d = 1).
+    names : sequence of str, optional
+        Of the inputs, for the sentences.
 
     Returns
     -------
@@ -76,8 +77,9 @@ def fit_environment(
         For data that cannot be identified, and for a hysteresis input that the data cannot give.
     """
     options = options or IdentifyOptions()
-    _require_usable(positions, force)
-    limit = options.max_positions
+    names = names or input_names(positions.shape[-1])
+    require_usable(positions, force, names)
+    limit = options.max_positions * 2 ** (positions.shape[1] - 1)
     ladder = _Ladder(positions, force, side, starts, options)
     best = ladder.climb()
     for _ in range(MOST_HALVINGS):
@@ -92,6 +94,11 @@ def fit_environment(
     # hysteresis was refused, so there is no reason any more to leave out rows that have no direction
     every_row = fit_environment(positions, force, None, options)
     return replace(every_row, path=found.path + every_row.path, notes=found.notes + every_row.notes)
+
+
+def input_names(dimension: int) -> tuple[str, ...]:
+    """Names for inputs that came without."""
+    return ("position", *(f"input {k}" for k in range(2, dimension + 1)))
 
 
 @dataclass(frozen=True)
@@ -115,13 +122,13 @@ class _Rung:
         return deviance(options.criterion, total, self.problem.samples, self.n_parameters)
 
     def cells_too_wide(self) -> bool:
-        """Whether gathering positions in cells may have moved the fit by more than it should (d = 1)."""
-        if self.problem.dimension > 1 or not self.rows.spread.any():
+        """Whether gathering positions in cells may have moved the fit by more than it should."""
+        if not self.rows.spread.any():
             return False
-        alpha, beta = self.solution.basis.alpha[:, 0], self.solution.basis.beta[:, 0]
-        bend = _core.mexican_hat_curvature(alpha * (self.rows.positions - beta))
-        by_channel = bend @ (alpha**2 * self.solution.coefficients[:, 2:]).T
-        return binning_error(self.rows, np.abs(by_channel).max(axis=1)) > BINNING_SHARE * self.rmse
+        basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
+        bends = _core.wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
+        curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
+        return binning_error(self.rows, curvature) > BINNING_SHARE * self.rmse
 
 
 class _Ladder:
@@ -346,26 +353,3 @@ class _Ladder:
 def _judged_on(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
     """Criterion of a solution on the rows of another problem of the same form."""
     return judge(problem, problem.solution_of(solution), options)
-
-
-def _require_usable(positions: Float2D, force: Float1D) -> None:
-    if positions.ndim != 2 or force.shape != (len(positions),):
-        raise InputError(
-            f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
-        )
-    if len(force) < LEAST_ROWS:
-        raise InputError(f"the recording has {len(force)} rows; {LEAST_ROWS} or more are needed")
-    for name, values in (("position", positions), ("force", force[:, None])):
-        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-        if len(bad):
-            raise InputError(
-                f"{name} in row {bad[0]} is {values[bad[0]]}; every value must be a finite number"
-            )
-    for number, column in enumerate(positions.T):
-        if column.min() == column.max():
-            raise InputError(f"all positions are {column[0]:g}; identifying needs a position that moves")
-        if len(np.unique(column)) < LEAST_POSITIONS:
-            raise InputError(
-                f"position {number} takes only {len(np.unique(column))} distinct values; "
-                f"{LEAST_POSITIONS} or more are needed"
-            )

@@ -9,9 +9,6 @@ from typing import Any
 from ..errors import InputError
 from .stopping import CRITERIA
 
-LADDER_INPUTS = ("position", "hysteresis")
-"""What the ladder can take as inputs, in its order."""
-
 COUPLING_SHARE = 0.9
 """Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
 
@@ -27,7 +24,8 @@ class IdentifyOptions:
     """
 
     inputs: str | tuple[str, ...] = "auto"
-    """"auto": the ladder decides. Or names, as a tuple or with commas between: the rung is then given."""
+    """"auto": the ladder decides, over the position and the recording's further inputs. Or names, as a tuple or
+    with commas between: position, then hysteresis, velocity (from time) or columns; the rung is then given."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"
@@ -51,7 +49,8 @@ class IdentifyOptions:
     resolved_by: int = 7
     """Distinct positions, on every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]"""
     max_positions: int = 1024
-    """Distinct positions that are kept apart; more of them are gathered in as many cells [-]"""
+    """Distinct positions that are kept apart, twice as many for each further input; more are gathered in as many
+    cells [-]"""
     hysteresis_nonnegative: bool = True
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
@@ -69,9 +68,10 @@ class IdentifyOptions:
         if self.inputs != "auto":
             names = self.inputs.split(",") if isinstance(self.inputs, str) else self.inputs
             object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
-            if "position" not in self.inputs or not set(self.inputs) <= set(LADDER_INPUTS):
+            if "position" not in self.inputs or "" in self.inputs or len(set(self.inputs)) < len(self.inputs):
                 raise InputError(
-                    f'inputs is {",".join(self.inputs)!r}; use "auto", "position" or "position,hysteresis"'
+                    f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
+                    "depends on: hysteresis, velocity, columns"
                 )
         if self.criterion not in CRITERIA:
             raise InputError(f"criterion is {self.criterion!r}; it must be one of {', '.join(CRITERIA)}")
