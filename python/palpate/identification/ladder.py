@@ -14,7 +14,8 @@ import numpy as np
 from .. import _core
 from .._typing import Float1D, Float2D
 from ..errors import InputError
-from .compression import Compressed, Compressor, binning_error
+from .cells import MOST_HALVINGS, cells_too_wide
+from .compression import Compressed, Compressor
 from .constraints import domain_bounds, impose, moved_to_bounds
 from .frame import truncated_frame
 from .growth import Grown, PathPoint, grow, judge, prune
@@ -30,12 +31,6 @@ VELOCITY_INPUTS = ("position", "velocity")
 
 COARSEST_CANDIDATE = 1.0
 """Dilation of the frame's coarsest level [1/box]."""
-
-BINNING_SHARE = 0.05
-"""Error that cells of positions may add, as a share of the RMS error; above it the cells are halved."""
-
-MOST_HALVINGS = 3
-"""Times that cells are halved at most."""
 
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
@@ -123,12 +118,7 @@ class _Rung:
 
     def cells_too_wide(self) -> bool:
         """Whether gathering positions in cells may have moved the fit by more than it should."""
-        if not self.rows.spread.any():
-            return False
-        basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
-        bends = _core.wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
-        curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
-        return binning_error(self.rows, curvature) > BINNING_SHARE * self.rmse
+        return cells_too_wide(self.problem, self.rows, self.solution)
 
 
 class _Ladder:

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from .._typing import Float1D, Float2D
 from ..errors import InputError
+from .cells import MOST_HALVINGS, cells_too_wide
 from .compression import Compressed, Compressor
 from .frame import truncated_frame
 from .growth import PathPoint, grow, judge
@@ -83,8 +84,13 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
         lower, upper = lower - 0.5 * _unit(lower), upper + 0.5 * _unit(upper)
     box = (X[:, columns] - lower) / (upper - lower)
     with threadpool_limits(limits=1, user_api="blas"):
-        rows = Compressor(box, y, weight=weight, max_positions=options.max_positions).rows()
-        found = _climbed(rows, options)
+        limit = options.max_positions * 2 ** (len(columns) - 1)
+        for _ in range(MOST_HALVINGS + 1):
+            rows = Compressor(box, y, weight=weight, max_positions=limit).rows()
+            found = _climbed(rows, options)
+            if not cells_too_wide(found.problem, rows, found.solution):
+                break
+            limit *= 2
         readings = Readings.of(found.solution, found.problem.readout, lower, upper - lower)
     return Regression(
         columns=columns,
