@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The baselines find what they can represent, say what they cost, and stand beside a model on the same rows."""
+"""Baselines find what they can represent, say what they cost, stand beside a model on the same rows."""
 
 import json
 from pathlib import Path

@@ -20,7 +20,7 @@ class SmoothingSpline:
     """The cubic spline with the fewest knots whose squared error stays below a multiple of the noise.
 
     FITPACK's algorithm (Dierckx 1975): knots are added where the error is largest until
-    sum_k (y_k - f(x_k))^2 <= smoothing * n * sigma^2. The noise sigma^2 is what each row differs from the mean
+    sum_k (y_k - f(x_k))^2 <= smoothing * n * sigma^2. The noise sigma^2 is how each row differs from the mean
     of its neighbours along x, taken by the median, so that jumps do not count. Outside its ends the spline
     holds its last value.
 
