@@ -62,6 +62,7 @@ def identify(
     as the data allows: a constant, a line, a wavelet network, and hysteresis where press and release differ.
     """
     from ..identification import identify as identify_model
+    from ..identification.options import RESERVED_INPUTS
     from ..verification import verify
 
     if plot is not None:
@@ -69,7 +70,8 @@ def identify(
     for target in filter(None, (output, plot)):
         require_writable(target, inputs=recording_files)
     require_distinct(output, plot)
-    recordings = [reading.read(path) for path in recording_files]
+    columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+    recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
     others = fit_baselines(recordings, hold_out_every) if beside else []
     judged_on = recordings
     if hold_out_every is not None:

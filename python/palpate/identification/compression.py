@@ -10,6 +10,7 @@ across the cell explains is removed, so that what remains measures noise. With m
 is both fine and small; then a share of the rows, evenly spread over the recording, stands for all.
 """
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,9 +74,21 @@ class Compressor:
         self._force = force[self.kept]
         self._weight = np.ones(len(self._force)) if weight is None else weight[self.kept]
 
-    def rows(self, side: Float1D | None = None) -> Compressed:
-        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart."""
+    @property
+    def rows_used(self) -> int:
+        """How many rows of the recording stand for all."""
+        return len(self._force)
+
+    def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
+        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart.
+
+        With only (n,), no more than these rows of the recording.
+        """
         key = self._key
+        if only is not None:
+            return self._part(only[self.kept]).rows(
+                None if side is None else side[self.kept][only[self.kept]]
+            )
         if side is not None:
             side = side[self.kept]
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
@@ -93,6 +106,14 @@ class Compressor:
             within -= self._explained_by_slopes(dx, dy)
         merged_side = None if side is None else _mean(group, count, weight * side)
         return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
+
+    def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
+        """The same cells with fewer rows."""
+        part = copy(self)
+        part.kept = slice(None)
+        part._key, part._positions = self._key[rows], self._positions[rows]
+        part._force, part._weight = self._force[rows], self._weight[rows]
+        return part
 
     def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:
         """Part of the within-sum that slopes across the cells explain, from deviations within the groups.
@@ -121,7 +142,7 @@ def binning_error(rows: Compressed, curvature: Float2D) -> float:
 
 
 def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], int]:
-    """Group number of each row, and the cells along each axis; 0 where a group is one and the same position."""
+    """Group number of each row, and the cells along each axis: 0 where a group is one position only."""
     d = positions.shape[1]
     if d == 1:
         distinct = np.unique(positions[:, 0])
@@ -140,7 +161,7 @@ def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.in
 
 def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64], Float1D]:
     """Group numbers without gaps (n,), and the weight of each group (groups,)."""
-    count = np.bincount(key, weight)
+    count = np.bincount(key, weight).astype(np.float64)
     rank = np.cumsum(count > 0) - 1
     return rank[key], np.asarray(count[count > 0], dtype=np.float64)
 

@@ -9,9 +9,9 @@ from threadpoolctl import threadpool_limits
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
 from ..recording import Recording, Source
+from .environment import VELOCITY_INPUTS, fit_environment
 from .identified import IdentifiedNetwork
 from .inputs import Observations, observations
-from .ladder import VELOCITY_INPUTS, fit_environment
 from .options import IdentifyOptions, options_from
 
 
@@ -52,7 +52,9 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
     seen = observations(recordings, settings)
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
-        network = fit_environment(seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names)
+        network = fit_environment(
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names
+        )
     return _model_of(network, seen, recordings, settings)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._typing import Float1D, Float2D
 from ..errors import InputError
@@ -39,20 +40,11 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
         An input is not in a recording; hysteresis together with further inputs.
     """
     names = _names(recordings[0], options)
-    kept, columns, notes = [], [], []
-    for recording in recordings:
-        taken, rows = [], np.ones(len(recording), dtype=np.bool_)
-        for name in names:
-            if name == "velocity" and name not in recording.input_names:
-                values, known = velocity(recording)
-                rows &= known
-                if not known.all():
-                    notes.append(f"{np.count_nonzero(~known)} rows at gaps of time have no velocity")
-            else:
-                values = column(recording, name)
-            taken.append(values)
-        columns.append(np.column_stack(taken)[rows])
-        kept.append(rows)
+    found = [input_columns(recording, names) for recording in recordings]
+    kept = [rows for _, rows in found]
+    columns = [X[rows] for X, rows in found]
+    lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
+    notes = (f"{lost} rows at the ends and at gaps of time have no velocity",) if lost else ()
     side, starts = None, None
     if all(part.direction is not None for part in recordings):
         sides = [np.asarray(part.direction, dtype=float) for part in recordings]
@@ -60,17 +52,31 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     elif all(part.time is not None for part in recordings):
         starts = (0, *np.cumsum([np.count_nonzero(rows) for rows in kept])[:-1].tolist())
     force = np.concatenate([part.force[rows] for part, rows in zip(recordings, kept, strict=True)])
-    return Observations(names, np.concatenate(columns), force, side, starts, tuple(notes))
+    return Observations(names, np.concatenate(columns), force, side, starts, notes)
 
 
-def column(recording: Recording, name: str) -> Float1D:
-    """An input (n,) by its name in the recording or in the file that it was read from.
+def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
+    """Inputs (n, d) by their names in the recording or its file, and the rows (n,) that have them all.
+
+    A velocity that is no column of the recording is derived from its time.
 
     Raises
     ------
     InputError
         The recording has no such input.
     """
+    columns, rows = [], np.ones(len(recording), dtype=np.bool_)
+    for name in names:
+        if name == "velocity" and name not in recording.input_names:
+            derived, known = velocity(recording)
+            columns.append(derived)
+            rows &= known
+        else:
+            columns.append(_column(recording, name))
+    return np.column_stack(columns), rows
+
+
+def _column(recording: Recording, name: str) -> Float1D:
     if name == "position":
         return recording.position
     for index, known in enumerate(recording.input_names):

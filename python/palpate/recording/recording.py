@@ -136,7 +136,9 @@ class Recording:
         given_inputs = dict(inputs or {})
         named: dict[str, npt.ArrayLike | None] = {"position": position, "force": force, "time": time}
         if clash := sorted({*named, "direction", "hysteresis"} & set(given_inputs)):
-            raise InputError(f"an input is called {clash[0]!r}, which a recording has already; name it otherwise")
+            raise InputError(
+                f"an input is called {clash[0]!r}, which a recording has already; name it otherwise"
+            )
         for name, values in (*named.items(), *given_inputs.items()):
             if values is None:
                 continue
@@ -166,6 +168,11 @@ class Recording:
                 raise InputError(
                     f"units[{role!r}] is {checked_units[role]!r}; use one of {', '.join(allowed)}"
                 )
+        for name in given_inputs:
+            if arrays[name].shape != arrays["position"].shape:
+                raise InputError(
+                    f"{name} has shape {arrays[name].shape}, but position has {arrays['position'].shape}"
+                )
         digest = hashlib.sha256()
         for array_or_none in (*arrays.values(), words):
             if array_or_none is not None:
@@ -176,7 +183,7 @@ class Recording:
             force=arrays["force"],
             time=arrays.get("time"),
             direction=words,
-            inputs=np.column_stack([arrays[name] for name in given_inputs]) if given_inputs else np.empty((n, 0)),
+            inputs=np.array([arrays[name] for name in given_inputs]).reshape(-1, n).T.copy(),
             input_names=tuple(given_inputs),
             columns={},
             metadata=dict(metadata or {}),
