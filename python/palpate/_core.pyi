@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -429,10 +429,6 @@ def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], 
     psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.
     
     x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.
-    """
-def wavelet_curvature_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[numpy.typing.NDArray[numpy.float64]]:
-    """
-    Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).
     """
 def wavelet_integral_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """

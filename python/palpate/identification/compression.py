@@ -163,7 +163,7 @@ def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64],
     """Group numbers without gaps (n,), and the weight of each group (groups,)."""
     count = np.bincount(key, weight).astype(np.float64)
     rank = np.cumsum(count > 0) - 1
-    return rank[key], count[count > 0]
+    return rank[key], np.asarray(count[count > 0], dtype=np.float64)
 
 
 def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1D:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Regression over any inputs: weighted rows in, a network out, however few or odd the rows are.
 
-The ladder of :mod:`.ladder` knows what a position and a stroke are; here there are only columns. The rungs are
-constant, linear and network, judged on n = sum of the weights samples, and none is tried that has as many
+The ladder of :mod:`.ladder` knows what a position and a stroke are; here there are only columns. The rungs
+are constant, linear and network, judged on n = sum of the weights samples, and none is tried that has as many
 parameters as there are samples.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,18 @@ from threadpoolctl import threadpool_limits
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
+from .environment import MOST_HALVINGS
 from .frame import truncated_frame
-from .growth import PathPoint, grow, judge
+from .fresh import FreshRows, kept_back
+from .growth import PathPoint, grow
 from .identified import Readings
-from .ladder import COARSEST_CANDIDATE
+from .ladder import COARSEST_CANDIDATE, LIBRARY_ENTRIES
 from .options import IdentifyOptions
+from .robust import robust_weights
+from .rung import Rung
 from .selection import Library
 from .separable import Basis, SeparableProblem, Solution, problem_of
-from .stopping import deviance
+from .stopping import ON_FRESH_ROWS
 
 NARROWEST = 1e-12
 """A column whose range is below this share of its largest value is constant but for rounding."""
@@ -82,9 +86,11 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
     if not varies.any():
         lower, upper = lower - 0.5 * _unit(lower), upper + 0.5 * _unit(upper)
     box = (X[:, columns] - lower) / (upper - lower)
+    fresh = kept_back(len(y), None) if options.criterion in ON_FRESH_ROWS else None
+    if fresh is not None and not fresh.any():
+        raise InputError(f"criterion {options.criterion!r} keeps rows back; {len(y)} are too few for that")
     with threadpool_limits(limits=1, user_api="blas"):
-        rows = Compressor(box, y, weight=weight, max_positions=options.max_positions).rows()
-        found = _climbed(rows, options)
+        found, path = _fitted(_Rows(box, y, fresh), weight, options)
         readings = Readings.of(found.solution, found.problem.readout, lower, upper - lower)
     return Regression(
         columns=columns,
@@ -94,8 +100,8 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
         rung=found.name,
         stop_reason=found.stop_reason,
         n_parameters=found.n_parameters,
-        rmse=found.problem.rmse(found.solution),
-        path=tuple(found.path),
+        rmse=found.rmse,
+        path=tuple(path),
     )
 
 
@@ -104,54 +110,85 @@ def _unit(value: Float1D) -> Float1D:
     return np.maximum(1.0, np.abs(value))
 
 
-@dataclass
-class _Climb:
-    """The best rung so far, and what was considered."""
+@dataclass(frozen=True)
+class _Rows:
+    """Rows in the unit box, and those of them that are kept back where the criterion asks for it."""
 
-    name: str
-    problem: SeparableProblem
-    solution: Solution
-    n_parameters: int
-    stop_reason: str
-    criterion: float
-    path: list[PathPoint]
+    box: Float2D
+    y: Float1D
+    fresh: NDArray[np.bool_] | None
+
+    def compressed(self, weight: Float1D, cells: int) -> Compressed:
+        only = None if self.fresh is None else ~self.fresh
+        return Compressor(self.box, self.y, weight=weight, max_positions=cells).rows(None, only)
+
+    def problem(self, rows: Compressed, options: IdentifyOptions) -> SeparableProblem:
+        fresh = None if self.fresh is None else FreshRows.of(self.box, self.y, None, self.fresh)
+        return problem_of(rows, resolved_by=options.resolved_by, fresh=fresh)
 
 
-def _climbed(rows: Compressed, options: IdentifyOptions) -> _Climb:
+def _fitted(data: _Rows, weight: Float1D, options: IdentifyOptions) -> tuple[Rung, list[PathPoint]]:
+    """Climb with cells that are fine enough, again with outliers weighed down where that is asked for."""
+    cells = options.max_positions * 2 ** (data.box.shape[1] - 1)
+    best, path = _climbed(data, weight, cells, options)
+    for _ in range(MOST_HALVINGS):
+        if not best.cells_too_wide():
+            break
+        cells *= 2
+        best, path = _climbed(data, weight, cells, options)
+    if options.loss == "huber":
+        weight, _ = robust_weights(
+            lambda weights: _climbed(data, weights, cells, options)[0], best, data.box, data.y, weight
+        )
+        best, path = _climbed(data, weight, cells, options)
+    return best, path
+
+
+def _climbed(
+    data: _Rows, weight: Float1D, cells: int, options: IdentifyOptions
+) -> tuple[Rung, list[PathPoint]]:
     """Constant, linear, network: as far as each lowers the criterion by `rung_evidence` or more."""
-    problem = problem_of(rows, resolved_by=options.resolved_by)
+    rows = data.compressed(weight, cells)
+    problem = data.problem(rows, options)
     straight = problem.solve(Basis.empty(problem.dimension))
-    level = np.zeros_like(straight.coefficients)
-    level[0, 0] = np.average(rows.force, weights=rows.weight)
-    best = _constant(problem, problem.solution(straight.basis, level, straight.designs), options)
+    mean = np.zeros_like(straight.coefficients)
+    mean[0, 0] = np.average(rows.force, weights=rows.weight)
+    level = problem.solution(straight.basis, mean, straight.designs)
+
+    def rung(of: SeparableProblem, name: str, solution: Solution, n_parameters: int, reason: str) -> Rung:
+        return Rung(name, rows, of, solution, n_parameters, reason)
+
+    best = rung(problem, "constant", level, 1, options.criterion)
+    path = [_point(best, options)]
     if problem.n_parameters(0) >= problem.samples:
-        return best
-    criterion = judge(problem, straight, options)
-    best.path.append(PathPoint("linear", 0, problem.rmse(straight), criterion))
-    if best.criterion - criterion >= options.rung_evidence:
-        best.name, best.solution, best.criterion = "linear", straight, criterion
-        best.n_parameters, best.stop_reason = problem.n_parameters(0), options.criterion
+        return replace(best, stop_reason="data"), path
+    line = rung(problem, "linear", straight, problem.n_parameters(0), options.criterion)
+    path.append(_point(line, options))
+    best = _better(best, line, options)
     if options.max_wavelets == 0 or problem.n_parameters(1) >= problem.samples:
-        return best
+        return best, path
     frame = truncated_frame(
         rows.positions,
         coarsest=COARSEST_CANDIDATE,
         finest=float(problem.finest(rows.positions).max()),
         frame_scale=options.frame_scale,
         frame_step=options.frame_step,
-        max_candidates=options.max_candidates,
+        max_candidates=max(1, min(options.max_candidates, LIBRARY_ENTRIES // len(rows.force))),
     )
-    grown = grow(problem, Library(problem, frame), Basis.empty(problem.dimension), "network", options)
-    best.path.extend(grown.path)
-    if best.criterion - grown.criterion >= options.rung_evidence:
-        best.name, best.solution, best.criterion = "network", grown.solution, grown.criterion
-        best.n_parameters = problem.n_parameters(len(grown.solution.basis))
-        best.stop_reason = grown.stop_reason
-    return best
+    # growth sets a prior of its own in its problem
+    apart = data.problem(rows, options)
+    grown = grow(apart, Library(apart, frame), Basis.empty(apart.dimension), "network", options)
+    path.extend(grown.path)
+    n_parameters = apart.n_parameters(len(grown.solution.basis))
+    return _better(
+        best, rung(apart, "network", grown.solution, n_parameters, grown.stop_reason), options
+    ), path
 
 
-def _constant(problem: SeparableProblem, level: Solution, options: IdentifyOptions) -> _Climb:
-    criterion = deviance(options.criterion, problem.total(level.rss), problem.samples, 1)
-    stop_reason = options.criterion if problem.n_parameters(0) < problem.samples else "data"
-    path = [PathPoint("constant", 0, problem.rmse(level), criterion)]
-    return _Climb("constant", problem, level, 1, stop_reason, criterion, path)
+def _better(below: Rung, above: Rung, options: IdentifyOptions) -> Rung:
+    falls = below.criterion(options) - above.criterion(options)
+    return above if falls >= options.rung_evidence else below
+
+
+def _point(rung: Rung, options: IdentifyOptions) -> PathPoint:
+    return PathPoint(rung.name, 0, rung.rmse, rung.criterion(options))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import math
 from dataclasses import fields
 from typing import Any
 
@@ -16,7 +17,7 @@ try:
     from sklearn.utils.validation import check_is_fitted, validate_data
 except ImportError as missing:
     raise ImportError(
-        "WaveletNetworkRegressor needs scikit-learn 1.6 or later: install it with pip install palpate[sklearn]"
+        "WaveletNetworkRegressor needs scikit-learn 1.6 or later: pip install palpate[sklearn] brings it"
     ) from missing
 
 from .._typing import Float1D
@@ -37,9 +38,7 @@ OF_RECORDINGS = {
 }
 """Settings that only a recording gives a meaning to: strokes, contact, a position with its slope."""
 
-SETTINGS = {
-    each.name: each.default for each in fields(IdentifyOptions) if each.name not in OF_RECORDINGS
-}
+SETTINGS = {each.name: each.default for each in fields(IdentifyOptions) if each.name not in OF_RECORDINGS}
 """Those of :class:`IdentifyOptions` that the regressor takes, with their defaults."""
 
 
@@ -57,7 +56,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     ----------
     **settings
         Fields of :class:`palpate.IdentifyOptions` that do not need a recording, with the same defaults:
-        max_wavelets, criterion, patience, refine, ... (``WaveletNetworkRegressor().get_params()`` lists them).
+        max_wavelets, criterion, patience, refine and others, which ``get_params()`` lists.
 
     Attributes
     ----------
@@ -129,10 +128,11 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
             A setting, shape or value is wrong; the message names it.
         """
         options = IdentifyOptions(**{name: _plain(getattr(self, name)) for name in SETTINGS})
-        X, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
-        weight = None if sample_weight is None else _weights(sample_weight, len(y))
-        found = fit_regression(X, np.asarray(y, dtype=np.float64), weight, options)
-        self.network_ = _model_of(found, self._input_names(found), X, y, weight)
+        rows, values = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        values = np.asarray(values, dtype=np.float64)
+        weight = None if sample_weight is None else _weights(sample_weight, len(values))
+        found = fit_regression(rows, values, weight, options)
+        self.network_ = _model_of(found, self._input_names(found), rows, values, weight)
         self.columns_ = found.columns
         self.n_wavelets_ = self.network_.n_wavelets
         self.n_parameters_ = self.network_.n_parameters
@@ -152,8 +152,8 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         (n,) array
         """
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float64, reset=False)
-        return self.network_.predict(X[:, self.columns_])
+        rows = validate_data(self, X, dtype=np.float64, reset=False)
+        return self.network_.predict(rows[:, self.columns_])
 
     def _input_names(self, found: Regression) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
@@ -175,16 +175,20 @@ def _weights(sample_weight: npt.ArrayLike, n: int) -> Float1D:
     return weight
 
 
-def _model_of(
-    found: Regression, inputs: list[str], X: Float1D, y: Float1D, weight: Float1D | None
-) -> Model:
+def _model_of(found: Regression, inputs: list[str], X: Float1D, y: Float1D, weight: Float1D | None) -> Model:
     digest = hashlib.sha256()
     for array in (X, y, weight):
         if array is not None:
             digest.update(np.ascontiguousarray(array).tobytes())
-    spread = float(np.std(y))
+    mean = np.average(y, weights=weight)
+    spread = float(np.sqrt(np.average((y - mean) ** 2, weights=weight)))
     path: list[PathStep] = [
-        {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
+        {
+            "n_wavelets": at.n_wavelets,
+            "rmse": at.rmse,
+            "criterion": at.criterion if math.isfinite(at.criterion) else None,
+            "rung": at.rung,
+        }
         for at in found.path
     ]
     readings = found.readings
