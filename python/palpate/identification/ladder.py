@@ -121,7 +121,8 @@ class _Rung:
         alpha, beta = self.solution.basis.alpha[:, 0], self.solution.basis.beta[:, 0]
         bend = _core.mexican_hat_curvature(alpha * (self.rows.positions - beta))
         by_channel = bend @ (alpha**2 * self.solution.coefficients[:, 2:]).T
-        return binning_error(self.rows, np.abs(by_channel).max(axis=1)) > BINNING_SHARE * self.rmse
+        error = binning_error(self.rows, np.abs(by_channel).max(axis=1))
+        return error > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
 
 
 class _Ladder:
