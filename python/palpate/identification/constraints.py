@@ -115,7 +115,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
 
     The free solution itself is returned if it keeps them.
     """
-    margin = MARGIN * problem.rmse(free)
+    margin = MARGIN * problem.resolved_rmse(free)
     rows: list[Float2D] = []
     limits: list[Float1D] = []
     current = free

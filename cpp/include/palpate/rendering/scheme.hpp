@@ -107,10 +107,11 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
     if (scheme.structure == StructureKind::Explicit) {
         const double steepest = steepest_slope(scheme, model);
         const double limit = explicit_slope_limit(scheme.inertia, scheme.coupling, period_s);
-        detail::require(steepest < limit,
-                        "structure is explicit, which diverges: the model's steepest slope is " +
-                            readable(steepest) + ", must be below " + readable(limit) +
-                            " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
+        detail::require(
+            steepest < limit,
+            "structure is explicit, which diverges: the model's steepest slope is " + readable(steepest) +
+                ", must be below " + readable(limit) +
+                " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
     }
 }
 
