@@ -54,13 +54,6 @@ void bind_device(py::module_& module) {
                       "rad, and forces are in N*m; or m, and they are in N.")
         .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,
                                "period_s + jitter_s: what a certificate has to hold for [s].")
-        .def(
-            "__eq__",
-            [](const DeviceProfile& self, const py::object& other) {
-                return py::isinstance<DeviceProfile>(other) && self == other.cast<DeviceProfile>();
-            },
-            "other"_a)
-        .def("__hash__", [](const DeviceProfile& self) { return py::hash(py::str(self.id)); })
         .def("__repr__", [](const DeviceProfile& p) {
             return "DeviceProfile(id='" + p.id + "', period_s=" + std::to_string(p.period_s) +
                    ", inertia=" + std::to_string(p.inertia) +
