@@ -105,6 +105,11 @@ void add_running(CLI::App& app, Options& options) {
     app.add_option("--telemetry-hz", options.telemetry_hz, "Lines a second")
         ->check(number_between(0.1, highest_rate_hz))
         ->capture_default_str();
+    app.add_flag("--uncertified", options.uncertified,
+                 "Render on a USB device without a certificate: nothing proves that it stays stable");
+    app.add_option("--wait-ms", options.wait_ms, "How long to wait for a packet of a USB device")
+        ->check(number_between(0.1, 10'000.0))
+        ->capture_default_str();
     app.add_option("--priority", options.real_time.priority, "Of SCHED_FIFO, 0 = ordinary scheduling")
         ->check(number_between(0, 99))
         ->capture_default_str();

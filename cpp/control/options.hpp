@@ -36,6 +36,9 @@ struct Options {
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
 
+    bool uncertified = false;
+    double wait_ms = 5.0;
+
     RealTimeOptions real_time;
     std::vector<std::string> faults;
     bool as_json = false;

@@ -33,6 +33,8 @@ struct Guards {
 template <Device D, Structure S>
 class Controller {
   public:
+    static constexpr bool paced_by_device = paces_host<D>;
+
     Controller(D& device, S structure, Guards guards)
         : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
 
