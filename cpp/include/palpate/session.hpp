@@ -15,6 +15,7 @@
 
 #include "palpate/controller.hpp"
 #include "palpate/guard/guard_settings.hpp"
+#include "palpate/guard/guards.hpp"
 #include "palpate/io/outlets.hpp"
 #include "palpate/io/tick_record.hpp"
 #include "palpate/loop.hpp"
@@ -112,10 +113,9 @@ template <Device D, class Watch>
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
+    validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, [&](auto structure) {
-        Controller controller{device, std::move(structure),
-                              Guards{force_limit(guards), slew_limit(guards, period_s),
-                                     force_ramp(guards, period_s), reading_guard(guards, period_s)}};
+        Controller controller{device, std::move(structure), guards_of(guards, model, scheme, period_s)};
         return run_session(controller, settings, outlets, asked, watch);
     });
 }

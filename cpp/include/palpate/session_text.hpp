@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <charconv>
 #include <cstddef>
 #include <string>
 #include <system_error>
@@ -13,18 +11,11 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/loop.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/session.hpp"
 
 namespace palpate {
-
-/// A number as a person reads it: four significant digits.
-[[nodiscard]] inline std::string readable(double value) {
-    std::array<char, 32> digits{};
-    const auto end =
-        std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::general, 4).ptr;
-    return {digits.data(), end};
-}
 
 /// "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us"
 [[nodiscard]] inline std::string percentiles(const DurationHistogram& histogram) {
@@ -73,7 +64,7 @@ namespace palpate {
         text +=
             ", K_c = " + readable(scheme.coupling.stiffness) + ", B_c = " + readable(scheme.coupling.damping);
     }
-    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+    if (has_mass(scheme.structure)) {
         text += ", m = " + readable(scheme.inertia.mass) + ", B_o = " + readable(scheme.inertia.damping);
     }
     if (scheme.play_radius > 0.0) {
