@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -22,6 +23,7 @@ struct UsbOptions {
     std::string serial;                     ///< empty: the only one there is
     std::chrono::microseconds wait{5'000};  ///< how long an exchange waits for the device's next packet
     std::uint16_t time_to_live_ms = 10;     ///< how long a torque outlives its packet
+    double longest_delay_s = 0.0;           ///< from a sample to its force; 0 = any [s]
 };
 
 /// What happened on the wire, packets and transfers.
@@ -41,7 +43,8 @@ struct UsbHealth {
 /// catches up without losing one; packets that waited longer than that are discarded. In the exchange nothing is
 /// allocated or thrown; libusb takes its own locks, and the wait is a futex.
 ///
-/// Reading::status: Timeout when no packet came, or when the device's watchdog had ended the torque; Fault when the
+/// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
+/// to the device than `UsbOptions::longest_delay_s`; Fault when the
 /// device reports one, was disabled or is gone, and then for good; Lost when it did not understand a command; Limited
 /// when it clipped one. Lost and repeated samples speak through Reading::sequence.
 class UsbDevice {
@@ -160,7 +163,7 @@ class UsbDevice {
     /// Empty, or what the device does not do, and what helps.
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
-        open_->stream = PacketStream{connection.info()};
+        open_->stream = PacketStream{connection.info(), longest_delay()};
         open_->moment = nanoseconds_a_second / (4 * connection.info().rate_hz);
         if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
             return "cannot be disabled: " + detail::usb_reason(code);
@@ -187,7 +190,13 @@ class UsbDevice {
                 return "does not let itself be enabled; run 'palpate devices --clear', then try again";
             }
         }
+        open_->stream.pause();
         return "";
+    }
+
+    [[nodiscard]] Nanoseconds longest_delay() const noexcept {
+        return options_.longest_delay_s > 0.0 ? static_cast<Nanoseconds>(1e9 * options_.longest_delay_s)
+                                              : std::numeric_limits<Nanoseconds>::max();
     }
 
     [[nodiscard]] static std::string fault_text(std::uint16_t bits) {
@@ -208,11 +217,13 @@ class UsbDevice {
 
     void discard_old() noexcept {
         detail::UsbArrival old;
-        for (std::size_t waiting = open_->transfers->arrived(); waiting > most_waiting; waiting = 0) {
-            while (open_->transfers->take(old)) {
-                ++open_->discarded;
-            }
+        if (open_->transfers->arrived() <= most_waiting) {
+            return;
         }
+        while (open_->transfers->take(old)) {
+            ++open_->discarded;
+        }
+        open_->stream.pause();
     }
 
     /// The last command's end and the packet that wakes a host come in the same frame, in any order: a moment of
