@@ -67,6 +67,7 @@ class PacketStream {
 
     /// Packets were thrown away: the next one does not follow the last, and what is sent before it is no answer.
     void pause() noexcept { follows_ = false; }
+    [[nodiscard]] bool follows() const noexcept { return follows_; }
 
     /// The next command on its way out at `now`.
     [[nodiscard]] wire::OutPacket next_command(double force, std::uint16_t time_to_live_ms,
@@ -111,7 +112,8 @@ class PacketStream {
             return;
         }
         health_.round_trip.add(now - flight.sent);
-        if (flight.sample_us != Flight{}.sample_us && packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
+        if (flight.sample_us != Flight{}.sample_us &&
+            packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
             const Nanoseconds delay = 1000 * (clock_us_.value() - packet.out_age_us - flight.sample_us);
             health_.delay.add(delay);
             is_late_ = delay > longest_delay_;

@@ -40,7 +40,7 @@ struct UsbHealth {
 ///
 /// The device paces the host: an exchange sends its command at once and waits for the next packet, in the order in
 /// which they were sampled, but no longer than `UsbOptions::wait`. A host that falls behind by a packet or two
-/// catches up without losing one; packets that waited longer than that are discarded. In the exchange nothing is
+/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. In the exchange nothing is
 /// allocated or thrown; libusb takes its own locks, and the wait is a futex.
 ///
 /// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
@@ -79,7 +79,13 @@ class UsbDevice {
         }
         detail::UsbTransfers& transfers = *open_->transfers;
         discard_old();
-        send(command.force);
+        // A host that is behind takes what waits, and sends what follows from it at once afterwards; but not twice.
+        open_->skipped_last = transfers.arrived() > 0 && !open_->skipped_last;
+        if (open_->skipped_last) {
+            ++open_->skipped_commands;
+        } else {
+            send(command.force);
+        }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
         while (transfers.wait_for_arrival(deadline)) {
             detail::UsbArrival arrival;
@@ -155,6 +161,7 @@ class UsbDevice {
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
         Nanoseconds moment = 0;  ///< a quarter of a frame
+        bool skipped_last = false;
         std::uint64_t skipped_commands = 0;
         std::uint64_t timeouts = 0;
         std::uint64_t discarded = 0;
@@ -182,7 +189,7 @@ class UsbDevice {
             return "reports " + fault_text(open_->stream.status_bits()) +
                    "; when its cause is gone, run 'palpate devices --clear', then try again";
         }
-        if (const int code = connection.request(wire::Request::Enable, 1); code != 0) {
+        if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
             return "cannot be enabled: " + detail::usb_reason(code);
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {
@@ -217,7 +224,7 @@ class UsbDevice {
 
     void discard_old() noexcept {
         detail::UsbArrival old;
-        if (open_->transfers->arrived() <= most_waiting) {
+        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
             return;
         }
         while (open_->transfers->take(old)) {
@@ -243,7 +250,7 @@ class UsbDevice {
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
         send(0.0);
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
-        (void)open_->connection.request(wire::Request::Enable, 0);  // where it fails the watchdog is left
+        (void)open_->transfers->request(wire::Request::Enable, 0);  // where it fails the watchdog is left
     }
 
     /// The last reading again, of no use but for its position.
