@@ -27,19 +27,20 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
                           const std::string& force_unit, double rate_hz, double duration_s,
                           std::string record, const std::string& model_name,
                           std::optional<std::uint16_t> telemetry_port, double telemetry_hz, int priority,
-                          int cpu) {
+                          int cpu, double lowest_rate_share) {
     SessionSettings settings;
     settings.loop.rate_hz = rate_hz;
     settings.loop.duration_s = duration_s;
+    settings.loop.lowest_rate_share = lowest_rate_share;
     settings.real_time = {priority, cpu};
     validate(settings.loop);
     const double period_s = 1.0 / rate_hz;
     const Bench bench = bench_for(model, position_unit == "rad", period_s);
     const GuardSettings guards = bench.guards();
     const RecordUnits units{position_unit, force_unit == "N*m" ? "Nm" : force_unit};
-    const Metadata metadata = flight_metadata(std::string("palpate ") + PALPATE_VERSION, model_name, scheme,
-                                              bench, guards, rate_hz);
-    validate(scheme, model);
+    const Metadata metadata = flight_metadata(std::string("palpate ") + PALPATE_VERSION,
+                                              simulated_metadata(bench), model_name, scheme, guards, rate_hz);
+    validate(scheme, model, period_s);
     SimulatedDevice device{bench.device, bench.hand, simulated_substeps(period_s)};
     Outlets outlets;
     if (telemetry_port) {
@@ -70,15 +71,23 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
 void bind_session(py::module_& module) {
     const LoopSettings loop;
     const RealTimeOptions real_time;
+    module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
+    py::class_<LoopSettings>(module, "LoopSettings", "When a rendering ticks, and when it ends: the defaults.")
+        .def(py::init<>())
+        .def_readonly("rate_hz", &LoopSettings::rate_hz)
+        .def_readonly("duration_s", &LoopSettings::duration_s)
+        .def_readonly("lowest_rate_share", &LoopSettings::lowest_rate_share);
     module.def(
         "render", &render_in_python, "model"_a, "scheme"_a, py::kw_only(), "position_unit"_a = "rad",
         "force_unit"_a = "N*m", "rate_hz"_a = loop.rate_hz, "duration_s"_a = loop.duration_s, "record"_a = "",
-        "model_name"_a = "", "telemetry_port"_a = py::none(), "telemetry_hz"_a = 50.0,
+        "model_name"_a = "", "telemetry_port"_a = py::none(), "telemetry_hz"_a = Telemetry::usual_hz,
         "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
+        "lowest_rate_share"_a = loop.lowest_rate_share,
         "The model rendered in real time on a simulated device: the loop of palpate-control.\n\n"
         "Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the\n"
         "recording, which grows as record.part; a `telemetry_port` of this machine gets JSON lines over "
         "UDP.\n"
+        "A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.\n"
         "Returns the summary by name; ValueError where it is refused before anything moves.");
 }
 

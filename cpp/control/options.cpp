@@ -54,15 +54,15 @@ void add_rendering(CLI::App& app, Options& options) {
     group(app.add_option("--structure", options.structure, "direct, massless, implicit or explicit"))
         ->check(structure_word())
         ->capture_default_str();
-    group(app.add_flag("--compensated", options.compensated, "Take the coupling's spring out of the model"));
-    group(app.add_option("--coupling-stiffness", options.coupling_stiffness,
+    group(app.add_flag("--compensated", options.scheme.compensated, "Take the coupling's spring out of the model"));
+    group(app.add_option("--coupling-stiffness", options.scheme.coupling_stiffness,
                          "K_c, force per position [100 N*m/rad, scaled to the model]"));
-    group(app.add_option("--coupling-damping", options.coupling_damping,
+    group(app.add_option("--coupling-damping", options.scheme.coupling_damping,
                          "B_c, force per velocity [0.02 N*m*s/rad, scaled]"));
-    group(app.add_option("--mass", options.mass, "m of implicit and explicit [0.001 kg*m^2, scaled]"));
+    group(app.add_option("--mass", options.scheme.mass, "m of implicit and explicit [0.001 kg*m^2, scaled]"));
     group(
-        app.add_option("--damping", options.damping, "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
-    group(app.add_option("--play-radius", options.play_radius,
+        app.add_option("--damping", options.scheme.damping, "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
+    group(app.add_option("--play-radius", options.scheme.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"));
 }
 
@@ -80,6 +80,8 @@ void add_guards(CLI::App& app, Options& options) {
               "--frozen-s", options.frozen_s,
               "A position that stands this long out of full motion is an encoder that died, 0 = never"))
         ->capture_default_str();
+    group(app.add_flag("--no-energy-tank", options.no_energy_tank,
+                       "Let the rendering give more energy than the model can hold"));
     group(app.add_option("--tolerated-samples", options.loop.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
         ->capture_default_str();
@@ -104,6 +106,11 @@ void add_running(CLI::App& app, Options& options) {
         ->check(number_between(1, 65535));
     app.add_option("--telemetry-hz", options.telemetry_hz, "Lines a second")
         ->check(number_between(0.1, highest_rate_hz))
+        ->capture_default_str();
+    app.add_flag("--uncertified", options.uncertified,
+                 "Render on a USB device without a certificate: nothing proves that it stays stable");
+    app.add_option("--wait-ms", options.wait_ms, "How long to wait for a packet of a USB device")
+        ->check(number_between(0.1, 10'000.0))
         ->capture_default_str();
     app.add_option("--priority", options.real_time.priority, "Of SCHED_FIFO, 0 = ordinary scheduling")
         ->check(number_between(0, 99))

@@ -7,7 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/simulation.hpp"
+#include "palpate/rendering/free_motion.hpp"
+#include "palpate/rendering/pulses.hpp"
 
 namespace palpate {
 namespace {
@@ -25,7 +26,7 @@ struct Sweep {
     std::vector<double> commands;
 };
 
-Sweep swept(SimulatedDevice& device, const ProbeSettings& settings, int ticks) {
+Sweep swept(SimulatedObjectDevice& device, const ProbeSettings& settings, int ticks) {
     (void)device.open();
     Controller controller{device, Probe{settings, period}, ForceLimit{settings.force_limit}};
     (void)controller.start();
@@ -38,14 +39,15 @@ Sweep swept(SimulatedDevice& device, const ProbeSettings& settings, int ticks) {
     return sweep;
 }
 
-SimulatedDevice nobody_holds(const std::function<double(double)>& object, bool transducer = true) {
-    SimulatedDevice device{DeviceProfile{}, Hand{0.0, 0.0, 0.0, 0.0, 0.5}};
-    device.mount({object, transducer});
-    return device;
+SimulatedObjectDevice mounted(const std::function<double(double)>& object, const Hand& hand,
+                              bool transducer = true, double start = 0.0) {
+    return SimulatedObjectDevice{DeviceProfile{}, hand, 20, start, 0.0, ObjectOnHandle{object, transducer}};
 }
 
+constexpr Hand nobody{0.0, 0.0, 0.0, 0.0, 0.5};
+
 TEST(Probe, CoversItsRangeSlowlyThroughAFallingForce) {
-    SimulatedDevice device = nobody_holds(detent);
+    SimulatedObjectDevice device = mounted(detent, nobody);
     ProbeSettings settings;
     settings.upper = 0.4;
     const Sweep sweep = swept(device, settings, 5000);
@@ -63,7 +65,7 @@ TEST(Probe, CoversItsRangeSlowlyThroughAFallingForce) {
 }
 
 TEST(Probe, TurnsRoundWhereTheObjectHoldsItsLimit) {
-    SimulatedDevice device = nobody_holds([](double x) { return 20.0 * x; });
+    SimulatedObjectDevice device = mounted([](double x) { return 20.0 * x; }, nobody);
     ProbeSettings settings;
     settings.upper = 3.0;
     settings.force_limit = 0.8;
@@ -80,7 +82,7 @@ TEST(Probe, TurnsRoundWhereTheObjectHoldsItsLimit) {
 }
 
 TEST(Probe, ComesBackWhenItStartsBeyondItsRange) {
-    SimulatedDevice device{DeviceProfile{}, Hand{0.0, 0.0, 0.0, 0.0, 0.5}, 20, 0.9};
+    SimulatedObjectDevice device = mounted(nullptr, nobody, true, 0.9);
     ProbeSettings settings;
     settings.upper = 0.3;
     EXPECT_LT(swept(device, settings, 4000).readings.back().position, 0.32);
@@ -101,7 +103,7 @@ TEST(Probe, RefusesARangeOfNoWidth) {
 
 TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
     for (const bool transducer : {true, false}) {
-        SimulatedDevice device = nobody_holds([](double x) { return 3.0 * x; }, transducer);
+        SimulatedObjectDevice device = mounted([](double x) { return 3.0 * x; }, nobody, transducer);
         ProbeSettings settings;
         settings.upper = 0.3;
         settings.force_limit = 5.0;
@@ -119,6 +121,25 @@ TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
     }
 }
 
+TEST(Pulses, AreShortAlternatingAndEndWhereTheHandleGotTooFar) {
+    Pulses pulses{{.force = 0.5, .push_s = 0.03, .rest_s = 0.17, .farthest = 0.2}, period};
+    pulses.reset(1.0);
+    double sum = 0.0;
+    int pushed = 0;
+    for (int k = 0; k < 400; ++k) {
+        const double force = pulses.step(1.0).force;
+        sum += force;
+        pushed += force != 0.0 ? 1 : 0;
+    }
+    EXPECT_EQ(pushed, 60);
+    EXPECT_NEAR(sum, 0.0, 1e-12);
+    for (int k = 0; k < 400; ++k) {
+        EXPECT_EQ(pulses.step(1.3).force, 0.0);
+    }
+    EXPECT_EQ(pulses.step(std::nan("")).status, Status::NonFinite);
+    EXPECT_THROW((Pulses{{.force = 0.0}, period}), std::invalid_argument);
+}
+
 TEST(FreeMotion, LeavesTheHandleToTheHand) {
     FreeMotion free;
     free.reset(1.0);
@@ -127,8 +148,7 @@ TEST(FreeMotion, LeavesTheHandleToTheHand) {
 }
 
 TEST(SimulatedDevice, FeelsTheObjectThatIsMountedOnIt) {
-    SimulatedDevice device{DeviceProfile{}, Hand{15.0, 0.05, 0.3, 0.3, 0.5}};
-    device.mount({[](double x) { return 5.0 * x; }, true});
+    SimulatedObjectDevice device = mounted([](double x) { return 5.0 * x; }, Hand{15.0, 0.05, 0.3, 0.3, 0.5});
     (void)device.open();
     Reading reading;
     for (int k = 0; k < 4000; ++k) {

@@ -20,19 +20,20 @@ ROOMS = ["recording", "model", "identification", "verification", "planning", "de
 # Leaves may import any room but cli; they are imported by cli and the report only.
 LEAVES = {"plotting", "analysis", "baselines"}
 
-# Folder or file of the headers -> what it may include, besides itself and status.hpp.
+# Folder or file of the headers -> what it may include, besides itself, status.hpp and readable.hpp.
 INCLUDES = {
     "status": set(),
+    "readable": set(),
     "model": set(),
     "dynamics": {"model"},
     "solver": {"dynamics", "model"},
     "rendering": {"solver", "dynamics", "model"},
     "stability": {"rendering", "solver", "dynamics", "model", "device"},
     "guard": {"rendering", "solver", "dynamics", "model"},
-    "device": set(),
+    "device": {"realtime"},
     "realtime": set(),
-    "io": {"model", "device", "realtime"},
-    "bench": {"rendering", "solver", "dynamics", "model", "device", "guard"},
+    "io": {"model", "device", "realtime", "rendering", "stability"},
+    "bench": {"simulation", "rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
     "measure": {
         "session",
@@ -47,12 +48,21 @@ INCLUDES = {
     },
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
+    "closed_loop": {"controller", "guard", "rendering", "solver", "dynamics", "model", "device"},
     "controller": {"guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
     "simulation": {"controller", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
 
-# Headers that need a library beside the standard one; no other header includes them, palpate.hpp neither.
-LEAF_HEADERS = {"device/inverse3.hpp", "device/usb.hpp", "io/model_file.hpp"}
+# Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
+LEAF_HEADERS = {
+    "device/inverse3.hpp",
+    "device/usb.hpp",
+    "device/detail/usb_connection.hpp",
+    "device/detail/usb_transfers.hpp",
+    "io/json_field.hpp",
+    "io/model_file.hpp",
+    "io/plan_file.hpp",
+}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
 # and latency in realtime; files and sockets in io.
@@ -141,12 +151,13 @@ def test_headers_include_only_what_stands_below_them(path: Path) -> None:
     name = path.relative_to(HEADERS)
     here = name.parts[0].removesuffix(".hpp")
     ours = [include.removeprefix("palpate/") for include in included(path) if include.startswith("palpate/")]
-    assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
+    if name.as_posix() not in LEAF_HEADERS:
+        assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
     if here == "palpate":
         return
     rooms = {include.split("/")[0].removesuffix(".hpp") for include in ours}
     assert here in INCLUDES, f"{here} is not drawn"
-    assert rooms <= {here, "status", *INCLUDES[here]}, f"{name} includes {sorted(rooms)}"
+    assert rooms <= {here, "status", "readable", *INCLUDES[here]}, f"{name} includes {sorted(rooms)}"
 
 
 @pytest.mark.parametrize("path", HEADER_FILES, ids=lambda path: str(path.relative_to(HEADERS)))

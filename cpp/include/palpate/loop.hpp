@@ -12,6 +12,7 @@
 
 #include "palpate/controller.hpp"
 #include "palpate/io/tick_record.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/timing.hpp"
 #include "palpate/status.hpp"
@@ -33,8 +34,7 @@ inline constexpr double highest_rate_hz = 10'000.0;
 inline void validate(const LoopSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
-                                        right);
+            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
         }
     };
     require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
@@ -76,6 +76,8 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
+    double least_energy = 0.0;  ///< the least that the rendering had taken in at any time [J]
+    std::uint64_t buzzes = 0;   ///< each made the object softer
 };
 
 [[nodiscard]] inline TickRecord record_of(const Tick& tick, const Wake& wake, Nanoseconds first) noexcept {
@@ -157,6 +159,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
+    report.least_energy = controller.guards().observer.least();
+    report.buzzes = controller.guards().buzz.buzzes();
 }
 
 }  // namespace palpate

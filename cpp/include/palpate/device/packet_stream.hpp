@@ -16,15 +16,16 @@ namespace palpate {
 
 /// How well a stream of packets goes, counted since it was opened.
 struct StreamHealth {
-    std::uint64_t packets = 0;           ///< that were understood
-    std::uint64_t lost = 0;              ///< samples of the device that nobody saw
-    std::uint64_t repeated = 0;          ///< samples that came again, or from before
-    std::uint64_t malformed = 0;         ///< of the wrong size, magic or version
-    std::uint64_t late_echoes = 0;       ///< of an OUT packet from before the last one echoed
-    std::uint64_t watchdog_trips = 0;    ///< times that the device's watchdog ended a torque
-    std::uint64_t refused_commands = 0;  ///< packets that told of an OUT packet that the device did not understand
-    DurationHistogram round_trip;        ///< from an OUT packet's way out to its echo's arrival, host clock [ns]
-    DurationHistogram delay;             ///< from a sample to the force computed from it, device clock [ns]
+    std::uint64_t packets = 0;         ///< that were understood
+    std::uint64_t lost = 0;            ///< samples of the device that nobody saw
+    std::uint64_t repeated = 0;        ///< samples that came again, or from before
+    std::uint64_t malformed = 0;       ///< of the wrong size, magic or version
+    std::uint64_t late_echoes = 0;     ///< of an OUT packet from before the last one echoed
+    std::uint64_t watchdog_trips = 0;  ///< times that the device's watchdog ended a torque
+    std::uint64_t refused_commands =
+        0;                         ///< packets that told of an OUT packet that the device did not understand
+    DurationHistogram round_trip;  ///< from an OUT packet's way out to its echo's arrival, host clock [ns]
+    DurationHistogram delay;       ///< from a sample to the force computed from it, device clock [ns]
 };
 
 /// Makes readings of the packets of one device: counters that wrap become ones that do not, counts become SI, status
@@ -81,7 +82,8 @@ class PacketStream {
     struct Flight {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
-        std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
+        std::int64_t sample_us =
+            std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
     };
 
     /// Commands are numbered on from the echo in the first packet, so that an echo is of this session or none.

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -153,6 +153,7 @@ class UsbDevice {
         detail::UsbConnection connection;
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
+        Nanoseconds moment = 0;  ///< a quarter of a frame
         std::uint64_t skipped_commands = 0;
         std::uint64_t timeouts = 0;
         std::uint64_t discarded = 0;
@@ -162,6 +163,7 @@ class UsbDevice {
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
         open_->stream = PacketStream{connection.info()};
+        open_->moment = nanoseconds_a_second / (4 * connection.info().rate_hz);
         if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
             return "cannot be disabled: " + detail::usb_reason(code);
         }
@@ -218,10 +220,12 @@ class UsbDevice {
         }
     }
 
+    /// The last command's end and the packet that wakes a host come in the same frame, in any order: a moment of
+    /// waiting keeps every frame a command. Whatever takes longer than that is skipped.
     void send(double force) noexcept {
+        (void)open_->transfers->wait_for_write(monotonic_now() + open_->moment);
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
-        // Told before it goes out: its echo may be here before the call returns.
         const int code = open_->transfers->write(packet);
         if (code == 0) {
             open_->stream.sent(packet, now);

@@ -27,7 +27,9 @@ struct UsbArrival {
     std::uint32_t size = 0;
     Nanoseconds time = 0;
 
-    [[nodiscard]] std::span<const std::uint8_t> packet() const noexcept { return std::span{bytes}.first(size); }
+    [[nodiscard]] std::span<const std::uint8_t> packet() const noexcept {
+        return std::span{bytes}.first(size);
+    }
 };
 
 /// The transfers of one stream: two reads always queued, one write at most on its way, one thread for libusb's
@@ -51,9 +53,8 @@ class UsbTransfers {
 
     /// 0, or why nothing runs: an error of libusb.
     [[nodiscard]] int start() {
-        if (write_ == nullptr || std::any_of(reads_.begin(), reads_.end(), [](const Read& read) {
-                return read.transfer == nullptr;
-            })) {
+        if (write_ == nullptr || std::any_of(reads_.begin(), reads_.end(),
+                                             [](const Read& read) { return read.transfer == nullptr; })) {
             return LIBUSB_ERROR_NO_MEM;
         }
         runs_.store(true, std::memory_order_release);
@@ -141,9 +142,12 @@ class UsbTransfers {
     [[nodiscard]] bool is_gone() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
-    [[nodiscard]] std::uint64_t bus_errors() const noexcept { return bus_errors_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint64_t bus_errors() const noexcept {
+        return bus_errors_.load(std::memory_order_relaxed);
+    }
     [[nodiscard]] int in_flight() const noexcept {
-        return reads_in_flight_.load(std::memory_order_acquire) + writes_in_flight_.load(std::memory_order_acquire);
+        return reads_in_flight_.load(std::memory_order_acquire) +
+               writes_in_flight_.load(std::memory_order_acquire);
     }
 
   private:
@@ -168,7 +172,8 @@ class UsbTransfers {
     void handle_events() noexcept {
         // A packet that waits for its turn on the processor is late for the loop: this thread stands above it.
         const sched_param priority{90};
-        (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);  // refused: told by the loop's own
+        (void)pthread_setschedparam(pthread_self(), SCHED_FIFO,
+                                    &priority);  // refused: told by the loop's own
         while (runs_.load(std::memory_order_acquire)) {
             timeval wait{0, 100'000};
             const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
@@ -210,8 +215,8 @@ class UsbTransfers {
     void submit(Read& read) noexcept {
         constexpr unsigned no_timeout = 0;
         libusb_fill_interrupt_transfer(read.transfer.get(), handle_, wire::in_endpoint, read.bytes.data(),
-                                       static_cast<int>(read.bytes.size()), &UsbTransfers::arrived_here, &read,
-                                       no_timeout);
+                                       static_cast<int>(read.bytes.size()), &UsbTransfers::arrived_here,
+                                       &read, no_timeout);
         reads_in_flight_.fetch_add(1, std::memory_order_acq_rel);
         if (const int code = libusb_submit_transfer(read.transfer.get()); code != 0) {
             note(code);
