@@ -191,10 +191,11 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
     if (probe || wanted.push) {
         bench.hand.stiffness = bench.hand.damping = 0.0;  // nobody holds a handle that moves by itself
     }
+    SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
     wanted.transducer = object && wanted.transducer;
-    ObjectOnHandle mounted{object ? object_of(*object, 0.0) : nullptr, wanted.transducer};
-    SimulatedObjectDevice device{bench.device, bench.hand, simulated_substeps(period_s),
-                                 0.0,          0.0,        std::move(mounted)};
+    if (object) {
+        device.mount({object_of(*object, 0.0), wanted.transducer});
+    }
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
     metadata.insert(metadata.begin() + 1,

@@ -26,7 +26,7 @@ struct Sweep {
     std::vector<double> commands;
 };
 
-Sweep swept(SimulatedObjectDevice& device, const ProbeSettings& settings, int ticks) {
+Sweep swept(SimulatedRig& device, const ProbeSettings& settings, int ticks) {
     (void)device.open();
     Controller controller{device, Probe{settings, period}, ForceLimit{settings.force_limit}};
     (void)controller.start();
@@ -39,15 +39,14 @@ Sweep swept(SimulatedObjectDevice& device, const ProbeSettings& settings, int ti
     return sweep;
 }
 
-SimulatedObjectDevice mounted(const std::function<double(double)>& object, const Hand& hand,
-                              bool transducer = true, double start = 0.0) {
-    return SimulatedObjectDevice{DeviceProfile{}, hand, 20, start, 0.0, ObjectOnHandle{object, transducer}};
+SimulatedRig nobody_holds(const std::function<double(double)>& object, bool transducer = true) {
+    SimulatedRig device{DeviceProfile{}, Hand{0.0, 0.0, 0.0, 0.0, 0.5}};
+    device.mount({object, transducer});
+    return device;
 }
 
-constexpr Hand nobody{0.0, 0.0, 0.0, 0.0, 0.5};
-
 TEST(Probe, CoversItsRangeSlowlyThroughAFallingForce) {
-    SimulatedObjectDevice device = mounted(detent, nobody);
+    SimulatedRig device = nobody_holds(detent);
     ProbeSettings settings;
     settings.upper = 0.4;
     const Sweep sweep = swept(device, settings, 5000);
@@ -65,7 +64,7 @@ TEST(Probe, CoversItsRangeSlowlyThroughAFallingForce) {
 }
 
 TEST(Probe, TurnsRoundWhereTheObjectHoldsItsLimit) {
-    SimulatedObjectDevice device = mounted([](double x) { return 20.0 * x; }, nobody);
+    SimulatedRig device = nobody_holds([](double x) { return 20.0 * x; });
     ProbeSettings settings;
     settings.upper = 3.0;
     settings.force_limit = 0.8;
@@ -82,7 +81,7 @@ TEST(Probe, TurnsRoundWhereTheObjectHoldsItsLimit) {
 }
 
 TEST(Probe, ComesBackWhenItStartsBeyondItsRange) {
-    SimulatedObjectDevice device = mounted(nullptr, nobody, true, 0.9);
+    SimulatedRig device{DeviceProfile{}, Hand{0.0, 0.0, 0.0, 0.0, 0.5}, 20, 0.9};
     ProbeSettings settings;
     settings.upper = 0.3;
     EXPECT_LT(swept(device, settings, 4000).readings.back().position, 0.32);
@@ -103,7 +102,7 @@ TEST(Probe, RefusesARangeOfNoWidth) {
 
 TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
     for (const bool transducer : {true, false}) {
-        SimulatedObjectDevice device = mounted([](double x) { return 3.0 * x; }, nobody, transducer);
+        SimulatedRig device = nobody_holds([](double x) { return 3.0 * x; }, transducer);
         ProbeSettings settings;
         settings.upper = 0.3;
         settings.force_limit = 5.0;
@@ -147,8 +146,9 @@ TEST(FreeMotion, LeavesTheHandleToTheHand) {
     EXPECT_EQ(free.step(std::nan("")).status, Status::NonFinite);
 }
 
-TEST(SimulatedDevice, FeelsTheObjectThatIsMountedOnIt) {
-    SimulatedObjectDevice device = mounted([](double x) { return 5.0 * x; }, Hand{15.0, 0.05, 0.3, 0.3, 0.5});
+TEST(SimulatedRig, FeelsTheObjectThatIsMountedOnIt) {
+    SimulatedRig device{DeviceProfile{}, Hand{15.0, 0.05, 0.3, 0.3, 0.5}};
+    device.mount({[](double x) { return 5.0 * x; }, true});
     (void)device.open();
     Reading reading;
     for (int k = 0; k < 4000; ++k) {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <utility>
 
 #include "palpate/device/device.hpp"
@@ -18,7 +17,8 @@ namespace palpate {
 
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
 /// friction, encoder, force step and limit, hold over the tick, whole samples of delay. `Plant` moves the
-/// handle: SemiImplicitEuler, Midpoint where energy is accounted for, or ObjectOnHandle.
+/// handle: SemiImplicitEuler, Midpoint where energy is accounted for, or MountedObject where the device is there
+/// to measure a real thing.
 ///
 /// It does not model: motor electrical dynamics, torque ripple, backlash, flexible parts, jitter of the
 /// sample time, the noise of a force transducer.
@@ -26,19 +26,18 @@ template <SimulatedHand H, class Plant>
 class SimulatedHandle {
   public:
     explicit SimulatedHandle(DeviceProfile profile, H hand = {}, int substeps = 20, double start = 0.0,
-                             double start_velocity = 0.0, Plant plant = {})
-        : profile_{std::move(profile)},
-          hand_{hand},
-          fresh_plant_{std::move(plant)},
-          substeps_{substeps},
-          start_{start, start_velocity} {
+                             double start_velocity = 0.0)
+        : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start, start_velocity} {
         validate(profile_);
     }
+
+    /// Puts in what moves the handle, if it has anything to be told.
+    void mount(Plant plant) { plant_ = std::move(plant); }
 
     /// Puts the handle at its start, at rest unless it was given a velocity.
     Opened open() {
         handle_ = start_;
-        plant_ = fresh_plant_;
+        plant_.start();
         applied_ = 0.0;
         tick_ = 0;
         pending_.fill(0.0);
@@ -55,11 +54,7 @@ class SimulatedHandle {
         const double measured = encoded(handle_.position);
         const double velocity = (measured - last_reading_) / profile_.period_s;
         last_reading_ = measured;
-        double transducer = std::numeric_limits<double>::quiet_NaN();
-        if constexpr (requires { plant_.transducer(); }) {
-            transducer = plant_.transducer();
-        }
-        return {measured, velocity, applied_, transducer, time(), tick_, Status::Ok};
+        return {measured, velocity, applied_, plant_.measured(handle_), time(), tick_, Status::Ok};
     }
 
     void close() noexcept { applied_ = 0.0; }
@@ -98,7 +93,6 @@ class SimulatedHandle {
 
     DeviceProfile profile_;
     H hand_;
-    Plant fresh_plant_;
     Plant plant_;
     int substeps_;
     Motion start_;
@@ -112,10 +106,11 @@ class SimulatedHandle {
 /// The device of demonstrations, tests and examples, with a hand that sweeps.
 using SimulatedDevice = SimulatedHandle<Hand, SemiImplicitEuler>;
 
-/// With a real object on the handle, to be measured.
-using SimulatedObjectDevice = SimulatedHandle<Hand, ObjectOnHandle>;
+/// The same with a real object on it: what a recording is made of.
+using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
 
-static_assert(Device<SimulatedDevice> && Device<SimulatedObjectDevice>);
+static_assert(Device<SimulatedDevice>);
+static_assert(Device<SimulatedRig>);
 
 /// Substeps of a tick that keep the inner step of the simulation at 1/20 ms, whatever the rate.
 [[nodiscard]] inline int simulated_substeps(double period_s) noexcept {
