@@ -57,7 +57,9 @@ void refuse(const std::string& sentence) {
 
 Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench) {
     SchemeChoices chosen = options.scheme;
-    chosen.structure = structure_named(options.structure);
+    if (options.structure) {
+        chosen.structure = structure_named(*options.structure);
+    }
     const Scheme scheme = bench.scheme(model, chosen);
     validate(scheme, model, bench.device.period_s);
     return scheme;

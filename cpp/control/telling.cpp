@@ -95,11 +95,11 @@ void LiveView::show(const SessionView& view) {
     if (terminal_ && ++calls_ % calls_a_line == 0) {
         const auto ticks = view.progress.ticks.load(std::memory_order_relaxed);
         const auto missed = view.progress.missed.load(std::memory_order_relaxed);
-        const std::string line = fitting(
-            {readable(static_cast<double>(ticks + missed) / settings_.rate_hz) + " s",
-             readable(view.progress.position.load(std::memory_order_relaxed)) + " " + units_.position,
-             readable(view.progress.force.load(std::memory_order_relaxed)) + " " + units_.force,
-             readable(rate) + " Hz", "missed " + std::to_string(missed)});
+        const std::string line =
+            fitting({readable(static_cast<double>(ticks + missed) / settings_.rate_hz) + " s",
+                     readable(view.progress.position.load(std::memory_order_relaxed)) + " " + units_.position,
+                     readable(view.progress.force.load(std::memory_order_relaxed)) + " " + units_.force,
+                     readable(rate) + " Hz", "missed " + std::to_string(missed)});
         std::cerr << "\r\033[K" << line << std::flush;
         line_is_open_ = true;
     }

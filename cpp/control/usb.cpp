@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "usb.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -14,8 +15,7 @@ namespace palpate::control {
 
 namespace {
 
-/// Below this share of its rate the certificate of a run no longer holds: it is for the period asked for.
-constexpr double certified_rate_share = 0.99;
+constexpr double delay_tolerance = 0.25;  ///< of a sample, for the device's own clock
 
 UsbOptions usb_options(const Options& options) {
     UsbOptions usb;
@@ -78,20 +78,26 @@ int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
     if (!options.faults.empty()) {
         refuse("--fault is for the simulated device");
     }
-    if (options.uncertified == false) {
-        if (const std::string reason = not_certified(file); !reason.empty()) {
-            refuse(options.model + " " + reason +
-                   "; make one with 'palpate plan', or type --uncertified to render without");
-        }
+    UsbOptions usb = usb_options(options);
+    if (!options.uncertified && file.certificate) {
+        // A command that comes later than that is one that nobody certified.
+        const DeviceProfile& certified = file.certificate->device;
+        usb.longest_delay_s = (certified.delay_samples + delay_tolerance) * certified.period_s;
     }
-    UsbDevice device{usb_options(options)};
+    UsbDevice device{std::move(usb)};
     if (const Opened opened = device.open(); !opened) {
         refuse("--device " + options.device + ": " + opened.reason);
     }
     require_fitting(options, file, device);
     Bench bench = bench_for(file.model, true, 1.0 / device.info().rate_hz);
     bench.device = device.profile(bench.device);
-    const Scheme scheme = scheme_of(options, file.model, bench);
+    if (!options.uncertified) {
+        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
+            refuse(options.model + " " + reason +
+                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+        }
+    }
+    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
     const GuardSettings guards = guards_of(options, bench);
     Job job{std::move(file), std::move(units), scheme, guards, {}};
     job.settings.loop = options.loop;

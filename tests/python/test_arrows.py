@@ -67,7 +67,8 @@ LEAF_HEADERS = {
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
 # and latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
-    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"},
+    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
+    | {"linux/futex.h", "sys/syscall.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 

@@ -3,6 +3,7 @@
 
 #include <libusb-1.0/libusb.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -147,7 +148,8 @@ class UsbConnection {
     [[nodiscard]] static std::string refusal(const std::string& serial, const std::vector<Candidate>& fitting,
                                              const std::vector<std::string>& others,
                                              const std::vector<std::string>& reasons) {
-        const auto listed = [](const std::vector<std::string>& words) {
+        const auto listed = [](std::vector<std::string> words) {
+            std::sort(words.begin(), words.end());
             std::string text;
             for (const std::string& word : words) {
                 text += (text.empty() ? "" : ", ") + word;
