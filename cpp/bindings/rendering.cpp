@@ -109,12 +109,14 @@ void bind_rendering(py::module_& module) {
                 period_s ? validate(s, model, *period_s) : validate(s, model);
             },
             "model"_a, "period_s"_a = py::none(),
-            "ValueError names the field, its value and what would be right for this model; with a period also\n"
+            "ValueError names the field, its value and what would be right for this model; with a period "
+            "also\n"
             "what is sure to diverge at it.")
         .def(
             "steepest_slope",
             [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
-            "Largest slope of the model that the structure meets, never below 0; h / r is part of it while a\n"
+            "Largest slope of the model that the structure meets, never below 0; h / r is part of it while "
+            "a\n"
             "hysteresis model sticks.")
         .def("__repr__", [](const Scheme& s) {
             return "Scheme(structure='" +
@@ -131,7 +133,8 @@ void bind_rendering(py::module_& module) {
         "explicit_slope_limit",
         [](const Scheme& s, double period_s, bool coupled) {
             require_period(period_s);
-            return explicit_slope_limit(s.inertia, coupled ? s.coupling : VirtualCoupling{0.0, 0.0}, period_s);
+            return explicit_slope_limit(s.inertia, coupled ? s.coupling : VirtualCoupling{0.0, 0.0},
+                                        period_s);
         },
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
         "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
