@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/measure.hpp"
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <exception>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +21,10 @@
 #include "palpate/rendering/probe.hpp"
 #include "palpate/rendering/pulses.hpp"
 #include "summary.hpp"
+
+#ifdef PALPATE_HAS_USB
+#include "palpate/device/usb.hpp"
+#endif
 
 namespace palpate::bindings {
 
@@ -116,6 +123,53 @@ class Watcher {
     int views_ = 0;
 };
 
+/// A measurement on a device that is described by `bench`. The device is not open yet; `told` is added to the
+/// summary when it has been closed.
+template <Device D, class Told>
+py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSettings>& probe,
+                     Metadata metadata, Measurement& wanted, Told told) {
+    const double period_s = 1.0 / wanted.session.loop.rate_hz;
+    GuardSettings guards = bench.guards();
+    guards.force_limit = probe ? probe->force_limit : guards.force_limit;
+    Outlets outlets;
+    outlets.real_object = !wanted.push;
+    outlets.keeps = wanted.keep;
+    const Opened opened = device.open();
+    detail::require(static_cast<bool>(opened), opened.reason);
+    if (!wanted.record.empty()) {
+        const std::string reason = outlets.file.open(wanted.record, wanted.units, metadata);
+        if (!reason.empty()) {
+            device.close();
+            throw std::invalid_argument(reason);
+        }
+    }
+    std::atomic<bool> asked{false};
+    Watcher watcher{wanted.progress, asked};
+    const auto watch = [&](const SessionView& view) { watcher(view); };
+    const auto measured = [&](auto moves) {
+        const py::gil_scoped_release unlocked;
+        return measure_live(device, std::move(moves), guards, wanted.session, outlets, asked, watch);
+    };
+    const SessionReport report = probe         ? measured(Probe{*probe, period_s})
+                                 : wanted.push ? measured(Pulses{{*wanted.push}, period_s})
+                                               : measured(FreeMotion{});
+    const std::vector<std::string> notes =
+        close_record(outlets, report, wanted.session.loop, wanted.units, metadata, wanted.record);
+    watcher.rethrow();
+    py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes);
+    summary["device"] = bench.device.id;
+    summary["encoder_step"] = bench.device.encoder_step;
+    summary["force_limit"] = bench.device.force_limit;
+    summary["transducer"] = wanted.transducer;
+    summary["position_range"] = std::pair{outlets.positions.lower, outlets.positions.upper};
+    summary["force_range"] = std::pair{outlets.forces.lower, outlets.forces.upper};
+    if (wanted.keep) {
+        summary["kept"] = columns(outlets.kept);
+    }
+    told(summary);
+    return summary;
+}
+
 /// The bench on which a model is mounted; without one the default knob.
 Bench bench_with(const std::optional<ForceModel>& object, const RecordUnits& units, double period_s) {
     if (object) {
@@ -138,51 +192,57 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
         bench.hand.stiffness = bench.hand.damping = 0.0;  // nobody holds a handle that moves by itself
     }
     SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
-    const bool transducer = object && wanted.transducer;
+    wanted.transducer = object && wanted.transducer;
     if (object) {
         device.mount({object_of(*object, 0.0), wanted.transducer});
     }
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
-                                          transducer, wanted.session.loop.rate_hz);
+                                          wanted.transducer, wanted.session.loop.rate_hz);
     metadata.insert(metadata.begin() + 1,
                     {"simulated", "yes: device, hand and object; nothing here was measured"});
-    GuardSettings guards = bench.guards();
-    guards.force_limit = probe ? probe->force_limit : guards.force_limit;
+    return measured_on(device, bench, probe, std::move(metadata), wanted, [](py::dict&) {});
+}
 
-    Outlets outlets;
-    outlets.real_object = !wanted.push;
-    outlets.keeps = wanted.keep;
-    if (!wanted.record.empty()) {
-        const std::string reason = outlets.file.open(wanted.record, wanted.units, metadata);
-        detail::require(reason.empty(), reason);
-    }
+#ifdef PALPATE_HAS_USB
+/// What a device says of itself: it is opened without force, and closed again.
+wire::Info identity_of(const std::string& serial, DeviceProfile& profile) {
+    UsbDevice device{{.serial = serial, .makes_force = false}};
     const Opened opened = device.open();
     detail::require(static_cast<bool>(opened), opened.reason);
-    std::atomic<bool> asked{false};
-    Watcher watcher{wanted.progress, asked};
-    const auto watch = [&](const SessionView& view) { watcher(view); };
-    const auto measured = [&](auto moves) {
-        const py::gil_scoped_release unlocked;
-        return measure_live(device, std::move(moves), guards, wanted.session, outlets, asked, watch);
-    };
-    const SessionReport report = probe         ? measured(Probe{*probe, period_s})
-                                 : wanted.push ? measured(Pulses{{*wanted.push}, period_s})
-                                               : measured(FreeMotion{});
-    const std::vector<std::string> notes =
-        close_record(outlets, report, wanted.session.loop, wanted.units, metadata, wanted.record);
-    watcher.rethrow();
-    py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes);
-    summary["device"] = bench.device.id;
-    summary["encoder_step"] = bench.device.encoder_step;
-    summary["force_limit"] = bench.device.force_limit;
-    summary["transducer"] = transducer;
-    summary["position_range"] = std::pair{outlets.positions.lower, outlets.positions.upper};
-    summary["force_range"] = std::pair{outlets.forces.lower, outlets.forces.upper};
-    if (wanted.keep) {
-        summary["kept"] = columns(outlets.kept);
-    }
-    return summary;
+    profile = device.profile();
+    return device.info();
 }
+
+py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
+    Bench bench;
+    const wire::Info info = identity_of(serial, bench.device);
+    wanted.session.loop.rate_hz = info.rate_hz;
+    validate(wanted.session.loop);
+    wanted.transducer = (info.capabilities & wire::has_transducer) != 0;
+    const ProbeSettings standard;
+    const std::optional<ProbeSettings> probe = wanted.probe.granted(bench, standard.lower, standard.upper);
+    UsbDevice device{{.serial = serial, .makes_force = probe || wanted.push}};
+    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
+                                          wanted.transducer, wanted.session.loop.rate_hz);
+    return measured_on(device, bench, probe, std::move(metadata), wanted, [&](py::dict& summary) {
+        const UsbHealth health = device.health();
+        summary["device"] = device.name().text();
+        summary["round_trip"] = microseconds(health.stream.round_trip);
+        summary["delay"] = microseconds(health.stream.delay);
+        summary["malformed"] = health.stream.malformed;
+        summary["stalls"] = health.stalls;
+        summary["bus_errors"] = health.bus_errors;
+        summary["watchdog_trips"] = health.stream.watchdog_trips;
+        summary["skipped_commands"] = health.skipped_commands;
+        summary["timeouts"] = health.timeouts;
+    });
+}
+#else
+py::dict measure_on_usb(const std::string& /*serial*/, Measurement& /*wanted*/) {
+    throw std::invalid_argument(
+        "palpate was built without libusb: install libusb-1.0-0-dev, then palpate again");
+}
+#endif
 
 }  // namespace
 
@@ -191,11 +251,11 @@ void bind_measure(py::module_& module) {
     const RealTimeOptions real_time;
     module.def(
         "measure",
-        [](const std::optional<ForceModel>& object, bool transducer, const std::string& position_unit,
-           const std::string& force_unit, bool probe, std::optional<double> lower,
-           std::optional<double> upper, std::optional<double> speed, std::optional<double> stiffness,
-           std::optional<double> force_limit, std::optional<double> push, double rate_hz, double duration_s,
-           const std::string& record, bool keep, int priority, int cpu,
+        [](const std::string& device, const std::optional<ForceModel>& object, bool transducer,
+           const std::string& position_unit, const std::string& force_unit, bool probe,
+           std::optional<double> lower, std::optional<double> upper, std::optional<double> speed,
+           std::optional<double> stiffness, std::optional<double> force_limit, std::optional<double> push,
+           double rate_hz, double duration_s, const std::string& record, bool keep, int priority, int cpu,
            const std::optional<py::function>& progress) {
             Measurement wanted{transducer,
                                {position_unit, force_unit == "N*m" ? "Nm" : force_unit},
@@ -208,14 +268,19 @@ void bind_measure(py::module_& module) {
             wanted.session.loop.rate_hz = rate_hz;
             wanted.session.loop.duration_s = duration_s;
             wanted.session.real_time = {priority, cpu};
+            if (device == "usb" || device.starts_with("usb:")) {
+                return measure_on_usb(device.substr(std::min<std::size_t>(device.size(), 4)), wanted);
+            }
+            detail::require(device == "simulated",
+                            "device is '" + device + "', must be simulated or usb[:SERIAL]");
             return measure_on_simulated(object, wanted);
         },
-        py::kw_only(), "object"_a = py::none(), "transducer"_a = true, "position_unit"_a = "rad",
-        "force_unit"_a = "N*m", "probe"_a = false, "lower"_a = py::none(), "upper"_a = py::none(),
-        "speed"_a = py::none(), "stiffness"_a = py::none(), "force_limit"_a = py::none(),
-        "push"_a = py::none(), "rate_hz"_a = loop.rate_hz, "duration_s"_a = loop.duration_s, "record"_a = "",
-        "keep"_a = false, "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
-        "progress"_a = py::none(),
+        "device"_a = "simulated", py::kw_only(), "object"_a = py::none(), "transducer"_a = true,
+        "position_unit"_a = "rad", "force_unit"_a = "N*m", "probe"_a = false, "lower"_a = py::none(),
+        "upper"_a = py::none(), "speed"_a = py::none(), "stiffness"_a = py::none(),
+        "force_limit"_a = py::none(), "push"_a = py::none(), "rate_hz"_a = loop.rate_hz,
+        "duration_s"_a = loop.duration_s, "record"_a = "", "keep"_a = false,
+        "priority"_a = real_time.priority, "cpu"_a = real_time.cpu, "progress"_a = py::none(),
         "A real object measured in real time on a simulated device, on which the model `object` is "
         "mounted.\n\n"
         "A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;\n"

@@ -7,7 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/simulation.hpp"
+#include "palpate/rendering/free_motion.hpp"
+#include "palpate/rendering/pulses.hpp"
 
 namespace palpate {
 namespace {
@@ -117,6 +118,25 @@ TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
         // The encoder's step, against the friction of the device at the sweep's speed and its turns.
         EXPECT_LT(worst, transducer ? 2e-4 : 0.05);
     }
+}
+
+TEST(Pulses, AreShortAlternatingAndEndWhereTheHandleGotTooFar) {
+    Pulses pulses{{.force = 0.5, .push_s = 0.03, .rest_s = 0.17, .farthest = 0.2}, period};
+    pulses.reset(1.0);
+    double sum = 0.0;
+    int pushed = 0;
+    for (int k = 0; k < 400; ++k) {
+        const double force = pulses.step(1.0).force;
+        sum += force;
+        pushed += force != 0.0 ? 1 : 0;
+    }
+    EXPECT_EQ(pushed, 60);
+    EXPECT_NEAR(sum, 0.0, 1e-12);
+    for (int k = 0; k < 400; ++k) {
+        EXPECT_EQ(pulses.step(1.3).force, 0.0);
+    }
+    EXPECT_EQ(pulses.step(std::nan("")).status, Status::NonFinite);
+    EXPECT_THROW((Pulses{{.force = 0.0}, period}), std::invalid_argument);
 }
 
 TEST(FreeMotion, LeavesTheHandleToTheHand) {

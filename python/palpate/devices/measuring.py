@@ -7,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .._core import measure as measure_simulated
+from .._core import measure as measure_live
 from ..errors import InputError
 from ..model import Model
-from .errors import DeviceError
 
 Progress = Callable[[int, float, float], None]
 """Is told, ten times a second, the ticks so far, the position and the object's force."""
@@ -22,7 +21,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     Parameters
     ----------
     device : str
-        ``simulated``.
+        ``simulated``, or ``usb[:SERIAL]``.
     object : Model, optional
         What is mounted on the simulated device.
     **settings
@@ -36,14 +35,8 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     Raises
     ------
     InputError
-        A device of no known kind.
-    DeviceError
-        The device cannot be used: with the reason and its cure.
+        Refused before anything moved: with the device, the reason and its cure.
     """
-    if device != "simulated":
-        if device.split(":")[0] == "usb":
-            raise DeviceError(f"--device {device}: this build has no USB stream")
-        raise InputError(f"device is '{device}', must be simulated or usb[:SERIAL]")
     if object is not None:
         settings["position_unit"] = object.units["position"]
         settings["force_unit"] = object.units["force"]
@@ -53,7 +46,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
             raise InputError(
                 f"the object has {object.dimension} inputs: one of the position alone can be mounted"
             )
-    return measure_simulated(object=object, **settings)
+    return measure_live(device, object=object, **settings)
 
 
 def record(
@@ -80,7 +73,7 @@ def record(
     path : str or Path
         The recording; it grows as path.part.
     device : str
-        ``simulated``.
+        ``simulated``, or ``usb[:SERIAL]``.
     object : Model, optional
         What is mounted on the simulated device.
     probe : bool
