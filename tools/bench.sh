@@ -28,6 +28,7 @@ for source in bench/*.cpp; do
         exit 1
     fi
 done
+.venv/bin/palpate chart speed build/bench --to build/bench/figures
 echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."
 
 echo "Lateness of the real-time loop beside cyclictest"

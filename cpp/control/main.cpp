@@ -48,15 +48,10 @@ void refuse(const std::string& sentence) {
 }
 
 Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench) {
-    Scheme scheme = bench.scheme(model);
-    scheme.structure = structure_named(options.structure);
-    scheme.compensated = options.compensated;
-    scheme.coupling.stiffness = options.coupling_stiffness.value_or(scheme.coupling.stiffness);
-    scheme.coupling.damping = options.coupling_damping.value_or(scheme.coupling.damping);
-    scheme.inertia.mass = options.mass.value_or(scheme.inertia.mass);
-    scheme.inertia.damping = options.damping.value_or(scheme.inertia.damping);
-    scheme.play_radius = options.play_radius.value_or(scheme.play_radius);
-    validate(scheme, model);
+    SchemeChoices chosen = options.scheme;
+    chosen.structure = structure_named(options.structure);
+    const Scheme scheme = bench.scheme(model, chosen);
+    validate(scheme, model, bench.device.period_s);
     return scheme;
 }
 

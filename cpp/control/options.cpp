@@ -54,15 +54,15 @@ void add_rendering(CLI::App& app, Options& options) {
     group(app.add_option("--structure", options.structure, "direct, massless, implicit or explicit"))
         ->check(structure_word())
         ->capture_default_str();
-    group(app.add_flag("--compensated", options.compensated, "Take the coupling's spring out of the model"));
-    group(app.add_option("--coupling-stiffness", options.coupling_stiffness,
+    group(app.add_flag("--compensated", options.scheme.compensated, "Take the coupling's spring out of the model"));
+    group(app.add_option("--coupling-stiffness", options.scheme.coupling_stiffness,
                          "K_c, force per position [100 N*m/rad, scaled to the model]"));
-    group(app.add_option("--coupling-damping", options.coupling_damping,
+    group(app.add_option("--coupling-damping", options.scheme.coupling_damping,
                          "B_c, force per velocity [0.02 N*m*s/rad, scaled]"));
-    group(app.add_option("--mass", options.mass, "m of implicit and explicit [0.001 kg*m^2, scaled]"));
+    group(app.add_option("--mass", options.scheme.mass, "m of implicit and explicit [0.001 kg*m^2, scaled]"));
     group(
-        app.add_option("--damping", options.damping, "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
-    group(app.add_option("--play-radius", options.play_radius,
+        app.add_option("--damping", options.scheme.damping, "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
+    group(app.add_option("--play-radius", options.scheme.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"));
 }
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "telling.hpp"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <iostream>
+#include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -34,6 +38,23 @@ nlohmann::json statuses(const LoopReport& loop) {
         }
     }
     return counts;
+}
+
+/// As many of the parts as fit on one line of the terminal: a longer one would leave its first half behind.
+std::string fitting(const std::vector<std::string>& parts) {
+    constexpr std::size_t usual_columns = 80;
+    winsize size{};
+    const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+    const std::size_t columns = known ? size.ws_col : usual_columns;
+    std::string line;
+    for (const std::string& part : parts) {
+        const std::string more = (line.empty() ? "" : "  ") + part;
+        if (line.size() + more.size() >= columns) {
+            break;
+        }
+        line += more;
+    }
+    return line;
 }
 
 }  // namespace
@@ -73,10 +94,12 @@ void LiveView::show(const SessionView& view) {
     if (terminal_ && ++calls_ % calls_a_line == 0) {
         const auto ticks = view.progress.ticks.load(std::memory_order_relaxed);
         const auto missed = view.progress.missed.load(std::memory_order_relaxed);
-        std::cerr << "\r\033[K" << readable(static_cast<double>(ticks + missed) / settings_.rate_hz) << " s  "
-                  << readable(rate) << " Hz  position " << readable(view.progress.position.load()) << " "
-                  << units_.position << "  force " << readable(view.progress.force.load()) << " "
-                  << units_.force << "  missed " << missed << std::flush;
+        const std::string line = fitting(
+            {readable(static_cast<double>(ticks + missed) / settings_.rate_hz) + " s",
+             readable(view.progress.position.load(std::memory_order_relaxed)) + " " + units_.position,
+             readable(view.progress.force.load(std::memory_order_relaxed)) + " " + units_.force,
+             readable(rate) + " Hz", "missed " + std::to_string(missed)});
+        std::cerr << "\r\033[K" << line << std::flush;
         line_is_open_ = true;
     }
 }

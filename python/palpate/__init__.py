@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .errors import InputError
     from .identification import IdentifyOptions, frame_bounds
     from .identification.identify import identify
+    from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
     from .planning import Plan, simulate
     from .recording import Recording, read_recording
@@ -39,6 +40,7 @@ _HOME = {
     "read_recording": "recording",
     "Verification": "verification",
     "verify": "verification",
+    "WaveletNetworkRegressor": "identification.regressor",
 }
 """Where each public name lives."""
 
@@ -52,6 +54,7 @@ __all__ = [
     "Recording",
     "Scheme",
     "Verification",
+    "WaveletNetworkRegressor",
     "__version__",
     "frame_bounds",
     "identify",

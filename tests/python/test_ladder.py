@@ -183,7 +183,7 @@ def test_the_result_does_not_depend_on_units() -> None:
 @pytest.mark.parametrize(
     ("positions", "force", "told"),
     [
-        (np.full(20, 0.3), np.arange(20.0), "all positions are 0.3"),
+        (np.full(20, 0.3), np.arange(20.0), "every position is 0.3"),
         (np.arange(9.0), np.arange(9.0), "9 rows; 10 or more"),
         (np.repeat([0.0, 1.0], 10), np.arange(20.0), "2 distinct values; 3 or more"),
         (np.append(np.arange(19.0), np.nan), np.arange(20.0), "position in row 19 is"),

@@ -80,12 +80,13 @@ class Controller {
     [[nodiscard]] Status guarded(const Rendered& rendered, double& force, Status believed) noexcept {
         const double scale = guards_.buzz.scale();
         const Status softened = scale < 1.0 ? Status::Softened : Status::Ok;
-        force = guards_.ramp.next() * scale * rendered.force;
+        force = scale * rendered.force;
+        const Status ramped = guards_.ramp.apply(force);
         const Status limited = guards_.limit.apply(force);
         const Status slewed = guards_.slew.apply(force);
         const Status drained = guards_.tank.apply(force);
         guards_.buzz.watch(reading_.position, force);
-        for (const Status status : {rendered.status, limited, slewed, drained, softened}) {
+        for (const Status status : {rendered.status, ramped, limited, slewed, drained, softened}) {
             if (status != Status::Ok) {
                 return status;
             }

@@ -12,6 +12,7 @@
 
 #include "palpate/controller.hpp"
 #include "palpate/io/tick_record.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/timing.hpp"
 #include "palpate/status.hpp"
@@ -33,8 +34,7 @@ inline constexpr double highest_rate_hz = 10'000.0;
 inline void validate(const LoopSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
-                                        right);
+            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
         }
     };
     require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
@@ -64,6 +64,7 @@ struct LoopProgress {
     std::atomic<std::uint64_t> missed{0};
     std::atomic<double> position{0.0};
     std::atomic<double> force{0.0};
+    std::atomic<double> object_force{0.0};  ///< of a real object against the handle
     RateCheck rate;
 };
 
@@ -85,6 +86,7 @@ struct LoopReport {
     record.position = tick.reading.position;
     record.force = tick.command.force;
     record.applied = tick.reading.applied;
+    record.measured = tick.reading.measured;
     record.environment_position = tick.rendered.environment_position;
     record.velocity = tick.reading.velocity;
     record.device_time = tick.reading.device_time;
@@ -128,7 +130,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         const Wake wake = clock.wait();
         report.timing.add(wake);
         const Tick tick = controller.tick();
-        sink.push(record_of(tick, wake, report.timing.first));
+        const TickRecord record = record_of(tick, wake, report.timing.first);
+        sink.push(record);
         report.status = tick.status;
         ++report.ticks_by_status[static_cast<std::size_t>(tick.status)];
         bad_in_a_row = sends_force(tick.status) ? 0 : bad_in_a_row + 1;
@@ -137,6 +140,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         progress.missed.store(report.timing.missed, std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
         progress.force.store(tick.command.force, std::memory_order_relaxed);
+        progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);
         if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.ending)) {

@@ -79,11 +79,12 @@ template <class Control, class Watch>
     std::atomic<bool> over{false};
     LastRecords<TickRecord> last{settings.last_ticks};
     const LockedMemory memory;
+    const WakefulCores cores;
     using Recorder = FlightRecorder<TickRecord, Outlets>;
     Recorder recorder{outlets, capacity, settings.hand_over_every};
 
     std::thread loop{[&] {
-        report.refused = become_real_time(settings.real_time, memory);
+        report.refused = become_real_time(settings.real_time, memory, cores);
         asked_for_privileges.store(true, std::memory_order_release);
         Periodic clock{period};
         detail::LoopSink<Recorder> sink{recorder, last};
@@ -111,6 +112,7 @@ template <Device D, class Watch>
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
+    validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, [&](auto structure) {
         Controller controller{device, std::move(structure), guards_of(guards, model, scheme, period_s)};
         return run_session(controller, settings, outlets, asked, watch);

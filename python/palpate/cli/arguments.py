@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -14,6 +14,7 @@ import click
 from .output import talk
 
 if TYPE_CHECKING:
+    from ..model import Model
     from ..recording import Recording
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -56,16 +57,22 @@ class ReadingOptions:
 
     options: dict[str, Any] = field(default_factory=dict)
 
-    def read(self, path: Path) -> Recording:
-        """Read a recording, and say first what was read and which columns were chosen."""
+    def read(self, path: Path, inputs: Sequence[str] = ()) -> Recording:
+        """Read a recording with further inputs, and say first what was read and which columns were chosen."""
         from ..recording import read_recording
 
-        recording = read_recording(path, **self.options)
+        recording = read_recording(path, inputs=inputs, **self.options)
         chosen, *others = recording.notes
         talk(f"read {path}: {len(recording)} rows; {chosen}")
         for note in others:
             talk(f"  {note}")
         return recording
+
+
+def columns_of(model: Model) -> list[str]:
+    """The columns of a file that a model's inputs beside the position were read from."""
+    known = model.data.columns
+    return [known.get(name, name) for name in model.inputs[1:] if name != "velocity" or name in known]
 
 
 def reading_options(command: F) -> F:

@@ -12,6 +12,7 @@ import click
 import numpy as np
 
 from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from .beside_baselines import as_records, baselines_option, fit_baselines, print_beside
 from .figures import require_figure_name
 from .identify_options import identify_options
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     metavar="K",
     help="Keep every K-th row out of the identification and report the error on these rows.",
 )
+@baselines_option
 @plot_option("measured and modelled force over position, residuals beneath")
 @json_option
 @reading_options
@@ -47,6 +49,7 @@ def identify(
     recording_files: tuple[Path, ...],
     output: Path,
     hold_out_every: int | None,
+    beside: bool,
     plot: Path | None,
     as_json: bool,
     reading: ReadingOptions,
@@ -59,6 +62,7 @@ def identify(
     as the data allows: a constant, a line, a wavelet network, and hysteresis where press and release differ.
     """
     from ..identification import identify as identify_model
+    from ..identification.options import RESERVED_INPUTS
     from ..verification import verify
 
     if plot is not None:
@@ -66,7 +70,9 @@ def identify(
     for target in filter(None, (output, plot)):
         require_writable(target, inputs=recording_files)
     require_distinct(output, plot)
-    recordings = [reading.read(path) for path in recording_files]
+    columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+    recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
+    others = fit_baselines(recordings, hold_out_every) if beside else []
     judged_on = recordings
     if hold_out_every is not None:
         parts = [recording.split(hold_out_every) for recording in recordings]
@@ -88,6 +94,8 @@ def identify(
         "nrmse": nrmse,
         "seconds": seconds,
     }
+    if beside:
+        result["baselines"] = as_records(others)
     rows = sum(len(recording) for recording in judged_on)
     judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
     with finishing():
@@ -107,6 +115,8 @@ def identify(
                 "seconds": f"{seconds:.2f}",
             }
         )
+        if beside:
+            print_beside(nrmse, model.n_parameters, seconds, others)
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:

@@ -11,15 +11,16 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 
 import click
 
-from ..identification.options import IdentifyOptions
+from ..identification.options import LOSSES, SELECTIONS, IdentifyOptions
 from ..identification.stopping import CRITERIA
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 HELP = {
-    "inputs": "auto, or names joined by commas, such as position,hysteresis.",
+    "inputs": "auto, or names joined by commas: position, then hysteresis, velocity or columns.",
     "max_wavelets": "Largest network tried.",
     "criterion": "When to stop adding wavelets.",
+    "selection": "How wavelets are taken from the frame.",
     "rung_evidence": "Fall of the criterion that a richer kind of model must show.",
     "patience": "Wavelets added without improvement before growth stops.",
     "refine": "Move and stretch the wavelets, or leave them on the frame.",
@@ -30,6 +31,7 @@ HELP = {
     "max_candidates": "Members of the frame at most.",
     "resolved_by": "Distinct positions that the core of a wavelet must hold.",
     "max_positions": "Distinct positions of a stroke beyond which they are binned.",
+    "loss": "Least squares, or rows far from the others weighed down.",
     "hysteresis_nonnegative": "Impose that every loop loses energy.",
     "slope_bounds": "Least and largest slope imposed, in force per position.",
     "coupling_stiffness": "Keep the slope below 0.9 of it, in force per position.",
@@ -75,5 +77,6 @@ def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
         return click.option(flag, name, metavar="NUMBERS", callback=_numbers, **text)
     if len(kinds) == 1 and get_args(kinds[0]):
         return click.option(flag, name, type=float, nargs=len(get_args(kinds[0])), **text)
-    kind = click.Choice(list(CRITERIA)) if name == "criterion" else kinds[0]
+    choices = {"criterion": CRITERIA, "selection": SELECTIONS, "loss": LOSSES}
+    kind = click.Choice(list(choices[name])) if name in choices else kinds[0]
     return click.option(flag, name, type=kind, **text)

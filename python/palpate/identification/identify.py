@@ -4,21 +4,22 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
 from ..recording import Recording, Source
+from .environment import VELOCITY_INPUTS, fit_environment
 from .identified import IdentifiedNetwork
-from .ladder import fit_environment
+from .inputs import Observations, observations
 from .options import IdentifyOptions, options_from
 
 
 def identify(recording: Recording | Sequence[Recording], **options: Any) -> Model:
     """Identify the environment behind recorded force over position.
 
-    Climbs the ladder constant, linear, position, hysteresis, as far as each rung earns its place.
+    Climbs the ladder constant, linear, position, hysteresis, as far as each rung earns its place. A recording
+    with further inputs gives a force of them all (constant, linear, network).
 
     Parameters
     ----------
@@ -48,27 +49,29 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
             raise InputError(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify them apart"
             )
-    positions = np.concatenate([part.position for part in recordings])[:, None]
-    force = np.concatenate([part.force for part in recordings])
-    side, starts = None, None
-    if all(part.direction is not None for part in recordings):
-        side = np.concatenate([np.asarray(part.direction, dtype=float) for part in recordings])
-    elif all(part.time is not None for part in recordings):
-        starts = np.concatenate([[0], np.cumsum([len(part.position) for part in recordings])[:-1]]).tolist()
+    seen = observations(recordings, settings)
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
-        network = fit_environment(positions, force, side, settings, starts=starts)
-    return _model_of(network, recordings, settings)
+        network = fit_environment(
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names
+        )
+    return _model_of(network, seen, recordings, settings)
 
 
-def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> Model:
+def _model_of(
+    network: IdentifiedNetwork,
+    seen: Observations,
+    recordings: Sequence[Recording],
+    options: IdentifyOptions,
+) -> Model:
+    notes = [*seen.notes, *network.notes]
     path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
     ]
     return Model(
-        kind="hysteresis" if network.weight_hysteresis is not None else "position",
-        inputs=("position",),
+        kind=_kind(network, seen.names),
+        inputs=seen.names,
         units=recordings[0].units,
         alpha=network.alpha,
         beta=network.beta,
@@ -93,5 +96,11 @@ def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], optio
             path=path,
         ),
         data=Source.merged(part.source for part in recordings),
-        notes={"identification": list(network.notes)} if network.notes else None,
+        notes={"identification": notes} if notes else None,
     )
+
+
+def _kind(network: IdentifiedNetwork, names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return "hysteresis" if network.weight_hysteresis is not None else "position"
+    return "position_velocity" if tuple(names) == VELOCITY_INPUTS else "general"

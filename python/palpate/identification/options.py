@@ -9,8 +9,14 @@ from typing import Any
 from ..errors import InputError
 from .stopping import CRITERIA
 
-LADDER_INPUTS = ("position", "hysteresis")
-"""What the ladder can take as inputs, in its order."""
+RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
+"""What `inputs` may hold beside the names of columns."""
+
+SELECTIONS = ("orthogonal", "residual", "backward")
+"""What `selection` may be."""
+
+LOSSES = ("squares", "huber")
+"""What `loss` may be."""
 
 COUPLING_SHARE = 0.9
 """Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
@@ -27,11 +33,14 @@ class IdentifyOptions:
     """
 
     inputs: str | tuple[str, ...] = "auto"
-    """"auto": the ladder decides. Or names, as a tuple or with commas between: the rung is then given."""
+    """"auto": the ladder decides, over the position and the recording's further inputs. Or names, as a tuple
+    or with commas between: position, then hysteresis, velocity (from time) or columns; they are then given."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"
-    """Stopping rule: bic, aicc, gcv or fpe"""
+    """Stopping rule: bic, aicc, gcv, fpe, or on rows kept back: fresh, perceptual"""
+    selection: str = "orthogonal"
+    """How wavelets are taken from the frame: orthogonal, residual or backward"""
     rung_evidence: float = 10.0
     """Fall of the criterion that a more complex rung must show; 10 is called very strong evidence [-]"""
     patience: int = 3
@@ -51,7 +60,10 @@ class IdentifyOptions:
     resolved_by: int = 7
     """Distinct positions, on every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]"""
     max_positions: int = 1024
-    """Distinct positions that are kept apart; more of them are gathered in as many cells [-]"""
+    """Distinct positions that are kept apart, twice as many for each further input; more are gathered in as
+    many cells [-]"""
+    loss: str = "squares"
+    """squares, or huber: rows far from the others pull no more than the others do"""
     hysteresis_nonnegative: bool = True
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
@@ -69,12 +81,17 @@ class IdentifyOptions:
         if self.inputs != "auto":
             names = self.inputs.split(",") if isinstance(self.inputs, str) else self.inputs
             object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
-            if "position" not in self.inputs or not set(self.inputs) <= set(LADDER_INPUTS):
+            if "position" not in self.inputs or "" in self.inputs or len(set(self.inputs)) < len(self.inputs):
                 raise InputError(
-                    f'inputs is {",".join(self.inputs)!r}; use "auto", "position" or "position,hysteresis"'
+                    f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
+                    "depends on: hysteresis, velocity, columns"
                 )
         if self.criterion not in CRITERIA:
             raise InputError(f"criterion is {self.criterion!r}; it must be one of {', '.join(CRITERIA)}")
+        if self.selection not in SELECTIONS:
+            raise InputError(f"selection is {self.selection!r}; it must be one of {', '.join(SELECTIONS)}")
+        if self.loss not in LOSSES:
+            raise InputError(f"loss is {self.loss!r}; it must be one of {', '.join(LOSSES)}")
         for name, least in _WHOLE_NUMBERS.items():
             value = getattr(self, name)
             if not isinstance(value, int) or isinstance(value, bool) or value < least:

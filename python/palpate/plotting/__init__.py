@@ -3,7 +3,17 @@
 
 from .measured_and_modelled import draw_measured_and_modelled
 from .real_against_rendered import draw_real_against_rendered
+from .speed import RenderedForce, WorkPrecision, draw_rendered_force, draw_work_precision
 from .structures import draw_structures
 from .two_models import draw_two_models
 
-__all__ = ["draw_measured_and_modelled", "draw_real_against_rendered", "draw_structures", "draw_two_models"]
+__all__ = [
+    "RenderedForce",
+    "WorkPrecision",
+    "draw_measured_and_modelled",
+    "draw_real_against_rendered",
+    "draw_rendered_force",
+    "draw_structures",
+    "draw_two_models",
+    "draw_work_precision",
+]

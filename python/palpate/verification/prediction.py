@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._typing import Float1D, Float2D
+from .._typing import Float1D
 from ..errors import InputError
+from ..identification.inputs import input_columns
 from ..model import Model
 from ..recording import Recording
 
@@ -50,8 +51,13 @@ def predict(model: Model, recording: Recording) -> Prediction:
     rows = np.ones(len(recording), dtype=bool)
     notes: tuple[str, ...] = ()
     if model.dimension > 1:
-        X = _inputs(model, recording)
+        X, rows = input_columns(recording, model.inputs)
+        if not rows.any():
+            raise InputError("no row of the recording has the velocity that the model needs")
+        X = X[rows]
         outside = ((model.lower > X) | (model.upper < X)).any(axis=1)
+        if left_out := int(np.count_nonzero(~rows)):
+            notes = (f"{left_out} rows at the ends and at gaps of time have no velocity and are left out",)
         return Prediction(rows, model.predict(X), int(np.count_nonzero(outside)), notes)
     if not model.hysteretic:
         force = model.force(recording.position)
@@ -81,15 +87,3 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
         if ours != theirs and _UNSTATED not in (ours, theirs):
             hint = "; give --torque-constant-Nm-per-A for the one in A" if "A" in (ours, theirs) else ""
             raise InputError(f"the model's {role} is in {ours}, the recording's in {theirs}{hint}")
-
-
-def _inputs(model: Model, recording: Recording) -> Float2D:
-    columns = []
-    for name in model.inputs:
-        if name == "position":
-            columns.append(recording.position)
-        elif name in recording.input_names:
-            columns.append(recording.inputs[:, recording.input_names.index(name)])
-        else:
-            raise InputError(f"the model needs the input {name}; read the recording with inputs=({name!r},)")
-    return np.column_stack(columns)

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "palpate/readable.hpp"
+
 namespace palpate {
 
 /// What is known of a haptic device. The default is a direct-drive knob with a 16-bit encoder.
@@ -24,6 +26,8 @@ struct DeviceProfile {
 
     /// What a certificate has to hold for.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
+
+    [[nodiscard]] bool operator==(const DeviceProfile&) const = default;
 };
 
 inline constexpr int longest_delay_samples = 16;
@@ -32,8 +36,8 @@ inline constexpr int longest_delay_samples = 16;
 inline void validate(const DeviceProfile& profile) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument("device profile: " + std::string(field) + " is " +
-                                        std::to_string(value) + ", must be " + right);
+            throw std::invalid_argument("device profile: " + std::string(field) + " is " + readable(value) +
+                                        ", must be " + right);
         }
     };
     const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };

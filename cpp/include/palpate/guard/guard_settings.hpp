@@ -10,6 +10,7 @@
 
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/reading_guard.hpp"
+#include "palpate/readable.hpp"
 
 namespace palpate {
 
@@ -36,8 +37,7 @@ inline constexpr double slowest_buzz_hz = 20.0;
 inline void validate(const GuardSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
-                                        right);
+            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
         }
     };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };

@@ -46,11 +46,12 @@ struct ForceRamp {
     std::uint64_t ticks = 0;
     std::uint64_t done = 0;
 
-    [[nodiscard]] double next() noexcept {
+    [[nodiscard]] Status apply(double& force) noexcept {
         if (done >= ticks) {
-            return 1.0;
+            return Status::Ok;
         }
-        return static_cast<double>(done++) / static_cast<double>(ticks);
+        force *= static_cast<double>(done++) / static_cast<double>(ticks);
+        return Status::Ramp;
     }
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
@@ -59,7 +61,7 @@ struct Scheme {
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
-        detail::require(holds, std::string(field) + " is " + std::to_string(value) + ", must be " + right);
+        detail::require(holds, std::string(field) + " is " + readable(value) + ", must be " + right);
     };
     const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
@@ -83,9 +85,32 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
             "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
         const double steepest = std::max(model.slope_bounds().upper, 0.0);
         detail::require(steepest <= 0.9 * scheme.coupling.stiffness,
-                        "coupling_stiffness is " + std::to_string(scheme.coupling.stiffness) +
-                            ", must be at least " + std::to_string(steepest / 0.9) +
-                            " to compensate a model whose steepest slope is " + std::to_string(steepest));
+                        "coupling_stiffness is " + readable(scheme.coupling.stiffness) +
+                            ", must be at least " + readable(steepest / 0.9) +
+                            " to compensate a model whose steepest slope is " + readable(steepest));
+    }
+}
+
+/// Largest slope that the structure meets, never below 0. While a hysteresis model sticks, h / r is part of it;
+/// a compensated model has had the coupling's spring taken out.
+[[nodiscard]] inline double steepest_slope(const Scheme& scheme, const ForceModel& model) {
+    const std::optional<double> radius =
+        scheme.play_radius > 0.0 ? std::optional{scheme.play_radius} : model.play_radius();
+    const double steepest = std::max(model.slope_bounds(radius).upper, 0.0);
+    const double stiffness = scheme.coupling.stiffness;
+    return scheme.compensated ? stiffness * steepest / (stiffness - steepest) : steepest;
+}
+
+/// The same, and refuses what is sure to diverge at this period.
+inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
+    validate(scheme, model);
+    if (scheme.structure == StructureKind::Explicit) {
+        const double steepest = steepest_slope(scheme, model);
+        const double limit = explicit_slope_limit(scheme.inertia, scheme.coupling, period_s);
+        detail::require(steepest < limit,
+                        "structure is explicit, which diverges: the model's steepest slope is " +
+                            readable(steepest) + ", must be below " + readable(limit) +
+                            " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
     }
 }
 

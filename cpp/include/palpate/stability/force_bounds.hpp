@@ -179,10 +179,12 @@ struct SlopeReading {
                 bounds.loss.lower = std::min(bounds.loss.lower, 0.0);
             }
             const double stick = std::max(0.0, loss.at_edge.value) / radius;
-            bounds.slope = {std::min(bounds.slope.lower, slopes.lower - loss_slope),
-                            std::max(bounds.slope.upper, slopes.upper + loss_slope + stick)};
-            bounds.sliding = std::max(bounds.sliding, slopes.largest() + loss_slope);
-            bounds.steepest = std::max(bounds.steepest, slopes.largest() + loss_slope + stick);
+            const double rounding = 1e-12 * (slopes.largest() + loss_slope + stick);
+            const double slide = slopes.largest() + loss_slope + rounding;
+            bounds.slope = {std::min(bounds.slope.lower, slopes.lower - loss_slope - rounding),
+                            std::max(bounds.slope.upper, slopes.upper + loss_slope + stick + rounding)};
+            bounds.sliding = std::max(bounds.sliding, slide);
+            bounds.steepest = std::max(bounds.steepest, slide + stick);
         }
     }
     bounds.loss_per_play = std::max(0.0, bounds.loss.upper) / radius;
