@@ -33,7 +33,8 @@ py::dict failure_map_in_python(const std::string& name, int points) {
                               "measured"_a = moved(std::move(line.measured)),
                               "theory"_a = moved(std::move(line.theory))));
     }
-    return py::dict("name"_a = map.name, "along"_a = map.along, "limit"_a = map.limit, "lines"_a = lines);
+    return py::dict("name"_a = map.name, "along"_a = map.along, "limit"_a = map.limit, "lines"_a = lines,
+                    "searched"_a = map.searched, "linear"_a = map.linear);
 }
 
 }  // namespace
@@ -48,7 +49,9 @@ void bind_failure(py::module_& module) {
         "failure_map", &failure_map_in_python, "name"_a, "points"_a = 8,
         "Where a method fails: boundaries measured in simulation, and what theory says of them.\n\n"
         "By name: along and limit (what the axes hold, with units) and lines, each with its name and the\n"
-        "arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known).");
+        "arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known);\n"
+        "searched (up to how many times the theory, where none failed) and linear (the limit spans no "
+        "decades).");
 }
 
 }  // namespace palpate::bindings

@@ -124,13 +124,15 @@ inline constexpr double coupling_time = 0.2e-3;
         }
         return false;
     };
+    map.searched = 10.0;
     const auto add = [&](const char* name, double damping, auto build) {
         map.lines.push_back(failure_line(
             name, logarithmic(10.0, 1000.0, points),
             [&](double stiffness) {
                 return stiffness + (coupling_time * stiffness + 2.0 * damping) / period;
             },
-            [&](double stiffness, double falling) { return gives(build, stiffness, falling); }));
+            [&](double stiffness, double falling) { return gives(build, stiffness, falling); },
+            map.searched));
     };
     const LoadLineSolver solver{.longest_step = 0.1 * width};
     add("massless", 0.0, [&](const auto& object, VirtualCoupling coupling) {

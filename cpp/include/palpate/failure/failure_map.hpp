@@ -24,6 +24,8 @@ struct FailureMap {
     std::string along;  ///< the quantity on the horizontal axis, with its unit
     std::string limit;  ///< what is limited, with its unit
     std::vector<FailureLine> lines;
+    double searched = 0.0;  ///< where nothing failed: up to how many times the theory it was looked for
+    bool linear = false;    ///< the limit spans no decades, and may be negative
 };
 
 /// Values from `first` to `last`, evenly spaced on a logarithmic axis.

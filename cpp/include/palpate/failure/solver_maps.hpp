@@ -81,6 +81,7 @@ namespace detail {
     constexpr VirtualCoupling coupling;
     const double beta = coupling.damping / period;
     FailureMap map{"pole", "stiffness K [N*m/rad]", "left of a swing after a tick", {}};
+    map.linear = true;
     const auto left = [](auto structure) {
         structure.reset(0.0);
         (void)structure.step(0.01);
