@@ -38,8 +38,8 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
     const Bench bench = bench_for(model, position_unit == "rad", period_s);
     const GuardSettings guards = bench.guards();
     const RecordUnits units{position_unit, force_unit == "N*m" ? "Nm" : force_unit};
-    const Metadata metadata = flight_metadata(std::string("palpate ") + PALPATE_VERSION, model_name, scheme,
-                                              bench, guards, rate_hz);
+    const Metadata metadata = flight_metadata(std::string("palpate ") + PALPATE_VERSION,
+                                              simulated_metadata(bench), model_name, scheme, guards, rate_hz);
     validate(scheme, model, period_s);
     SimulatedDevice device{bench.device, bench.hand, simulated_substeps(period_s)};
     Outlets outlets;
@@ -72,7 +72,8 @@ void bind_session(py::module_& module) {
     const LoopSettings loop;
     const RealTimeOptions real_time;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
-    py::class_<LoopSettings>(module, "LoopSettings", "When a rendering ticks, and when it ends: the defaults.")
+    py::class_<LoopSettings>(module, "LoopSettings",
+                             "When a rendering ticks, and when it ends: the defaults.")
         .def(py::init<>())
         .def_readonly("rate_hz", &LoopSettings::rate_hz)
         .def_readonly("duration_s", &LoopSettings::duration_s)

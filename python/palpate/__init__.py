@@ -13,18 +13,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._core import DeviceProfile, Hand, Scheme, __version__
+    from ._core import Hand, Scheme, __version__
     from .errors import InputError
     from .identification import IdentifyOptions, frame_bounds
     from .identification.identify import identify
     from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
-    from .planning import Plan, simulate
+    from .planning import DeviceProfile, Plan, simulate
+    from .planning.plan import plan
     from .recording import Recording, read_recording
     from .verification import Verification, verify
 
 _HOME = {
-    "DeviceProfile": "_core",
+    "DeviceProfile": "planning",
     "Hand": "_core",
     "Scheme": "_core",
     "__version__": "_core",
@@ -35,6 +36,7 @@ _HOME = {
     "Model": "model",
     "load_model": "model",
     "Plan": "planning",
+    "plan": "planning.plan",
     "simulate": "planning",
     "Recording": "recording",
     "read_recording": "recording",
@@ -59,6 +61,7 @@ __all__ = [
     "frame_bounds",
     "identify",
     "load_model",
+    "plan",
     "read_recording",
     "simulate",
     "verify",

@@ -30,7 +30,7 @@ INCLUDES = {
     "rendering": {"solver", "dynamics", "model"},
     "stability": {"rendering", "solver", "dynamics", "model", "device"},
     "guard": {"rendering", "solver", "dynamics", "model"},
-    "device": set(),
+    "device": {"realtime"},
     "realtime": set(),
     "io": {"model", "device", "realtime", "rendering", "stability"},
     "bench": {"simulation", "rendering", "solver", "dynamics", "model", "device", "guard"},
@@ -58,6 +58,8 @@ INCLUDES = {
 
 # Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
 LEAF_HEADERS = {
+    "device/detail/usb_connection.hpp",
+    "device/detail/usb_transfers.hpp",
     "device/inverse3.hpp",
     "device/usb.hpp",
     "io/json_field.hpp",
@@ -68,7 +70,8 @@ LEAF_HEADERS = {
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
 # and latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
-    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"},
+    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
+    | {"linux/futex.h", "sys/syscall.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 

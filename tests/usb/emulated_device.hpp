@@ -211,6 +211,7 @@ class EmulatedDevice {
     // ----------------------------------------------------------------------------- what a test wants to know
 
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
+    [[nodiscard]] std::uint16_t sequence() const { return sequence_; }
     [[nodiscard]] std::uint64_t outs() const { return outs_; }
     [[nodiscard]] std::uint64_t bad_outs() const { return bad_outs_; }
     [[nodiscard]] bool is_enabled() const { return enabled_; }
@@ -362,7 +363,6 @@ class EmulatedDevice {
             return;
         }
         bad_packet_ = tripped_ = false;
-        previous_out_sequence_ = out_sequence_;
         out_sequence_ = get<std::uint16_t>(packet, 2);
         ttl_ms_ = get<std::uint16_t>(packet, 10);
         out_us_ = clock_us_;
@@ -400,7 +400,7 @@ class EmulatedDevice {
             static_cast<std::int32_t>(measures_speed && !frozen ? std::lround(plant_.velocity * counts) : 0));
         put(packet_, applied_uNm());
         put(packet_, status());
-        put(packet_, used(FaultKind::OldEcho) ? previous_out_sequence_ : out_sequence_);
+        put(packet_, static_cast<std::uint16_t>(out_sequence_ - (used(FaultKind::OldEcho) ? 3 : 0)));
         put(packet_, static_cast<std::uint16_t>(
                          out_seen_at_all_ ? std::min<std::uint32_t>(clock_us_ - out_us_, 0xFFFF) : 0xFFFF));
         put(packet_, std::uint16_t{253});
@@ -428,7 +428,6 @@ class EmulatedDevice {
     std::uint16_t sequence_ = 0;
     std::uint32_t clock_us_ = 0;
     std::uint16_t out_sequence_ = 0;
-    std::uint16_t previous_out_sequence_ = 0;
     std::uint32_t out_us_ = 0;
     bool out_seen_ = false;         ///< the script's clock runs
     bool out_seen_at_all_ = false;  ///< since the device started

@@ -32,6 +32,7 @@ inline constexpr const char* options_text =
     "  --rate-hz RATE         frames a second [1000]\n"
     "  --patience-ms MS       lock-step waits so long for a host that stopped writing [250]\n"
     "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
+    "  --no-device            nothing is plugged in\n"
     "  --says-rate-hz RATE    what GET_INFO says [1000]\n"
     "  --no-transducer        capabilities without bit 0\n"
     "  --no-velocity          capabilities without bit 1\n"
@@ -50,6 +51,7 @@ inline constexpr const char* options_text =
     Settings settings;
     Identity common;
     std::vector<std::string> serials;
+    bool none = false;
     for (int k = 1; k < count; ++k) {
         const std::string word = words[k];
         const auto value = [&]() -> std::string {
@@ -76,6 +78,8 @@ inline constexpr const char* options_text =
             common.capabilities &= ~1U;
         } else if (word == "--no-velocity") {
             common.capabilities &= ~2U;
+        } else if (word == "--no-device") {
+            none = true;
         } else if (word == "--somebody-elses") {
             common.magic = 'X';
         } else if (word == "--flipped") {
@@ -98,7 +102,7 @@ inline constexpr const char* options_text =
             throw std::invalid_argument("no option is called '" + word + "'");
         }
     }
-    settings.devices.assign(1, common);
+    settings.devices.assign(none ? 0 : 1, common);
     if (!serials.empty()) {
         settings.devices.clear();
         for (const std::string& serial : serials) {
@@ -126,6 +130,7 @@ inline constexpr const char* options_text =
             return std::string("\"") + name + "\": " + value;
         };
         return "{" + field("frames", std::to_string(device.frames())) + ", " +
+               field("sequence", std::to_string(device.sequence())) + ", " +
                field("outs", std::to_string(device.outs())) + ", " +
                field("bad_outs", std::to_string(device.bad_outs())) + ", " +
                field("enabled", device.is_enabled() ? "true" : "false") + ", " +

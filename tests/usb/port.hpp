@@ -189,6 +189,7 @@ class FrameClock {
           patience_{patience} {}
 
     void host_wrote() { in_conversation_ = true; }
+    void host_left() { in_conversation_ = false; }
 
     /// Whether a frame begins now; else `until` is when to look again at the latest.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {

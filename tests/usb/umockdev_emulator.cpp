@@ -89,16 +89,31 @@ class Emulation {
         auto place = std::make_unique<Place>(
             Place{FrameClock{settings_.lock_step, settings_.rate_hz, settings_.patience}, nullptr});
         place->node = std::make_unique<UsbfsNode>(testbed_, EmulatedDevice{identity, settings_.plant, script},
-                                                  next_address_++, mutex_, [this] { begin_frames(); });
+                                                  next_address_++, mutex_, [this] {
+                                                      if (begin_frames() < wakes_at_) {
+                                                          changed_.notify_all();
+                                                      }
+                                                  });
         place->node->set_clock(place->clock);
         if (settings_.denied) {
-            ::chmod(place->node->node_file().c_str(), 0);
-            gchar* root = umockdev_testbed_get_root_dir(testbed_);
-            ::chmod(root, 0755);
-            g_free(root);
+            deny(place->node->node_file());
         }
         const std::lock_guard locked{mutex_};
         places_.push_back(std::move(place));
+    }
+
+    /// Everything is everybody's, the node nobody's.
+    void deny(const std::string& node) {
+        namespace fs = std::filesystem;
+        gchar* root = umockdev_testbed_get_root_dir(testbed_);
+        fs::permissions(root, fs::perms::all);
+        for (const auto& entry : fs::recursive_directory_iterator(root)) {
+            if (!entry.is_symlink()) {
+                fs::permissions(entry.path(), fs::perms::all);
+            }
+        }
+        g_free(root);
+        fs::permissions(node, fs::perms::none);
     }
 
     [[noreturn]] void become_the_command(const std::string& orders) {
@@ -148,7 +163,7 @@ class Emulation {
         ::prctl(PR_SET_TIMERSLACK, 1000);
         std::unique_lock locked{mutex_};
         while (!over_) {
-            const auto next = begin_frames();
+            const FrameClock::Clock::time_point next = begin_frames();
             for (const std::unique_ptr<Place>& place : places_) {
                 if (place->node->port().device().is_unplugged() &&
                     !std::exchange(place->told_removal, true)) {
@@ -158,7 +173,9 @@ class Emulation {
                     break;
                 }
             }
+            wakes_at_ = next;
             changed_.wait_until(locked, next);
+            wakes_at_ = {};
         }
     }
 
@@ -213,6 +230,7 @@ class Emulation {
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::unique_ptr<Place>> places_;
+    FrameClock::Clock::time_point wakes_at_{};  ///< of the frames' own thread
     int next_address_ = 2;
     int orders_ = -1;
     bool over_ = false;

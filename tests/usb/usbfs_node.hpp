@@ -225,6 +225,7 @@ class UsbfsNode {
                     return -EINVAL;
                 }
                 claimed_by_ = nullptr;
+                clock_->host_left();
                 return 0;
             case USBDEVFS_GETDRIVER:
             case USBDEVFS_IOCTL:

@@ -25,6 +25,8 @@ struct Tick {
 template <Device D, Structure S>
 class Controller {
   public:
+    static constexpr bool paced_by_device = paces_host<D>;
+
     Controller(D& device, S structure, Guards guards)
         : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
 

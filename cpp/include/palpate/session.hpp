@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -86,7 +87,7 @@ template <class Control, class Watch>
     std::thread loop{[&] {
         report.refused = become_real_time(settings.real_time, memory, cores);
         asked_for_privileges.store(true, std::memory_order_release);
-        Periodic clock{period};
+        std::conditional_t<Control::paced_by_device, PacedByDevice, Periodic> clock{period};
         detail::LoopSink<Recorder> sink{recorder, last};
         run_loop(controller, settings.loop, clock, asked, sink, progress, *loop_report);
         over.store(true, std::memory_order_release);

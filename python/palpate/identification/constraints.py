@@ -103,7 +103,7 @@ def moved_to_bounds(
         low = max([bound.limit for bound in bounds if bound.of_slope and bound.sign > 0], default=-np.inf)
         high = min([bound.limit for bound in bounds if bound.of_slope and bound.sign < 0], default=np.inf)
         mix = np.array([[1.0, 1.0], [1.0, -1.0]])[: len(readings), : len(readings)]
-        strokes = [_slope_limited(grid, stroke, low, high) for stroke in mix @ readings]
+        strokes = [slope_limited(grid, stroke, low, high) for stroke in mix @ readings]
         readings = np.linalg.solve(mix, np.array(strokes))
     shift = [np.interp(rows.positions[:, 0], grid, change) for change in readings - before]
     moved = rows.force + shift[0] + (shift[1] * rows.side if rows.side is not None else 0.0)
@@ -115,7 +115,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
 
     The free solution itself is returned if it keeps them.
     """
-    margin = MARGIN * problem.rmse(free)
+    margin = MARGIN * problem.resolved_rmse(free)
     rows: list[Float2D] = []
     limits: list[Float1D] = []
     current = free
@@ -223,7 +223,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
     return np.asarray(start + step / norm).reshape(free.coefficients.shape)
 
 
-def _slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
+def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
     """The nearest force (k,) with slope within [low, high]: isotonic regressions in turn (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)

@@ -16,15 +16,17 @@ namespace palpate {
 
 /// How well a stream of packets goes, counted since it was opened.
 struct StreamHealth {
-    std::uint64_t packets = 0;           ///< that were understood
-    std::uint64_t lost = 0;              ///< samples of the device that nobody saw
-    std::uint64_t repeated = 0;          ///< samples that came again, or from before
-    std::uint64_t malformed = 0;         ///< of the wrong size, magic or version
-    std::uint64_t late_echoes = 0;       ///< of an OUT packet from before the last one echoed
-    std::uint64_t watchdog_trips = 0;    ///< times that the device's watchdog ended a torque
-    std::uint64_t refused_commands = 0;  ///< packets that told of an OUT packet that the device did not understand
-    DurationHistogram round_trip;        ///< from an OUT packet's way out to its echo's arrival, host clock [ns]
-    DurationHistogram delay;             ///< from a sample to the force computed from it, device clock [ns]
+    std::uint64_t packets = 0;         ///< that were understood
+    std::uint64_t lost = 0;            ///< samples of the device that nobody saw
+    std::uint64_t repeated = 0;        ///< samples that came again, or from before
+    std::uint64_t malformed = 0;       ///< of the wrong size, magic or version
+    std::uint64_t late_echoes = 0;     ///< of an OUT packet from before the last one echoed
+    std::uint64_t watchdog_trips = 0;  ///< times that the device's watchdog ended a torque
+    std::uint64_t refused_commands =
+        0;  ///< packets that told of an OUT packet that the device did not understand
+    std::uint64_t late_commands = 0;  ///< that took longer to the device than they may
+    DurationHistogram round_trip;     ///< from an OUT packet's way out to its echo's arrival, host clock [ns]
+    DurationHistogram delay;          ///< from a sample to the force computed from it, device clock [ns]
 };
 
 /// Makes readings of the packets of one device: counters that wrap become ones that do not, counts become SI, status
@@ -35,7 +37,8 @@ struct StreamHealth {
 class PacketStream {
   public:
     PacketStream() = default;
-    explicit PacketStream(const wire::Info& info) noexcept : info_{info} {}
+    explicit PacketStream(const wire::Info& info, Nanoseconds longest_delay) noexcept
+        : info_{info}, longest_delay_{longest_delay} {}
 
     /// A packet that arrived at `now`, of the host's clock. False: not a packet of this protocol.
     [[nodiscard]] bool take(std::span<const std::uint8_t> bytes, Nanoseconds now) noexcept {
@@ -48,8 +51,9 @@ class PacketStream {
         const std::int64_t step = sequence_.follow(packet.sequence);
         clock_us_.follow(packet.clock_us);
         ++health_.packets;
-        health_.lost += static_cast<std::uint64_t>(std::max<std::int64_t>(step - 1, 0));
+        health_.lost += follows_ ? static_cast<std::uint64_t>(std::max<std::int64_t>(step - 1, 0)) : 0;
         health_.repeated += !first && step <= 0 ? 1 : 0;
+        is_late_ = false;
         if (first) {
             sent_ = echoed_ = packet.out_sequence;
         } else {
@@ -57,8 +61,13 @@ class PacketStream {
         }
         read(packet, first, step);
         status_bits_ = packet.status;
+        follows_ = true;
         return true;
     }
+
+    /// Packets were thrown away: the next one does not follow the last, and what is sent before it is no answer.
+    void pause() noexcept { follows_ = false; }
+    [[nodiscard]] bool follows() const noexcept { return follows_; }
 
     /// The next command on its way out at `now`.
     [[nodiscard]] wire::OutPacket next_command(double force, std::uint16_t time_to_live_ms,
@@ -69,7 +78,7 @@ class PacketStream {
     /// It went out.
     void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
         sent_ = command.sequence;
-        flights_[sent_ % flights_.size()] = {sent_, now, clock_us_.value()};
+        flights_[sent_ % flights_.size()] = {sent_, now, follows_ ? clock_us_.value() : Flight{}.sample_us};
     }
 
     [[nodiscard]] const Reading& reading() const noexcept { return reading_; }
@@ -81,7 +90,8 @@ class PacketStream {
     struct Flight {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
-        std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
+        std::int64_t sample_us =
+            std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
     };
 
     /// Commands are numbered on from the echo in the first packet, so that an echo is of this session or none.
@@ -98,12 +108,16 @@ class PacketStream {
         echoed_ = packet.out_sequence;
         is_acknowledged_ = true;
         const Flight& flight = flights_[echoed_ % flights_.size()];
-        if (flight.sequence != echoed_ || flight.sample_us == Flight{}.sample_us) {
+        if (flight.sequence != echoed_) {
             return;
         }
         health_.round_trip.add(now - flight.sent);
-        if (packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
-            health_.delay.add(1000 * (clock_us_.value() - packet.out_age_us - flight.sample_us));
+        if (flight.sample_us != Flight{}.sample_us &&
+            packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
+            const Nanoseconds delay = 1000 * (clock_us_.value() - packet.out_age_us - flight.sample_us);
+            health_.delay.add(delay);
+            is_late_ = delay > longest_delay_;
+            health_.late_commands += is_late_ ? 1 : 0;
         }
     }
 
@@ -143,7 +157,7 @@ class PacketStream {
         if ((bits & wire::fault_bits) != 0 || disabled) {
             return Status::Fault;
         }
-        if (tripped) {
+        if (tripped || is_late_) {
             return Status::Timeout;
         }
         if (refused) {
@@ -153,12 +167,15 @@ class PacketStream {
     }
 
     wire::Info info_;
+    Nanoseconds longest_delay_ = std::numeric_limits<Nanoseconds>::max();
     wire::Unwrapped<std::uint16_t> sequence_;
     wire::Unwrapped<std::uint32_t> clock_us_;
     std::uint16_t sent_ = 0;
     std::uint16_t echoed_ = 0;
     bool is_acknowledged_ = false;
+    bool is_late_ = false;  ///< the command that the last packet echoed
     bool was_enabled_ = false;
+    bool follows_ = false;  ///< the next packet, the last one that was taken
     std::uint16_t status_bits_ = 0;
     std::array<Flight, 64> flights_{};
     Reading reading_;

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -22,6 +23,7 @@ struct UsbOptions {
     std::string serial;                     ///< empty: the only one there is
     std::chrono::microseconds wait{5'000};  ///< how long an exchange waits for the device's next packet
     std::uint16_t time_to_live_ms = 10;     ///< how long a torque outlives its packet
+    double longest_delay_s = 0.0;           ///< from a sample to its force; 0 = any [s]
 };
 
 /// What happened on the wire, packets and transfers.
@@ -38,10 +40,11 @@ struct UsbHealth {
 ///
 /// The device paces the host: an exchange sends its command at once and waits for the next packet, in the order in
 /// which they were sampled, but no longer than `UsbOptions::wait`. A host that falls behind by a packet or two
-/// catches up without losing one; packets that waited longer than that are discarded. In the exchange nothing is
+/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. In the exchange nothing is
 /// allocated or thrown; libusb takes its own locks, and the wait is a futex.
 ///
-/// Reading::status: Timeout when no packet came, or when the device's watchdog had ended the torque; Fault when the
+/// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
+/// to the device than `UsbOptions::longest_delay_s`; Fault when the
 /// device reports one, was disabled or is gone, and then for good; Lost when it did not understand a command; Limited
 /// when it clipped one. Lost and repeated samples speak through Reading::sequence.
 class UsbDevice {
@@ -76,7 +79,13 @@ class UsbDevice {
         }
         detail::UsbTransfers& transfers = *open_->transfers;
         discard_old();
-        send(command.force);
+        // A host that is behind takes what waits, and sends what follows from it at once afterwards; but not twice.
+        open_->skipped_last = transfers.arrived() > 0 && !open_->skipped_last;
+        if (open_->skipped_last) {
+            ++open_->skipped_commands;
+        } else {
+            send(command.force);
+        }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
         while (transfers.wait_for_arrival(deadline)) {
             detail::UsbArrival arrival;
@@ -119,7 +128,8 @@ class UsbDevice {
         if (open_ == nullptr) {
             return last_health_;
         }
-        UsbHealth health{open_->stream.health(), open_->skipped_commands, open_->timeouts, open_->discarded, 0, 0};
+        UsbHealth health{
+            open_->stream.health(), open_->skipped_commands, open_->timeouts, open_->discarded, 0, 0};
         if (open_->transfers != nullptr) {
             health.stalls = open_->transfers->stalls();
             health.bus_errors = open_->transfers->bus_errors();
@@ -150,6 +160,8 @@ class UsbDevice {
         detail::UsbConnection connection;
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
+        Nanoseconds moment = 0;  ///< a quarter of a frame
+        bool skipped_last = false;
         std::uint64_t skipped_commands = 0;
         std::uint64_t timeouts = 0;
         std::uint64_t discarded = 0;
@@ -158,7 +170,8 @@ class UsbDevice {
     /// Empty, or what the device does not do, and what helps.
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
-        open_->stream = PacketStream{connection.info()};
+        open_->stream = PacketStream{connection.info(), longest_delay()};
+        open_->moment = nanoseconds_a_second / (4 * connection.info().rate_hz);
         if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
             return "cannot be disabled: " + detail::usb_reason(code);
         }
@@ -176,7 +189,7 @@ class UsbDevice {
             return "reports " + fault_text(open_->stream.status_bits()) +
                    "; when its cause is gone, run 'palpate devices --clear', then try again";
         }
-        if (const int code = connection.request(wire::Request::Enable, 1); code != 0) {
+        if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
             return "cannot be enabled: " + detail::usb_reason(code);
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {
@@ -184,7 +197,13 @@ class UsbDevice {
                 return "does not let itself be enabled; run 'palpate devices --clear', then try again";
             }
         }
+        open_->stream.pause();
         return "";
+    }
+
+    [[nodiscard]] Nanoseconds longest_delay() const noexcept {
+        return options_.longest_delay_s > 0.0 ? static_cast<Nanoseconds>(1e9 * options_.longest_delay_s)
+                                              : std::numeric_limits<Nanoseconds>::max();
     }
 
     [[nodiscard]] static std::string fault_text(std::uint16_t bits) {
@@ -205,17 +224,21 @@ class UsbDevice {
 
     void discard_old() noexcept {
         detail::UsbArrival old;
-        for (std::size_t waiting = open_->transfers->arrived(); waiting > most_waiting; waiting = 0) {
-            while (open_->transfers->take(old)) {
-                ++open_->discarded;
-            }
+        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
+            return;
         }
+        while (open_->transfers->take(old)) {
+            ++open_->discarded;
+        }
+        open_->stream.pause();
     }
 
+    /// The last command's end and the packet that wakes a host come in the same frame, in any order: a moment of
+    /// waiting keeps every frame a command. Whatever takes longer than that is skipped.
     void send(double force) noexcept {
+        (void)open_->transfers->wait_for_write(monotonic_now() + open_->moment);
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
-        // Told before it goes out: its echo may be here before the call returns.
         const int code = open_->transfers->write(packet);
         if (code == 0) {
             open_->stream.sent(packet, now);
@@ -227,7 +250,7 @@ class UsbDevice {
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
         send(0.0);
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
-        (void)open_->connection.request(wire::Request::Enable, 0);  // where it fails the watchdog is left
+        (void)open_->transfers->request(wire::Request::Enable, 0);  // where it fails the watchdog is left
     }
 
     /// The last reading again, of no use but for its position.

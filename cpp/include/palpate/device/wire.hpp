@@ -143,7 +143,8 @@ class Putting {
 };
 
 /// What every packet begins with.
-[[nodiscard]] inline Decoded begins(std::span<const std::uint8_t> bytes, std::size_t size, char magic) noexcept {
+[[nodiscard]] inline Decoded begins(std::span<const std::uint8_t> bytes, std::size_t size,
+                                    char magic) noexcept {
     if (bytes.size() != size) {
         return Decoded::WrongSize;
     }
@@ -176,8 +177,8 @@ class Putting {
     detail::Taking{bytes.subspan(2)}(info.firmware, info.counts_per_rev, info.max_torque_uNm, info.rate_hz,
                                      info.watchdog_ms, info.capabilities, in_bytes, out_bytes,
                                      degrees_of_freedom, reserved, info.uid);
-    const bool fits = in_bytes == in_size && out_bytes == out_size && degrees_of_freedom == 1 && reserved == 0 &&
-                      (info.capabilities & ~(has_transducer | measures_velocity)) == 0;
+    const bool fits = in_bytes == in_size && out_bytes == out_size && degrees_of_freedom == 1 &&
+                      reserved == 0 && (info.capabilities & ~(has_transducer | measures_velocity)) == 0;
     const bool possible = fits && info.counts_per_rev > 0 && info.max_torque_uNm > 0 && info.rate_hz > 0;
     return possible ? Decoded::Ok : Decoded::WrongField;
 }

@@ -3,6 +3,7 @@
 
 #include <libusb-1.0/libusb.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -29,7 +30,8 @@ struct UsbName {
     [[nodiscard]] std::string text() const {
         const std::string place =
             "(bus " + std::to_string(bus) + ", address " + std::to_string(address) + ")";
-        return (product.empty() ? "USB device" : product) + (serial.empty() ? " " : " " + serial + " ") + place;
+        return (product.empty() ? "USB device" : product) + (serial.empty() ? " " : " " + serial + " ") +
+               place;
     }
 };
 
@@ -39,7 +41,8 @@ namespace detail {
 [[nodiscard]] inline std::string usb_reason(int code) {
     switch (code) {
         case LIBUSB_ERROR_ACCESS:
-            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in again";
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
+                   "again";
         case LIBUSB_ERROR_BUSY:
             return "another program uses it; end that program, then try again";
         case LIBUSB_ERROR_NO_DEVICE:
@@ -50,7 +53,8 @@ namespace detail {
         case LIBUSB_ERROR_PIPE:
             return "it refused a request; its firmware may be of another version";
         case LIBUSB_ERROR_NO_MEM:
-            return "the system has no memory left for USB; see /sys/module/usbcore/parameters/usbfs_memory_mb";
+            return "the system has no memory left for USB; see "
+                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
         case LIBUSB_ERROR_IO:
             return "the transfer failed on the bus; try another cable or port";
         default:
@@ -97,9 +101,9 @@ class UsbConnection {
 
     /// A request without data. 0, or an error of libusb.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) const noexcept {
-        const int moved = libusb_control_transfer(
-            handle_.get(), wire::request_to_device, static_cast<std::uint8_t>(request), value,
-            wire::interface_number, nullptr, 0, request_timeout_ms);
+        const int moved = libusb_control_transfer(handle_.get(), wire::request_to_device,
+                                                  static_cast<std::uint8_t>(request), value,
+                                                  wire::interface_number, nullptr, 0, request_timeout_ms);
         return moved < 0 ? moved : 0;
     }
 
@@ -144,7 +148,8 @@ class UsbConnection {
     [[nodiscard]] static std::string refusal(const std::string& serial, const std::vector<Candidate>& fitting,
                                              const std::vector<std::string>& others,
                                              const std::vector<std::string>& reasons) {
-        const auto listed = [](const std::vector<std::string>& words) {
+        const auto listed = [](std::vector<std::string> words) {
+            std::sort(words.begin(), words.end());
             std::string text;
             for (const std::string& word : words) {
                 text += (text.empty() ? "" : ", ") + word;
@@ -165,15 +170,16 @@ class UsbConnection {
         if (!others.empty()) {
             return "no USB device has the serial number " + serial + "; there is " + listed(others);
         }
-        return "no USB device 1209:0001 of this protocol is plugged in; 'lsusb -d 1209:0001' shows whether the "
+        return "no USB device 1209:0001 of this protocol is plugged in; 'lsusb -d 1209:0001' shows whether "
+               "the "
                "system sees one";
     }
 
     /// By what the system knows without opening it.
     [[nodiscard]] static bool is_ours(libusb_device* device) noexcept {
         libusb_device_descriptor descriptor{};
-        if (libusb_get_device_descriptor(device, &descriptor) != 0 || descriptor.idVendor != wire::vendor_id ||
-            descriptor.idProduct != wire::product_id) {
+        if (libusb_get_device_descriptor(device, &descriptor) != 0 ||
+            descriptor.idVendor != wire::vendor_id || descriptor.idProduct != wire::product_id) {
             return false;
         }
         libusb_config_descriptor* read = nullptr;
@@ -229,9 +235,11 @@ class UsbConnection {
             return refuse("does not say what it is (GET_INFO)", moved);
         }
         wire::Info info;
-        const wire::Decoded decoded = wire::decode(std::span{bytes}.first(static_cast<std::size_t>(moved)), info);
+        const wire::Decoded decoded =
+            wire::decode(std::span{bytes}.first(static_cast<std::size_t>(moved)), info);
         if (decoded != wire::Decoded::Ok) {
-            reasons.push_back(name.text() + " is 1209:0001 but not of this protocol: its answer to GET_INFO " +
+            reasons.push_back(name.text() +
+                              " is 1209:0001 but not of this protocol: its answer to GET_INFO " +
                               wire::decoded_texts[static_cast<std::size_t>(decoded)]);
             return;
         }
@@ -241,7 +249,8 @@ class UsbConnection {
     [[nodiscard]] static std::string text_of(libusb_device_handle* handle, std::uint8_t index) {
         std::array<unsigned char, 256> letters{};
         const int length =
-            index == 0 ? 0 : libusb_get_string_descriptor_ascii(handle, index, letters.data(), letters.size());
+            index == 0 ? 0
+                       : libusb_get_string_descriptor_ascii(handle, index, letters.data(), letters.size());
         return {letters.begin(), letters.begin() + (length > 0 ? length : 0)};
     }
 

@@ -27,11 +27,13 @@ struct UsbArrival {
     std::uint32_t size = 0;
     Nanoseconds time = 0;
 
-    [[nodiscard]] std::span<const std::uint8_t> packet() const noexcept { return std::span{bytes}.first(size); }
+    [[nodiscard]] std::span<const std::uint8_t> packet() const noexcept {
+        return std::span{bytes}.first(size);
+    }
 };
 
-/// The transfers of one stream: two reads always queued, one write at most on its way, one thread for libusb's
-/// events. All memory is taken when it starts.
+/// The transfers of one stream: two reads always queued, one write and one request at most on their way, one thread
+/// for libusb's events. All memory is taken when it starts.
 ///
 /// The owner's thread writes and takes arrivals; the event thread runs the callbacks. What both see is atomic; a
 /// transfer counts as in flight until the last line of its callback.
@@ -44,6 +46,7 @@ class UsbTransfers {
             read.transfer.reset(libusb_alloc_transfer(0));
         }
         write_.reset(libusb_alloc_transfer(0));
+        request_.reset(libusb_alloc_transfer(0));
     }
     ~UsbTransfers() { stop(); }
     UsbTransfers(const UsbTransfers&) = delete;
@@ -51,9 +54,9 @@ class UsbTransfers {
 
     /// 0, or why nothing runs: an error of libusb.
     [[nodiscard]] int start() {
-        if (write_ == nullptr || std::any_of(reads_.begin(), reads_.end(), [](const Read& read) {
-                return read.transfer == nullptr;
-            })) {
+        if (write_ == nullptr || request_ == nullptr ||
+            std::any_of(reads_.begin(), reads_.end(),
+                        [](const Read& read) { return read.transfer == nullptr; })) {
             return LIBUSB_ERROR_NO_MEM;
         }
         runs_.store(true, std::memory_order_release);
@@ -105,8 +108,24 @@ class UsbTransfers {
         }
         return code;
     }
-    [[nodiscard]] bool is_writing() const noexcept {
-        return writes_in_flight_.load(std::memory_order_acquire) != 0;
+
+    /// A request without data, waited for. 0, or an error of libusb. Only one at a time, and by the owner's thread.
+    [[nodiscard]] int request(wire::Request request, std::uint16_t value) noexcept {
+        if (requests_in_flight_.load(std::memory_order_acquire) != 0) {
+            return LIBUSB_ERROR_BUSY;
+        }
+        libusb_fill_control_setup(setup_.data(), wire::request_to_device, static_cast<std::uint8_t>(request),
+                                  value, wire::interface_number, 0);
+        libusb_fill_control_transfer(request_.get(), handle_, setup_.data(), &UsbTransfers::requested, this,
+                                     request_timeout_ms);
+        requests_in_flight_.store(1, std::memory_order_relaxed);
+        if (const int code = libusb_submit_transfer(request_.get()); code != 0) {
+            requests_in_flight_.store(0, std::memory_order_relaxed);
+            return code;
+        }
+        const Nanoseconds last = monotonic_now() + longest_stop;
+        return wait_until_zero(requests_in_flight_, last) ? answer_.load(std::memory_order_relaxed)
+                                                          : static_cast<int>(LIBUSB_ERROR_TIMEOUT);
     }
 
     /// Waits for packets; false: none came before the deadline, or none can come any more.
@@ -124,13 +143,7 @@ class UsbTransfers {
     }
     /// Waits until the write on its way has ended; false: it has not.
     [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
-        while (is_writing()) {
-            const std::uint32_t seen = changes_.events();
-            if (is_writing() && !changes_.wait(seen, deadline)) {
-                return !is_writing();
-            }
-        }
-        return true;
+        return wait_until_zero(writes_in_flight_, deadline);
     }
 
     /// Packets that wait to be taken.
@@ -141,15 +154,20 @@ class UsbTransfers {
     [[nodiscard]] bool is_gone() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
-    [[nodiscard]] std::uint64_t bus_errors() const noexcept { return bus_errors_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint64_t bus_errors() const noexcept {
+        return bus_errors_.load(std::memory_order_relaxed);
+    }
     [[nodiscard]] int in_flight() const noexcept {
-        return reads_in_flight_.load(std::memory_order_acquire) + writes_in_flight_.load(std::memory_order_acquire);
+        return reads_in_flight_.load(std::memory_order_acquire) +
+               writes_in_flight_.load(std::memory_order_acquire) +
+               requests_in_flight_.load(std::memory_order_acquire);
     }
 
   private:
     static constexpr std::size_t most_waiting = 64;
     static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
     static constexpr Nanoseconds cancel_again = nanoseconds_a_second / 10;
+    static constexpr unsigned request_timeout_ms = 500;
     static constexpr int errors_to_give_up = 100;  ///< in a row
 
     struct FreeTransfer {
@@ -168,7 +186,8 @@ class UsbTransfers {
     void handle_events() noexcept {
         // A packet that waits for its turn on the processor is late for the loop: this thread stands above it.
         const sched_param priority{90};
-        (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);  // refused: told by the loop's own
+        (void)pthread_setschedparam(pthread_self(), SCHED_FIFO,
+                                    &priority);  // refused: told by the loop's own
         while (runs_.load(std::memory_order_acquire)) {
             timeval wait{0, 100'000};
             const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
@@ -210,8 +229,8 @@ class UsbTransfers {
     void submit(Read& read) noexcept {
         constexpr unsigned no_timeout = 0;
         libusb_fill_interrupt_transfer(read.transfer.get(), handle_, wire::in_endpoint, read.bytes.data(),
-                                       static_cast<int>(read.bytes.size()), &UsbTransfers::arrived_here, &read,
-                                       no_timeout);
+                                       static_cast<int>(read.bytes.size()), &UsbTransfers::arrived_here,
+                                       &read, no_timeout);
         reads_in_flight_.fetch_add(1, std::memory_order_acq_rel);
         if (const int code = libusb_submit_transfer(read.transfer.get()); code != 0) {
             note(code);
@@ -294,7 +313,40 @@ class UsbTransfers {
         changes_.happened();
     }
 
+    static void LIBUSB_CALL requested(libusb_transfer* transfer) {
+        auto& self = *static_cast<UsbTransfers*>(transfer->user_data);
+        self.answer_.store(error_of(transfer->status), std::memory_order_relaxed);
+        self.requests_in_flight_.store(0, std::memory_order_release);
+        self.changes_.happened();
+    }
+
+    [[nodiscard]] static int error_of(libusb_transfer_status status) noexcept {
+        switch (status) {
+            case LIBUSB_TRANSFER_COMPLETED:
+                return 0;
+            case LIBUSB_TRANSFER_STALL:
+                return LIBUSB_ERROR_PIPE;
+            case LIBUSB_TRANSFER_NO_DEVICE:
+                return LIBUSB_ERROR_NO_DEVICE;
+            case LIBUSB_TRANSFER_TIMED_OUT:
+            case LIBUSB_TRANSFER_CANCELLED:
+                return LIBUSB_ERROR_TIMEOUT;
+            default:
+                return LIBUSB_ERROR_IO;
+        }
+    }
+
     // ------------------------------------------------------------------------------------------- both threads
+
+    [[nodiscard]] bool wait_until_zero(const std::atomic<int>& in_flight, Nanoseconds deadline) noexcept {
+        while (in_flight.load(std::memory_order_acquire) != 0) {
+            const std::uint32_t seen = changes_.events();
+            if (in_flight.load(std::memory_order_acquire) != 0 && !changes_.wait(seen, deadline)) {
+                return in_flight.load(std::memory_order_acquire) == 0;
+            }
+        }
+        return true;
+    }
 
     void failed() noexcept {
         bus_errors_.fetch_add(1, std::memory_order_relaxed);
@@ -318,6 +370,7 @@ class UsbTransfers {
             (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has ended
         }
         (void)libusb_cancel_transfer(write_.get());
+        (void)libusb_cancel_transfer(request_.get());
     }
 
     libusb_context* context_;
@@ -325,11 +378,15 @@ class UsbTransfers {
     std::array<Read, 2> reads_;
     Transfer write_;
     std::array<std::uint8_t, wire::out_size> out_bytes_{};
+    Transfer request_;
+    std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE> setup_{};
+    std::atomic<int> answer_{0};
 
     RingBuffer<UsbArrival> arrivals_;
     WakeUp changes_;  ///< something arrived, ended or broke
     std::atomic<int> reads_in_flight_{0};
     std::atomic<int> writes_in_flight_{0};
+    std::atomic<int> requests_in_flight_{0};
     std::atomic<bool> stopping_{false};
     std::atomic<bool> runs_{false};
     std::atomic<int> error_{0};
