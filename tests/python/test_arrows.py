@@ -49,6 +49,9 @@ INCLUDES = {
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
     "closed_loop": {"controller", "guard", "rendering", "solver", "dynamics", "model", "device"},
+    "failure": {
+        *("closed_loop", "controller", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"),
+    },
     "controller": {"guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
     "simulation": {"controller", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
