@@ -53,7 +53,7 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
-            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
         )
     return _model_of(network, seen, recordings, settings)
 
@@ -87,6 +87,8 @@ def _model_of(
         above=network.above,
         period=options.period,
         play_radius=network.play_radius,
+        mass=network.mass,
+        damping=network.damping,
         fit=Fit(
             rung=network.rung,
             stop_reason=network.stop_reason,

@@ -79,13 +79,16 @@ class Ladder:
         self._starts = starts if side is None and box.shape[1] == 1 else None
         self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions)
         self._fresh = kept_back(len(force), starts)
+        if weight is not None:
+            self._fresh &= weight > 0.0
         if side is None and self._starts is None and "hysteresis" in options.inputs:
             raise InputError(
                 "inputs names hysteresis, but the recording has neither both directions nor time; "
                 "name a direction column or leave hysteresis out"
             )
-        if (samples := self._compressor.rows_used) < len(force):
-            self.notes.append(f"{samples} of {len(force)} rows, evenly spread, stand for all of them")
+        given = len(force) if weight is None else int(np.count_nonzero(weight))
+        if (used := self._compressor.rows_used) < given:
+            self.notes.append(f"{used} of {given} rows, evenly spread, stand for all of them")
 
     def climb(self) -> Rung:
         """The highest rung that earned its place, or the one that the inputs name."""

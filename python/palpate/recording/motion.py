@@ -8,7 +8,7 @@ forward and backward, which has none either. L is two real poles twice, |L| = 1 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,7 +27,7 @@ UNEVEN = 0.01
 """Share of the period by which the steps of a piece may differ from it before it is resampled."""
 
 MARGIN = 3.0
-"""Time constants of L that are left out at both ends of a piece."""
+"""Time constants of L, 2/w_c for its two poles, that are left out at both ends of a piece."""
 
 FINEST = 0.25
 """Highest cutoff tried [1/period]: above it L would be no filter."""
@@ -35,8 +35,11 @@ FINEST = 0.25
 NOISE_SHARE = 0.01
 """Noise of the position that L may let into the variance of a derivative."""
 
-CUTOFFS = 40
-"""Cutoffs tried, each 0.85 of the one before."""
+STEP = 0.85
+"""Ratio of the cutoffs that are tried one after the other."""
+
+LEAST_CONSTANTS = 200.0
+"""1/w_c that the recording must last: what is slower is no motion."""
 
 
 @dataclass(frozen=True)
@@ -49,32 +52,53 @@ class Piece:
     """(k,) [s]"""
     position: Float1D
     force: Float1D
+    row_time: Float1D
+    """(rows,) [s]"""
+    period: float
+    """Of the grid [s]"""
     even: bool
     """The grid is the recording's own rows; else it was interpolated between them."""
+
+    def on_grid(self, values: Float1D) -> Float1D:
+        """Values at the piece's rows, at the times of the grid."""
+        return values if self.even else np.interp(self.time, self.row_time, values)
+
+    def at_rows(self, values: Float1D) -> Float1D:
+        """Values on the grid, at the piece's rows."""
+        return values if self.even else np.interp(self.row_time, self.time, values)
+
+    @property
+    def velocity(self) -> Float1D:
+        """Central difference (k,) [position/s]"""
+        return velocity_of(self.position, self.period)
+
+    @property
+    def acceleration(self) -> Float1D:
+        """Second central difference (k,) [position/s^2]"""
+        return acceleration_of(self.position, self.period)
 
 
 @dataclass(frozen=True)
 class LowPass:
-    """L, forward and backward, for signals of one period."""
+    """L, forward and backward."""
 
     cutoff: float
     """w_c [rad/s]"""
-    period: float
-    """[s]"""
 
-    @property
-    def margin(self) -> int:
-        """Samples at each end that the ends of the signal disturb."""
-        return math.ceil(MARGIN / (self.cutoff * self.period))
+    def margin(self, period: float) -> int:
+        """Samples at each end that the ends of a signal disturb."""
+        return math.ceil(2.0 * MARGIN / (self.cutoff * period))
 
-    def __call__(self, signal: Float1D) -> Float1D:
-        """The signal (k,) without what lies above the cutoff, and without delay; its ends are held."""
-        pole = math.exp(-self.cutoff * self.period)
+    def __call__(self, signal: Float1D, period: float) -> Float1D:
+        """The signal (k,) without what lies above the cutoff, and without delay; its ends are mirrored."""
+        pole = math.exp(-self.cutoff * period)
         response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
+        mirrored = min(len(signal) - 1, self.margin(period))
+        wide = np.concatenate([signal[mirrored:0:-1], signal, signal[-2 : -mirrored - 2 : -1]])
         for _ in range(2):
-            start = signal[0]
-            signal = (start + response.filter(np.ascontiguousarray(signal - start)))[::-1]
-        return signal
+            start = wide[0]
+            wide = (start + response.filter(np.ascontiguousarray(wide - start)))[::-1]
+        return wide[mirrored : mirrored + len(signal)]
 
 
 def pieces(recording: Recording) -> list[Piece]:
@@ -93,12 +117,13 @@ def pieces(recording: Recording) -> list[Piece]:
     found = []
     for start, stop in pairwise(edges):
         rows = slice(int(start), int(stop))
-        time, position, force = recording.time[rows], recording.position[rows], recording.force[rows]
-        even = bool(np.all(np.abs(np.diff(time) - period) <= UNEVEN * period))
+        at, position, force = recording.time[rows], recording.position[rows], recording.force[rows]
+        even = bool(np.all(np.abs(np.diff(at) - period) <= UNEVEN * period))
+        grid = at
         if not even:
-            grid = time[0] + period * np.arange(int((time[-1] - time[0]) / period + 1e-9) + 1)
-            position, force, time = np.interp(grid, time, position), np.interp(grid, time, force), grid
-        found.append(Piece(rows, time, position, force, even))
+            grid = at[0] + period * np.arange(int((at[-1] - at[0]) / period + 1e-9) + 1)
+            position, force = np.interp(grid, at, position), np.interp(grid, at, force)
+        found.append(Piece(rows, grid, position, force, at, period, even))
     return found
 
 
@@ -115,7 +140,7 @@ def acceleration_of(position: Float1D, period: float) -> Float1D:
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
-def quiet_low_pass(parts: Sequence[Piece], period: float, *, order: int) -> LowPass | None:
+def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
     """The highest L whose derivative of that order holds at most NOISE_SHARE of noise; None: there is none.
 
     The position's noise is what sixth differences leave of it, as white noise would; a hand's motion leaves
@@ -126,24 +151,43 @@ def quiet_low_pass(parts: Sequence[Piece], period: float, *, order: int) -> LowP
         return None
     noise = float(np.mean(np.concatenate(sixth) ** 2)) / math.comb(12, 6)
     derive = (velocity_of, acceleration_of)[order - 1]
-    for power in range(CUTOFFS):
-        low_pass = LowPass(FINEST * 0.85**power / period, period)
-        signals = [low_pass(derive(part.position, period)) for part in _long_enough(parts, low_pass)]
-        if not signals:
+    duration = sum(part.period * len(part.time) for part in parts)
+    low_pass = LowPass(FINEST / parts[0].period)
+    while low_pass.cutoff * duration > LEAST_CONSTANTS:
+        moving = [
+            low_pass(derive(part.position, part.period), part.period)[low_pass.margin(part.period) :][
+                : -low_pass.margin(part.period)
+            ]
+            for part in long_enough(parts, low_pass)
+        ]
+        if not moving:
             return None
-        margin = low_pass.margin
-        moving = np.concatenate([signal[margin:-margin] for signal in signals])
-        impulse = np.zeros(2 * margin + 5)
+        period = parts[0].period
+        impulse = np.zeros(2 * low_pass.margin(period) + 5)
         impulse[len(impulse) // 2] = 1.0
-        passed = float(np.sum(low_pass(derive(impulse, period)) ** 2))
-        if noise * passed <= NOISE_SHARE * float(np.mean(moving**2)):
+        passed = float(np.sum(low_pass(derive(impulse, period), period) ** 2))
+        if noise * passed <= NOISE_SHARE * float(np.mean(np.concatenate(moving) ** 2)):
             return low_pass
+        low_pass = LowPass(STEP * low_pass.cutoff)
     return None
 
 
-def _long_enough(parts: Sequence[Piece], low_pass: LowPass) -> Iterator[Piece]:
+def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
     """Pieces of which something is left without their margins."""
-    return (part for part in parts if len(part.time) > 2 * low_pass.margin + 2)
+    return [part for part in parts if len(part.time) > 2 * low_pass.margin(part.period) + 2]
+
+
+def at_rows(
+    parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
+) -> tuple[Float1D, NDArray[np.bool_]]:
+    """A derivative behind L at the n rows that the pieces are of (n,), and the rows that have one (n,)."""
+    result, known = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    for part in long_enough(parts, low_pass):
+        margin = low_pass.margin(part.period)
+        result[part.rows] = part.at_rows(low_pass(derive(part), part.period))
+        first, last = part.time[margin], part.time[len(part.time) - 1 - margin]
+        known[part.rows] = (part.row_time >= first) & (part.row_time <= last)
+    return result, known
 
 
 def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
@@ -154,21 +198,21 @@ def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
     InputError
         The recording has no time, or its position is too noisy or too short to be differentiated.
     """
+    return _derivative(recording, 1)
+
+
+def acceleration(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
+    """Acceleration [position unit per second squared], as :func:`velocity`."""
+    return _derivative(recording, 2)
+
+
+def _derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.bool_]]:
     parts = pieces(recording)
-    period = recording.sample_period
-    assert period is not None
-    assert recording.time is not None
-    low_pass = quiet_low_pass(parts, period, order=1)
+    low_pass = quiet_low_pass(parts, order=order)
     if low_pass is None:
         raise InputError(
-            f"no velocity can be had from {len(recording)} rows: the pieces between gaps of time are too "
-            "short, or the position is all noise"
+            f"no {('velocity', 'acceleration')[order - 1]} can be had from {len(recording)} rows: the pieces "
+            "between gaps of time are too short, or the position is all noise"
         )
-    result, known = np.zeros(len(recording)), np.zeros(len(recording), dtype=np.bool_)
-    for part in _long_enough(parts, low_pass):
-        derived = low_pass(velocity_of(part.position, period))
-        inner = slice(low_pass.margin, len(derived) - low_pass.margin)
-        at = recording.time[part.rows]
-        result[part.rows] = derived if part.even else np.interp(at, part.time, derived)
-        known[part.rows] = (at >= part.time[inner][0]) & (at <= part.time[inner][-1])
-    return result, known
+    derive = (lambda part: part.velocity) if order == 1 else (lambda part: part.acceleration)
+    return at_rows(parts, low_pass, derive, len(recording))
