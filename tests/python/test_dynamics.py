@@ -86,6 +86,25 @@ def test_each_term_is_reported_with_what_it_gains() -> None:
     assert any(note.startswith("mass refused: bic ") for note in notes)
 
 
+def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None:
+    """Hunt-Crossley: f = 800 x^1.5 (1 + 1.2 v)."""
+
+    def contact(seed: int) -> Recording:
+        motion = moved(seed)
+        assert motion.time is not None
+        x = -0.002 + (motion.position + 0.2) / 0.669 * 0.012
+        time = motion.time / 8.0
+        force = 800.0 * np.maximum(x, 0.0) ** 1.5 * (1.0 + 1.2 * np.gradient(x, time))
+        noise = np.random.default_rng(seed).normal(0.0, 0.003, len(x))
+        return Recording.from_arrays(x, force + noise, time=time)
+
+    model = identify(contact(1))
+    assert (model.kind, model.inputs) == ("position_velocity", ("position", "velocity"))
+    assert (model.fit.rung, model.damping) == ("velocity", None)
+    assert verify(model, contact(2)).rmse < 0.004
+    assert any(note.startswith("velocity taken as an input") for note in model.notes["identification"])
+
+
 def test_a_negative_damping_is_refused() -> None:
     model = identify(moved(2, damping=-0.03))
     assert model.damping is None

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import _core
 from .._typing import Float1D, Float2D
 from ..recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from .options import IdentifyOptions
 from .separable import TINY, Basis, solve_gram
-from .stopping import CRITERIA, ON_FRESH_ROWS, deviance
+from .stopping import CRITERIA, ON_FRESH_ROWS
 
 PER_TIME_CONSTANT = 2.0
 """Samples kept of a filtered column in each time constant of L."""
@@ -28,6 +29,9 @@ FOLDS = 10
 
 LEAST_SAMPLES = 40.0
 """Independent samples below which nothing is said about velocity or mass."""
+
+MOST_ROWS = 20_000
+"""Rows that are enough to see what a residual depends on."""
 
 NAMES = ("damping", "mass")
 """What multiplies the columns v and a."""
@@ -160,6 +164,24 @@ class Dynamics:
                 total, known = total + value * derived, known & here
         return total, known.astype(float)
 
+    def velocity(self) -> tuple[Float1D, NDArray[np.bool_]]:
+        """L v at every row (n,), and the rows (n,) that have one."""
+        return at_rows(self._parts, self._low_pass, lambda part: part.velocity, self._n)
+
+    def left_to_velocity(self, residual: Float1D, box: Float2D, basis: Basis) -> float:
+        """Share of a residual (n,) that v psi_i(x), v x, v and v|v| explain: what a constant damping cannot.
+
+        box (n, 1) are the positions, and the wavelets those of the force over position.
+        """
+        velocity, known = self.velocity()
+        rows = np.flatnonzero(known)[:: max(1, -(-int(known.sum()) // MOST_ROWS))]
+        v, r, x = velocity[rows, None], residual[rows], box[rows]
+        columns = np.concatenate(
+            [v, v * np.abs(v), v * x, v * _core.wavelet_columns(x, basis.alpha, basis.beta)], 1
+        )
+        product = columns.T @ r
+        return float(product @ solve_gram(columns.T @ columns, product) / max(float(r @ r), TINY))
+
     def _regression(self, basis: Basis, side: Float1D | None) -> "_Regression | None":
         tables, folds = [], []
         rows = sum(len(fixed) for fixed in self._fixed)
@@ -225,7 +247,7 @@ class _Regression:
     def solved(self, two_sided: bool, names: Sequence[str]) -> list[float]:
         """The coefficients of these names."""
         columns = self._columns(two_sided, names)
-        return self._solution(self._grams.sum(axis=0), columns)[: len(names)].tolist()
+        return [float(value) for value in self._solution(self._grams.sum(axis=0), columns)[: len(names)]]
 
     def fresh_gain(
         self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]

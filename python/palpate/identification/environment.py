@@ -23,6 +23,10 @@ VELOCITY_INPUTS = ("position", "velocity")
 DYNAMIC_ROUNDS = 2
 """Times that the ladder is climbed again beside velocity and mass, on ever better values of theirs."""
 
+WORTH_A_VELOCITY = 0.05
+"""Share of the squared error that velocity as an input must take away beside a constant damping: a force of
+two inputs is harder to render."""
+
 MOST_HALVINGS = 3
 """Times that cells are halved at most."""
 
@@ -106,8 +110,7 @@ class _Data:
     side: Float1D | None
     starts: Sequence[int] | None
     weight: Float1D | None
-    network: str
-    """Name of the rung that a network over the inputs is"""
+    names: tuple[str, ...]
     options: IdentifyOptions
 
     def climbed(self, cells: int) -> tuple[Ladder, Rung]:
@@ -119,7 +122,7 @@ class _Data:
             self.side,
             self.starts,
             self.options,
-            network=self.network,
+            network=_network_rung(self.names),
             slope_unit=float(self.reach[0]),
             max_positions=cells,
         )
@@ -146,7 +149,7 @@ def _fitted(
         None if side is None else np.sign(side).astype(float),
         starts,
         weight,
-        "velocity" if names == VELOCITY_INPUTS else "position" if len(names) == 1 else "network",
+        names,
         options,
     )
     cells = options.max_positions * 2 ** (positions.shape[1] - 1)
@@ -165,17 +168,23 @@ def _fitted(
         data = replace(data, weight=weights)
         ladder, best = data.climbed(cells)
         ladder.notes.append(note)
-    terms = NO_TERMS
-    if parts and len(names) == 1 and options.inputs == "auto":
-        ladder, best, terms = _with_dynamics(data, cells, parts, ladder, best)
-    return _identified(best, terms, ladder, data)
+    if not parts or len(names) > 1 or options.inputs != "auto":
+        return _identified(best, NO_TERMS, ladder, data)
+    dynamics = Dynamics(parts, float(lower[0]), float(reach[0]), len(force))
+    ladder, best, terms = _with_dynamics(data, cells, dynamics, ladder, best)
+    found = _identified(best, terms, ladder, data)
+    if terms.names != ("damping",):
+        return found
+    residual = data.force - dynamics.force_of(terms)[0] - best.modelled(data.box)
+    if dynamics.left_to_velocity(residual, data.box, best.solution.basis) < WORTH_A_VELOCITY:
+        return found
+    return _over_velocity(data, dynamics, found)
 
 
 def _with_dynamics(
-    data: _Data, cells: int, parts: Sequence[Piece], ladder: Ladder, best: Rung
+    data: _Data, cells: int, dynamics: Dynamics, ladder: Ladder, best: Rung
 ) -> tuple[Ladder, Rung, Terms]:
     """The ladder climbed again without what velocity and acceleration explain, if they earn their place."""
-    dynamics = Dynamics(parts, float(data.lower[0]), float(data.reach[0]), len(data.force))
     terms = dynamics.terms(best.solution.basis, best.side, data.options)
     ladder.notes.extend(terms.notes)
     if not terms:
@@ -197,6 +206,30 @@ def _with_dynamics(
     return ladder, best, found
 
 
+def _over_velocity(data: _Data, dynamics: Dynamics, damped: IdentifiedNetwork) -> IdentifiedNetwork:
+    """A network over position and velocity, where it says clearly more than a constant damping."""
+    velocity, known = dynamics.velocity()
+    rows = known if data.weight is None else known & (data.weight > 0.0)
+    positions = data.lower + data.box * data.reach
+    both = _fitted(
+        np.column_stack([positions, velocity])[rows],
+        data.force[rows],
+        None,
+        data.options,
+        None,
+        VELOCITY_INPUTS,
+        None if data.weight is None else data.weight[rows],
+        (),
+    )
+    share = 1.0 - (both.rmse / damped.rmse) ** 2 if damped.rmse > 0.0 else 0.0
+    said = f"a network over position and velocity lowers the squared error by {100 * share:.3g} %"
+    if share < WORTH_A_VELOCITY:
+        note = f"velocity refused as an input: {said}, it has to be {100 * WORTH_A_VELOCITY:g} % or more"
+        return replace(damped, path=damped.path + both.path, notes=(*damped.notes, note))
+    note = f"velocity taken as an input: beside a constant damping {said}"
+    return replace(both, path=damped.path + both.path, notes=(*damped.notes, note, *both.notes))
+
+
 def _identified(
     rung: Rung,
     terms: Terms,
@@ -211,6 +244,7 @@ def _identified(
     near_zero = max(rung.rmse, data.options.contact_share * float(np.ptp(force)))
     left_there = len(lower) == 1 and abs(law.at_lower) <= near_zero
     return IdentifiedNetwork(
+        inputs=data.names,
         alpha=law.alpha,
         beta=law.beta,
         weight=law.weights[0],
@@ -234,6 +268,11 @@ def _identified(
         path=tuple(ladder.path),
         notes=tuple(ladder.notes),
     )
+
+
+def _network_rung(names: tuple[str, ...]) -> str:
+    """Name of the rung that a network over these inputs is."""
+    return "velocity" if names == VELOCITY_INPUTS else "position" if len(names) == 1 else "network"
 
 
 def _input_names(dimension: int) -> tuple[str, ...]:

@@ -70,8 +70,8 @@ def _model_of(
         for at in network.path
     ]
     return Model(
-        kind=_kind(network, seen.names),
-        inputs=seen.names,
+        kind=_kind(network),
+        inputs=network.inputs,
         units=recordings[0].units,
         alpha=network.alpha,
         beta=network.beta,
@@ -102,7 +102,7 @@ def _model_of(
     )
 
 
-def _kind(network: IdentifiedNetwork, names: Sequence[str]) -> str:
-    if len(names) == 1:
+def _kind(network: IdentifiedNetwork) -> str:
+    if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
-    return "position_velocity" if tuple(names) == VELOCITY_INPUTS else "general"
+    return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

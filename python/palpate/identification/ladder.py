@@ -34,6 +34,9 @@ LIBRARY_ENTRIES = 2**23
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
 
+GAINS_ENERGY = 2.0
+"""Ratio of the RMS errors with and without h >= 0 above which the loop is run through the wrong way."""
+
 LEAST_FRESH = 20
 """Fresh rows below which they are too few to refuse a rung."""
 
@@ -179,7 +182,13 @@ class Ladder:
         kept = self._constrained(free)
         if named or kept is free:
             return kept
-        return self._better(self._single_valued(kept) if len(below.solution.basis) else below, kept)
+        best = self._better(self._single_valued(kept) if len(below.solution.basis) else below, kept)
+        if best.name != "hysteresis" and kept.rmse > GAINS_ENERGY * free.rmse:
+            self.notes.append(
+                "press and release differ, but the loop would gain energy; if position or force is turned, "
+                "give --negate position or --negate force"
+            )
+        return best
 
     def _single_valued(self, hysteresis: Rung) -> Rung:
         """A force of position alone on the wavelets of a hysteresis rung, those it does not need removed.

@@ -34,7 +34,7 @@ class IdentifyOptions:
 
     inputs: str | tuple[str, ...] = "auto"
     """"auto": the ladder decides, over the position and the recording's further inputs. Or names, as a tuple
-    or with commas between: position, then hysteresis, velocity (from time) or columns; they are then given."""
+    or with commas between: position, then hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"
