@@ -34,6 +34,8 @@ HELP = {
     "loss": "Least squares, or rows far from the others weighed down.",
     "hysteresis_nonnegative": "Impose that every loop loses energy.",
     "slope_bounds": "Least and largest slope imposed, in force per position.",
+    "monotone": "Impose that the force never falls with position.",
+    "fixed_force": "Position and force that the model goes through.",
     "coupling_stiffness": "Keep the slope below 0.9 of it, in force per position.",
     "play_radius": "Play radii tried without a direction, as shares of the travel, joined by commas.",
     "contact_share": "Share of the force range below which the force at the start counts as free contact.",

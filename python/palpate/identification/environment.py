@@ -123,7 +123,8 @@ class _Data:
             self.starts,
             self.options,
             network=_network_rung(self.names),
-            slope_unit=float(self.reach[0]),
+            lower=float(self.lower[0]),
+            reach=float(self.reach[0]),
             max_positions=cells,
         )
         return ladder, ladder.climb()

@@ -57,8 +57,8 @@ class Ladder:
         Rows at which a motion starts, from which the play operator gives a hysteresis input (d = 1).
     network : str
         Name of the rung that a network over the inputs is.
-    slope_unit : float
-        Length of the box along a single input [position].
+    lower, reach : float
+        Corner and length of the box along the position.
     max_positions : int
     """
 
@@ -72,12 +72,21 @@ class Ladder:
         options: IdentifyOptions,
         *,
         network: str,
-        slope_unit: float,
+        lower: float,
+        reach: float,
         max_positions: int,
     ) -> None:
         self.notes: list[str] = []
         self.path: list[PathPoint] = []
-        self._options, self._name, self._slope_unit = options, network, slope_unit
+        self._options, self._name, self._slope_unit = options, network, reach
+        self._fixed_force = None
+        if options.fixed_force is not None:
+            place, fixed = options.fixed_force
+            if not lower <= place <= lower + reach:
+                raise InputError(
+                    f"fixed_force is at {place:g}, outside the positions from {lower:g} to {lower + reach:g}"
+                )
+            self._fixed_force = (place - lower) / reach, fixed
         self._box, self._force, self._side = box, force, side
         self._starts = starts if side is None and box.shape[1] == 1 else None
         self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions)
@@ -268,7 +277,9 @@ class Ladder:
         """
         options, problem, slopes = self._options, rung.problem, self._options.slope_limits
         box_slopes = None if slopes is None else (slopes[0] * self._slope_unit, slopes[1] * self._slope_unit)
-        bounds = domain_bounds(problem, hysteresis=options.hysteresis_nonnegative, slopes=box_slopes)
+        bounds = domain_bounds(
+            problem, hysteresis=options.hysteresis_nonnegative, slopes=box_slopes, fixed=self._fixed_force
+        )
         if problem.dimension > 1 or not bounds:
             return rung
         kept = impose(problem, rung.solution, bounds)

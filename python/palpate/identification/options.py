@@ -68,6 +68,10 @@ class IdentifyOptions:
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
     """(min, max) of df/dx, imposed over the domain [force/position]"""
+    monotone: bool = False
+    """Impose df/dx >= 0 over the domain"""
+    fixed_force: tuple[float, float] | None = None
+    """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
     coupling_stiffness: float | None = None
     """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
@@ -104,8 +108,10 @@ class IdentifyOptions:
 
     @property
     def slope_limits(self) -> tuple[float, float] | None:
-        """Both slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
+        """All slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
         low, high = self.slope_bounds or (-math.inf, math.inf)
+        if self.monotone:
+            low = max(low, 0.0)
         if self.coupling_stiffness is not None:
             high = min(high, COUPLING_SHARE * self.coupling_stiffness)
         return None if math.isinf(low) and math.isinf(high) else (low, high)
@@ -119,9 +125,12 @@ class IdentifyOptions:
         limits = self.slope_limits
         if limits is not None and not limits[0] < limits[1]:
             raise InputError(
-                f"slope_bounds asks for a slope of {limits[0]:g} or more, but coupling_stiffness "
-                f"{self.coupling_stiffness:g} allows no more than {limits[1]:g}"
+                f"slope_bounds, monotone and coupling_stiffness ask for a slope of {limits[0]:g} or more, but "
+                f"allow no more than {limits[1]:g}"
             )
+        fixed: tuple[float, ...] | None = self.fixed_force
+        if fixed is not None and not (len(fixed) == 2 and all(map(math.isfinite, fixed))):
+            raise InputError(f"fixed_force is {self.fixed_force!r}; it must be (position, force)")
 
 
 _WHOLE_NUMBERS = {
