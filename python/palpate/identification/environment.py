@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._typing import Float1D, Float2D
+from ..errors import InputError
 from ..recording.motion import Piece
 from .dynamics import NO_TERMS, Dynamics, Terms
 from .growth import PathPoint
@@ -75,6 +76,11 @@ def fit_environment(
     options = options or IdentifyOptions()
     names = tuple(names or _input_names(positions.shape[-1]))
     require_usable(positions, force, names)
+    if len(names) > 1 and (options.slope_limits is not None or options.fixed_force is not None):
+        raise InputError(
+            "slope_bounds, monotone, coupling_stiffness and fixed_force are for a force over position alone, "
+            f"not over {', '.join(names)}"
+        )
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         side = None
     if side is None or side.all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):

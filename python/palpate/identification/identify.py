@@ -87,8 +87,8 @@ def _model_of(
         above=network.above,
         period=options.period,
         play_radius=network.play_radius,
-        mass=network.mass,
-        damping=network.damping,
+        mass=network.mass if options.filters == "matched" else options.assumed_mass,
+        damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
         fit=Fit(
             rung=network.rung,
             stop_reason=network.stop_reason,

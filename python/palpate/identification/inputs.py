@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..recording import Recording
 from ..recording.motion import Piece, pieces, velocity
 from .options import IdentifyOptions
+from .paper import paper_target
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,6 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     if all(part.direction is not None for part in recordings):
         sides = [np.asarray(part.direction, dtype=float) for part in recordings]
         side = np.concatenate([each[rows] for each, rows in zip(sides, kept, strict=True)])
-    elif all(part.time is not None for part in recordings):
-        starts = (0, *np.cumsum([np.count_nonzero(rows) for rows in kept])[:-1].tolist())
     parts: tuple[Piece, ...] = ()
     if len(names) == 1 and all(part.time is not None for part in recordings):
         first = np.cumsum([0, *(len(part) for part in recordings)])
@@ -61,8 +60,23 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
             for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
             for piece in pieces(recording)
         )
-    force = np.concatenate([part.force[rows] for part, rows in zip(recordings, kept, strict=True)])
+    if side is None and all(part.time is not None for part in recordings):
+        starts = _starts(recordings, kept)
+    if options.filters == "matched":
+        forces = [part.force for part in recordings]
+    else:
+        forces, parts = [paper_target(part, options) for part in recordings], ()
+    force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
     return Observations(names, np.concatenate(columns), force, side, starts, parts, notes)
+
+
+def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
+    """Rows, of those that are kept, at which a recording or a piece between gaps of time begins."""
+    starts, before = [], 0
+    for recording, rows in zip(recordings, kept, strict=True):
+        starts += [before + int(np.count_nonzero(rows[: piece.rows.start])) for piece in pieces(recording)]
+        before += int(np.count_nonzero(rows))
+    return tuple(dict.fromkeys(start for start in starts if start < before))
 
 
 def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
