@@ -53,7 +53,7 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
-            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
         )
     return _model_of(network, seen, recordings, settings)
 
@@ -70,8 +70,8 @@ def _model_of(
         for at in network.path
     ]
     return Model(
-        kind=_kind(network, seen.names),
-        inputs=seen.names,
+        kind=_kind(network),
+        inputs=network.inputs,
         units=recordings[0].units,
         alpha=network.alpha,
         beta=network.beta,
@@ -87,6 +87,8 @@ def _model_of(
         above=network.above,
         period=options.period,
         play_radius=network.play_radius,
+        mass=network.mass if options.filters == "matched" else options.assumed_mass,
+        damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
         fit=Fit(
             rung=network.rung,
             stop_reason=network.stop_reason,
@@ -100,7 +102,7 @@ def _model_of(
     )
 
 
-def _kind(network: IdentifiedNetwork, names: Sequence[str]) -> str:
-    if len(names) == 1:
+def _kind(network: IdentifiedNetwork) -> str:
+    if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
-    return "position_velocity" if tuple(names) == VELOCITY_INPUTS else "general"
+    return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"
