@@ -30,6 +30,7 @@ def fit_environment(
     starts: Sequence[int] | None = None,
     names: Sequence[str] | None = None,
     weight: Float1D | None = None,
+    within: float = 0.0,
 ) -> IdentifiedNetwork:
     """Identify a force law from arrays.
 
@@ -49,6 +50,8 @@ def fit_environment(
         Of the inputs, for the sentences.
     weight : (n,), optional
         Samples that each row stands for, above 0; 1 without it.
+    within : float
+        Sum of squares of the force inside rows that stand for several samples.
 
     Returns
     -------
@@ -65,7 +68,7 @@ def fit_environment(
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         side = None
     if side is None or side.all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
-        return _fitted(positions, force, side, options, starts, names, weight)
+        return _fitted(positions, force, side, options, starts, names, weight, within)
     directed = side != 0
     left_out = f"{np.count_nonzero(~directed)} rows without a direction were left out to judge hysteresis"
     found = _fitted(
@@ -76,12 +79,13 @@ def fit_environment(
         starts,
         names,
         None if weight is None else weight[directed],
+        within,
     )
     found = replace(found, notes=(left_out, *found.notes))
     if found.weight_hysteresis is not None:
         return found
     # hysteresis was refused, so there is no reason any more to leave out rows that have no direction
-    every_row = _fitted(positions, force, None, options, None, names, weight)
+    every_row = _fitted(positions, force, None, options, None, names, weight, within)
     return replace(every_row, path=found.path + every_row.path, notes=found.notes + every_row.notes)
 
 
@@ -93,6 +97,7 @@ def _fitted(
     starts: Sequence[int] | None,
     names: tuple[str, ...],
     weight: Float1D | None,
+    within: float,
 ) -> IdentifiedNetwork:
     """Climb with cells that are fine enough, again with outliers weighed down where that is asked for."""
     lower, reach = positions.min(axis=0), np.ptp(positions, axis=0)
@@ -112,6 +117,7 @@ def _fitted(
             network=network,
             slope_unit=float(reach[0]),
             max_positions=cells,
+            within=within,
         )
         return ladder, ladder.climb()
 

@@ -57,6 +57,8 @@ class Ladder:
     slope_unit : float
         Length of the box along a single input [position].
     max_positions : int
+    within : float
+        Sum of squares of the force inside rows that stand for several samples.
     """
 
     def __init__(
@@ -71,13 +73,14 @@ class Ladder:
         network: str,
         slope_unit: float,
         max_positions: int,
+        within: float = 0.0,
     ) -> None:
         self.notes: list[str] = []
         self.path: list[PathPoint] = []
         self._options, self._name, self._slope_unit = options, network, slope_unit
         self._box, self._force, self._side = box, force, side
         self._starts = starts if side is None and box.shape[1] == 1 else None
-        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions)
+        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
         self._fresh = kept_back(len(force), starts)
         if side is None and self._starts is None and "hysteresis" in options.inputs:
             raise InputError(
