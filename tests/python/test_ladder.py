@@ -226,7 +226,7 @@ def test_named_inputs_decide_the_rung() -> None:
         ({"frame_scale": 1.0}, "frame_scale is 1.0"),
         ({"coupling_stiffness": -5.0}, "coupling_stiffness is -5.0"),
         ({"slope_bounds": (3.0, 1.0)}, r"slope_bounds is \(3.0, 1.0\)"),
-        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allows no more than 90"),
+        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allow no more than 90"),
         ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
         ({"period": float("nan")}, "period is nan"),
     ],

@@ -557,3 +557,14 @@ def test_time_that_starts_again_is_refused_with_its_line(data: Path) -> None:
     }
     sentence = refusal(data / "sysid_benchmarks/cascaded_tanks.csv", **hint)
     assert sentence.startswith("cascaded_tanks.csv, line 1026: column time_s holds '0', no later than")
+
+
+def test_the_force_of_rows_that_touch_nothing_is_taken_off(csv_file: Callable[..., Path]) -> None:
+    rows = [f"{0.1 * k:.1f},{0.25 + max(0.0, 0.1 * k - 1.0):.6f}" for k in range(30)]
+    path = csv_file("depth_mm,force_N", rows)
+    recording = read_recording(path, zero=(0, 10), rows=(2, None))
+    assert recording.force[:8] == pytest.approx(np.zeros(8))
+    assert recording.force[-1] == pytest.approx(1.9)
+    assert "0.25 N, the mean force of rows 0 to 9, is taken off" in recording.notes
+    with pytest.raises(InputError, match="--zero 0:2 holds none of the rows that are used"):
+        read_recording(path, zero=(0, 2), rows=(2, None))

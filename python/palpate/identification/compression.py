@@ -58,7 +58,7 @@ class Compressor:
     max_positions : int
         With more distinct positions than this they are gathered in that many cells of a regular grid.
     weight : (n,), optional
-        Samples that each row stands for, above 0; 1 without it.
+        Samples that each row stands for, >= 0; 1 without it. A row of weight 0 is no row.
     within : float
         Sum of squares about the rows themselves, where they stand for several samples.
     """
@@ -73,11 +73,11 @@ class Compressor:
         within: float = 0.0,
     ) -> None:
         self._within = within
-        self._key, self._per_axis = _position_key(positions, max_positions)
-        self.kept: NDArray[np.int64] | slice = slice(None)
+        self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
         """The rows that stand for all."""
+        self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
         if 0 < self._per_axis < LEAST_PER_AXIS:
-            self.kept = np.linspace(0, len(force) - 1, max_positions).round().astype(np.int64)
+            self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
             self._key, self._per_axis = np.arange(max_positions), 0
         self._positions = positions[self.kept]
         self._force = force[self.kept]
@@ -119,7 +119,7 @@ class Compressor:
     def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
         """The same cells with fewer rows."""
         part = copy(self)
-        part.kept = slice(None)
+        part.kept = np.arange(np.count_nonzero(rows))
         part._key, part._positions = self._key[rows], self._positions[rows]
         part._force, part._weight = self._force[rows], self._weight[rows]
         part._within = self._within * float(part._weight.sum() / self._weight.sum())

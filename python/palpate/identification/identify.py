@@ -53,29 +53,28 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
-            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
         )
     source = Source.merged(part.source for part in recordings)
-    return model_of(network, seen.names, recordings[0].units, source, settings, seen.notes)
+    return model_of(network, recordings[0].units, source, settings, seen.notes)
 
 
 def model_of(
     network: IdentifiedNetwork,
-    names: Sequence[str],
     units: Mapping[str, str],
     source: Source,
     options: IdentifyOptions,
     notes: Sequence[str] = (),
 ) -> Model:
-    """The model of an identified network over inputs of these names."""
+    """The model of an identified network."""
     notes = [*notes, *network.notes]
     path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
     ]
     return Model(
-        kind=_kind(network, names),
-        inputs=names,
+        kind=_kind(network),
+        inputs=network.inputs,
         units=units,
         alpha=network.alpha,
         beta=network.beta,
@@ -91,6 +90,8 @@ def model_of(
         above=network.above,
         period=options.period,
         play_radius=network.play_radius,
+        mass=network.mass if options.filters == "matched" else options.assumed_mass,
+        damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
         fit=Fit(
             rung=network.rung,
             stop_reason=network.stop_reason,
@@ -104,7 +105,7 @@ def model_of(
     )
 
 
-def _kind(network: IdentifiedNetwork, names: Sequence[str]) -> str:
-    if len(names) == 1:
+def _kind(network: IdentifiedNetwork) -> str:
+    if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
-    return "position_velocity" if tuple(names) == VELOCITY_INPUTS else "general"
+    return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

@@ -138,7 +138,6 @@ def _identified(summary: Summary, recordings: Sequence[LongRecording], settings:
             upper=np.array([summary.upper]),
             nrmse=network.rmse / spread if spread > 0 else 0.0,
         ),
-        ("position",),
         recordings[0].units,
         replace(source, rows=int(summary.rows)),
         settings,
