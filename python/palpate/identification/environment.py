@@ -41,6 +41,7 @@ def fit_environment(
     starts: Sequence[int] | None = None,
     names: Sequence[str] | None = None,
     weight: Float1D | None = None,
+    within: float = 0.0,
     parts: Sequence[Piece] = (),
 ) -> IdentifiedNetwork:
     """Identify a force law from arrays.
@@ -61,6 +62,8 @@ def fit_environment(
         Of the inputs, for the sentences.
     weight : (n,), optional
         Samples that each row stands for, above 0; 1 without it.
+    within : float
+        Sum of squares of the force inside rows that stand for several samples.
     parts : sequence of Piece
         The motion between gaps of time, for velocity, mass and damping (d = 1).
 
@@ -84,7 +87,7 @@ def fit_environment(
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         side = None
     if side is None or side.all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
-        return _fitted(positions, force, side, options, starts, names, weight, parts)
+        return _fitted(positions, force, side, options, starts, names, weight, parts, within)
     directed = side != 0
     left_out = f"{np.count_nonzero(~directed)} rows without a direction were left out to judge hysteresis"
     found = _fitted(
@@ -96,12 +99,13 @@ def fit_environment(
         names,
         None if weight is None else weight[directed],
         (),
+        within,
     )
     found = replace(found, notes=(left_out, *found.notes))
     if found.weight_hysteresis is not None:
         return found
     # hysteresis was refused, so there is no reason any more to leave out rows that have no direction
-    every_row = _fitted(positions, force, None, options, None, names, weight, ())
+    every_row = _fitted(positions, force, None, options, None, names, weight, (), within)
     return replace(every_row, path=found.path + every_row.path, notes=found.notes + every_row.notes)
 
 
@@ -118,6 +122,8 @@ class _Data:
     weight: Float1D | None
     names: tuple[str, ...]
     options: IdentifyOptions
+    within: float
+    """Sum of squares inside rows that stand for several samples [force^2]"""
 
     def climbed(self, cells: int) -> tuple[Ladder, Rung]:
         """The highest rung that earned its place, with positions in at most that many cells."""
@@ -132,6 +138,7 @@ class _Data:
             lower=float(self.lower[0]),
             reach=float(self.reach[0]),
             max_positions=cells,
+            within=self.within,
         )
         return ladder, ladder.climb()
 
@@ -145,6 +152,7 @@ def _fitted(
     names: tuple[str, ...],
     weight: Float1D | None,
     parts: Sequence[Piece],
+    within: float,
 ) -> IdentifiedNetwork:
     """Climb with cells that are fine enough, outliers weighed down if asked for; then velocity and mass."""
     lower, reach = positions.min(axis=0), np.ptp(positions, axis=0)
@@ -158,6 +166,7 @@ def _fitted(
         weight,
         names,
         options,
+        within,
     )
     cells = options.max_positions * 2 ** (positions.shape[1] - 1)
     ladder, best = data.climbed(cells)
@@ -227,6 +236,7 @@ def _over_velocity(data: _Data, dynamics: Dynamics, damped: IdentifiedNetwork) -
         VELOCITY_INPUTS,
         None if data.weight is None else data.weight[rows],
         (),
+        0.0,
     )
     share = 1.0 - (both.rmse / damped.rmse) ** 2 if damped.rmse > 0.0 else 0.0
     said = f"a network over position and velocity lowers the squared error by {100 * share:.3g} %"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """identify: from recordings to a model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -11,7 +11,7 @@ from ..model import Fit, Model, PathStep
 from ..recording import Recording, Source
 from .environment import VELOCITY_INPUTS, fit_environment
 from .identified import IdentifiedNetwork
-from .inputs import Observations, observations
+from .inputs import observations
 from .options import IdentifyOptions, options_from
 
 
@@ -55,16 +55,19 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
         network = fit_environment(
             seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
         )
-    return _model_of(network, seen, recordings, settings)
+    source = Source.merged(part.source for part in recordings)
+    return model_of(network, recordings[0].units, source, settings, seen.notes)
 
 
-def _model_of(
+def model_of(
     network: IdentifiedNetwork,
-    seen: Observations,
-    recordings: Sequence[Recording],
+    units: Mapping[str, str],
+    source: Source,
     options: IdentifyOptions,
+    notes: Sequence[str] = (),
 ) -> Model:
-    notes = [*seen.notes, *network.notes]
+    """The model of an identified network."""
+    notes = [*notes, *network.notes]
     path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
@@ -72,7 +75,7 @@ def _model_of(
     return Model(
         kind=_kind(network),
         inputs=network.inputs,
-        units=recordings[0].units,
+        units=units,
         alpha=network.alpha,
         beta=network.beta,
         weight=network.weight,
@@ -97,7 +100,7 @@ def _model_of(
             n_parameters=network.n_parameters,
             path=path,
         ),
-        data=Source.merged(part.source for part in recordings),
+        data=source,
         notes={"identification": notes} if notes else None,
     )
 

@@ -60,6 +60,8 @@ class Ladder:
     lower, reach : float
         Corner and length of the box along the position.
     max_positions : int
+    within : float
+        Sum of squares of the force inside rows that stand for several samples.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class Ladder:
         lower: float,
         reach: float,
         max_positions: int,
+        within: float = 0.0,
     ) -> None:
         self.notes: list[str] = []
         self.path: list[PathPoint] = []
@@ -89,7 +92,7 @@ class Ladder:
             self._fixed_force = (place - lower) / reach, fixed
         self._box, self._force, self._side = box, force, side
         self._starts = starts if side is None and box.shape[1] == 1 else None
-        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions)
+        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
         self._fresh = kept_back(len(force), starts)
         if weight is not None:
             self._fresh &= weight > 0.0
