@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .errors import InputError
     from .identification import IdentifyOptions, frame_bounds
     from .identification.identify import identify
+    from .identification.identify_files import identify_files
+    from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
     from .planning import DeviceProfile, Plan, simulate
     from .planning.plan import plan
@@ -32,6 +34,7 @@ _HOME = {
     "IdentifyOptions": "identification",
     "frame_bounds": "identification",
     "identify": "identification",
+    "identify_files": "identification.identify_files",
     "Model": "model",
     "load_model": "model",
     "Plan": "planning",
@@ -41,6 +44,7 @@ _HOME = {
     "read_recording": "recording",
     "Verification": "verification",
     "verify": "verification",
+    "WaveletNetworkRegressor": "identification.regressor",
 }
 """Where each public name lives."""
 
@@ -54,9 +58,11 @@ __all__ = [
     "Recording",
     "Scheme",
     "Verification",
+    "WaveletNetworkRegressor",
     "__version__",
     "frame_bounds",
     "identify",
+    "identify_files",
     "load_model",
     "plan",
     "read_recording",

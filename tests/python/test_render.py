@@ -86,6 +86,23 @@ def test_the_verb_ends_in_an_orderly_way_when_asked(tmp_path: Path, number: sign
     assert json.loads(told)["recorded"] == len(every_row(out))
 
 
+def test_a_rate_that_is_not_held_ends_the_run_unless_none_is_too_low() -> None:
+    """Stopped for two seconds, it has missed most of its deadlines."""
+    for patient in (False, True):
+        command = [*COMMAND, "--duration-s", "3", "--json", *(PATIENT if patient else [])]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert process.stderr is not None
+        while "rendering" not in process.stderr.readline():
+            pass
+        time.sleep(0.3)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(2.0)
+        process.send_signal(signal.SIGCONT)
+        told, _ = process.communicate(timeout=30)
+        assert process.returncode == (0 if patient else 1)
+        assert ("did not hold its rate" in told) != patient
+
+
 def test_the_verb_refuses_with_one_sentence() -> None:
     answer = subprocess.run([*COMMAND, "--rate-hz", "5"], capture_output=True, text=True, check=False)
     assert answer.returncode == 2

@@ -64,6 +64,10 @@ struct Bench {
         guards.largest_speed *= length;
         guards.frozen_speed =
             std::max(guards.frozen_speed * length, 3.0 * device.encoder_step / device.period_s);
+        guards.buzz_force *= length * stiffness;
+        guards.device_damping = device.viscous_damping;
+        guards.device_friction = device.coulomb_friction;
+        guards.encoder_step = device.encoder_step;
         return guards;
     }
 };
