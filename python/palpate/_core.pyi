@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'failure_map', 'failure_map_names', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -33,7 +33,12 @@ class Status:
       Jump : the position moved farther in one sample than the device can; the force sent is zero
     
       Frozen : the position stood still at once out of full motion; the force sent is zero
+    
+      Drained : the rendering had given all the energy it may; a force that gives more was scaled down
+    
+      Softened : the handle buzzed; all forces are scaled down from then on
     """
+    Drained: typing.ClassVar[Status]
     Fault: typing.ClassVar[Status]
     Frozen: typing.ClassVar[Status]
     Jump: typing.ClassVar[Status]
@@ -43,6 +48,7 @@ class Status:
     NonFinite: typing.ClassVar[Status]
     NotUnique: typing.ClassVar[Status]
     Ok: typing.ClassVar[Status]
+    Softened: typing.ClassVar[Status]
     Timeout: typing.ClassVar[Status]
     __members__: typing.ClassVar[dict[str, Status]]
     @typing.overload
@@ -362,6 +368,13 @@ def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
     The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
     """
+def failure_map(name: str, points: typing.SupportsInt | typing.SupportsIndex = 8) -> dict:
+    """
+    Where a method fails: boundaries measured in simulation, and what theory says of them.
+    
+    By name: along and limit (what the axes hold, with units) and lines, each with its name and the
+    arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known).
+    """
 def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
@@ -419,11 +432,6 @@ def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`
     times max|f'| wider than the true range.
     """
-def solver_name(model: ForceModel, scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex) -> str | None:
-    """
-    How the load line is solved: 'table' where certified tables answer, at least in part, else 'newton';
-    None where a structure has no load line.
-    """
 def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """
     Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`
@@ -449,8 +457,9 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
     """
 __version__: str = '0.1.0'
+failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'solver', 'pole', 'guard')
 paper_sample_time_s: float = 0.001
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero'}
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}
 structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit')
 wavelet_curvature_bound: float = 3.0
 wavelet_jerk_bound: float = 5.7831
