@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // palpate-control: a model rendered on a device in real time. The exit codes stand in --help.
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <exception>
 #include <filesystem>
@@ -143,7 +144,10 @@ int run(const Options& options) {
     }
     std::cerr << options.model << ": " << file.model.parameters().weight.size() << " wavelets, "
               << describe(scheme) << "; " << bench.device.id << " (simulated: nothing moves) at "
-              << readable(options.loop.rate_hz) << " Hz for " << readable(options.loop.duration_s) << " s\n";
+              << readable(options.loop.rate_hz) << " Hz "
+              << (std::isfinite(options.loop.duration_s) ? "for " + readable(options.loop.duration_s) + " s"
+                                                         : "until Ctrl-C")
+              << "\n";
 
     handle_signals();
     LiveView view{settings.loop, units};
