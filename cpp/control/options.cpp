@@ -98,7 +98,7 @@ void add_rendering(CLI::App& app, Options& options) {
     group(app.add_option("--structure", options.structure, "direct, massless, implicit or explicit"))
         ->check(structure_word())
         ->type_name("NAME")
-        ->capture_default_str();
+        ->default_str(std::string(name_of(Scheme{}.structure)));
     group(app.add_flag("--compensated", scheme.compensated, "Take the coupling's spring out of the model"));
     group(app.add_option("--coupling-stiffness", scheme.coupling_stiffness,
                          "K_c, force per position" + scaled(usual.coupling.stiffness, "N*m/rad")))
@@ -138,6 +138,8 @@ void add_guards(CLI::App& app, Options& options) {
               "A position that stands this long out of full motion is an encoder that died, 0 = never"))
         ->check(not_negative())
         ->capture_default_str();
+    group(app.add_flag("--no-energy-tank", options.no_energy_tank,
+                       "Let the rendering give more energy than the model can hold"));
     group(app.add_option("--tolerated-samples", options.loop.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
         ->check(number_between(0, 1e6))
@@ -165,6 +167,11 @@ void add_running(CLI::App& app, Options& options) {
         ->check(number_between(1, 65535));
     app.add_option("--telemetry-hz", options.telemetry_hz, "Lines a second")
         ->check(number_between(0.1, highest_rate_hz))
+        ->capture_default_str();
+    app.add_flag("--uncertified", options.uncertified,
+                 "Render on a USB device without a certificate: nothing proves that it stays stable");
+    app.add_option("--wait-ms", options.wait_ms, "How long to wait for a packet of a USB device")
+        ->check(number_between(0.1, 10'000.0))
         ->capture_default_str();
     app.add_option("--priority", options.real_time.priority, "Of SCHED_FIFO, 0 = ordinary scheduling")
         ->check(number_between(0, 99))

@@ -24,7 +24,7 @@ struct Options {
     std::optional<std::uint16_t> telemetry_port;
     double telemetry_hz = Telemetry::usual_hz;
 
-    std::string structure{structure_names[static_cast<std::size_t>(Scheme{}.structure)]};
+    std::optional<std::string> structure;
     SchemeChoices scheme;  ///< but for the structure, which stands above as a word
 
     std::optional<double> force_limit;
@@ -32,6 +32,10 @@ struct Options {
     double slew_s = GuardSettings{}.slew_s;
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
+    bool no_energy_tank = false;
+
+    bool uncertified = false;
+    double wait_ms = 5.0;
 
     RealTimeOptions real_time;
     std::vector<std::string> faults;

@@ -22,13 +22,7 @@ namespace {
 
 constexpr std::size_t shown_ticks = 8;
 constexpr int calls_a_line = 5;  ///< the live line changes ten times a second
-
-nlohmann::json microseconds(const DurationHistogram& histogram) {
-    return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
-            {"p99_us", 1e-3 * histogram.quantile(0.99)},
-            {"p999_us", 1e-3 * histogram.quantile(0.999)},
-            {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
-}
+constexpr double held_rate_share = 0.99;
 
 nlohmann::json statuses(const LoopReport& loop) {
     nlohmann::json counts = nlohmann::json::object();
@@ -59,6 +53,13 @@ std::string fitting(const std::vector<std::string>& parts) {
 
 }  // namespace
 
+nlohmann::json microseconds(const DurationHistogram& histogram) {
+    return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
+            {"p99_us", 1e-3 * histogram.quantile(0.99)},
+            {"p999_us", 1e-3 * histogram.quantile(0.999)},
+            {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
+}
+
 LiveView::LiveView(const LoopSettings& settings, RecordUnits units)
     : settings_{settings}, units_{std::move(units)}, terminal_{isatty(STDERR_FILENO) == 1} {}
 
@@ -85,7 +86,7 @@ void LiveView::show(const SessionView& view) {
             std::generic_category().message(view.disk_error));
     }
     const double rate = view.progress.rate.rate_hz();
-    const bool is_short = rate > 0.0 && rate < 0.99 * settings_.rate_hz;
+    const bool is_short = rate > 0.0 && rate < held_rate_share * settings_.rate_hz;
     if (is_short && !std::exchange(short_of_rate_, is_short)) {
         say("warning: the loop runs at " + readable(rate) + " Hz, asked for " + readable(settings_.rate_hz) +
             " Hz");
@@ -105,7 +106,7 @@ void LiveView::show(const SessionView& view) {
 }
 
 void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
-                  const std::string& record, bool as_json) {
+                  const std::string& record, const Story& device, bool as_json) {
     const LoopReport& loop = report.loop;
     const RecordingFile& file = outlets.file;
     const std::string ending = ending_text(loop, settings.loop);
@@ -128,6 +129,9 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
                                {"telemetry_sent", outlets.telemetry.sent()},
                                {"telemetry_dropped", outlets.telemetry.dropped()},
                                {"without", report.refused}};
+        if (!device.json.is_null()) {
+            summary["usb"] = device.json;
+        }
         std::cout << summary.dump() << std::endl;
         return;
     }
@@ -138,11 +142,17 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
     }
     std::cout << "ended      " << ending << "\n"
               << "rate       " << readable(loop.timing.rate_hz()) << " Hz of "
-              << readable(settings.loop.rate_hz) << " Hz, " << loop.timing.missed << " deadlines missed\n"
+              << readable(settings.loop.rate_hz) << " Hz"
+              << (loop.timing.rate_hz() < held_rate_share * settings.loop.rate_hz ? ", lower than asked, "
+                                                                                  : ", ")
+              << loop.timing.missed << " deadlines missed\n"
               << "period     " << percentiles(loop.timing.period) << " (the longest gap)\n"
               << "late by    " << percentiles(loop.timing.lateness) << "\n"
               << "ticks      " << counted << "\n"
               << "samples    " << loop.lost_samples << " lost, " << loop.repeated_samples << " repeated\n";
+    for (const auto& [title, text] : device.lines) {
+        std::cout << title << std::string(title.size() < 11 ? 11 - title.size() : 1, ' ') << text << "\n";
+    }
     if (!record.empty()) {
         std::cout << "recorded   " << record << ": " << file.written() << " rows, "
                   << report.lost_records + file.refused() << " lost\n";

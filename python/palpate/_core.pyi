@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'environment_filters', 'explicit_slope_limit', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -248,7 +248,7 @@ class DeviceProfile:
     """
     What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
     """
-    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0) -> None:
+    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -286,9 +286,24 @@ class DeviceProfile:
         [kg or kg*m^2]
         """
     @property
+    def jitter_s(self) -> float:
+        """
+        How much longer than period_s the time between two samples can get [s].
+        """
+    @property
+    def longest_period_s(self) -> float:
+        """
+        period_s + jitter_s: what a certificate has to hold for [s].
+        """
+    @property
     def period_s(self) -> float:
         """
-        Longest time between two samples [s].
+        T, time between two samples [s].
+        """
+    @property
+    def position_unit(self) -> str:
+        """
+        rad, and forces are in N*m; or m, and they are in N.
         """
     @property
     def viscous_damping(self) -> float:
@@ -367,6 +382,152 @@ class Scheme:
     @property
     def structure(self) -> str:
         ...
+class ForceBounds:
+    """
+    Proved bounds of a force over every position that can be reached, continuations included.
+    
+    With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h / r more while it sticks.
+    """
+    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
+        ...
+    @property
+    def hysteresis(self) -> bool:
+        ...
+    @property
+    def loss_max(self) -> float:
+        """
+        Largest h.
+        """
+    @property
+    def loss_min(self) -> float:
+        """
+        Smallest h.
+        """
+    @property
+    def loss_per_play(self) -> float:
+        """
+        max h / r
+        """
+    @property
+    def mean_force(self) -> float:
+        """
+        |mean| over a period of a model that repeats.
+        """
+    @property
+    def sliding(self) -> float:
+        """
+        max |f'|, or max(|g'| + |h'|).
+        """
+    @property
+    def slope_max(self) -> float:
+        """
+        Of every path.
+        """
+    @property
+    def slope_min(self) -> float:
+        """
+        Of every path.
+        """
+    @property
+    def steepest(self) -> float:
+        """
+        L = max |f'|, or max(|g'| + |h'| + h / r).
+        """
+class Inequality:
+    """
+    One line of a certificate: left >= right, or left > right where it is strict.
+    """
+    def __init__(self, *, name: str, formula: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, rests_on: str, source: str, strict: bool = False) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def formula(self) -> str:
+        ...
+    @property
+    def holds(self) -> bool:
+        ...
+    @property
+    def left(self) -> float:
+        """
+        What there is.
+        """
+    @property
+    def margin(self) -> float:
+        """
+        left - right
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def rests_on(self) -> str:
+        """
+        proved, linear (the linearised system only) or none (no bound is known beyond).
+        """
+    @property
+    def right(self) -> float:
+        """
+        What is needed.
+        """
+    @property
+    def source(self) -> str:
+        ...
+    @property
+    def strict(self) -> bool:
+        ...
+class Certificate:
+    """
+    What is proved of a model, rendered by a scheme, on a device.
+    """
+    def __init__(self, *, scheme: Scheme, device: DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, why: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        A certificate that stood in a file; nothing of it is to be believed before `check`.
+        """
+    def __repr__(self) -> str:
+        ...
+    def check(self, model: ForceModel) -> None:
+        """
+        Computes everything again; ValueError names the first field that is not what the model gives.
+        """
+    @property
+    def bounds(self) -> ForceBounds:
+        """
+        Of the force that is rendered, compensation included.
+        """
+    @property
+    def certified(self) -> bool:
+        ...
+    @property
+    def device(self) -> DeviceProfile:
+        ...
+    @property
+    def inequalities(self) -> list[Inequality]:
+        ...
+    @property
+    def longest_period_s(self) -> float:
+        """
+        Time between two samples up to which every inequality holds [s]; 0 where one does not.
+        """
+    @property
+    def model(self) -> str:
+        """
+        Fingerprint of the model.
+        """
+    @property
+    def refused(self) -> bool:
+        ...
+    @property
+    def scheme(self) -> Scheme:
+        ...
+    @property
+    def verdict(self) -> str:
+        ...
+    @property
+    def why(self) -> str:
+        """
+        One sentence.
+        """
 class Bench:
     """
     A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
@@ -414,6 +575,23 @@ def bench_for(model: ForceModel, is_angle: bool, period_s: typing.SupportsFloat 
     for any other unit it is the same knob as a scale model: lengths and forces are multiplied so
     that travel and largest force stand to the device as in the knob's own scene.
     """
+def certify(model: ForceModel, scheme: Scheme, device: DeviceProfile) -> Certificate:
+    """
+    What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason;
+    ValueError where scheme or device is impossible.
+    """
+def certify_bounds(bounds: ForceBounds, scheme: Scheme, device: DeviceProfile) -> Certificate:
+    """
+    The same for any force within bounds.
+    """
+def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
+    """
+    Device damping over the longest period that a coupling of K_c and B_c needs for any passive object.
+    """
+def device_difference(certified: DeviceProfile, device: DeviceProfile) -> str:
+    """
+    The first field in which a device is not the certified one, as a sentence; empty where it is.
+    """
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
     The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
@@ -422,6 +600,14 @@ def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing
     """
     Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
     driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.
+    """
+def fingerprint(model: ForceModel) -> str:
+    """
+    16 hexadecimal digits that change with every number of which the model's force is made.
+    """
+def force_bounds(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ForceBounds:
+    """
+    Proved bounds of a model of one position; play_radius in place of its own where above 0.
     """
 def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
@@ -506,9 +692,10 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
     """
 __version__: str = '0.1.0'
+longest_delay_samples: int = 16
 paper_sample_time_s: float = 0.001
 status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start'}
-structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit')
+structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')
 usual_telemetry_hz: float = 50.0
 wavelet_curvature_bound: float = 3.0
 wavelet_jerk_bound: float = 5.7831

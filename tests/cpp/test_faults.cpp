@@ -105,8 +105,7 @@ Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingF
                          run.observed};
         EXPECT_TRUE(device.open());
         Controller controller{device, std::move(structure),
-                              Guards{force_limit(run.guards), slew_limit(run.guards, period_s),
-                                     force_ramp(run.guards, period_s), reading_guard(run.guards, period_s)}};
+                              guards_of(run.guards, model, bench.scheme(model), period_s)};
         VirtualClock clock;
         Collected sink;
         sink.file = file;

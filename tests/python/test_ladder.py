@@ -194,7 +194,7 @@ def test_the_result_does_not_depend_on_units() -> None:
 @pytest.mark.parametrize(
     ("positions", "force", "told"),
     [
-        (np.full(20, 0.3), np.arange(20.0), "all positions are 0.3"),
+        (np.full(20, 0.3), np.arange(20.0), "every position is 0.3"),
         (np.arange(9.0), np.arange(9.0), "9 rows; 10 or more"),
         (np.repeat([0.0, 1.0], 10), np.arange(20.0), "2 distinct values; 3 or more"),
         (np.append(np.arange(19.0), np.nan), np.arange(20.0), "position in row 19 is"),
@@ -237,7 +237,7 @@ def test_named_inputs_decide_the_rung() -> None:
         ({"frame_scale": 1.0}, "frame_scale is 1.0"),
         ({"coupling_stiffness": -5.0}, "coupling_stiffness is -5.0"),
         ({"slope_bounds": (3.0, 1.0)}, r"slope_bounds is \(3.0, 1.0\)"),
-        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allows no more than 90"),
+        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allow no more than 90"),
         ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
         ({"period": float("nan")}, "period is nan"),
     ],

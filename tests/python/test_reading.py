@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate import read_recording
+from palpate import InputError, read_recording
 from small_files import HEADER, Write, refusal, rows, timed
 
 
@@ -173,3 +173,15 @@ def test_numbers_are_read_to_the_last_bit(csv_file: Write) -> None:
     exact = random.normal(size=2000) * 10.0 ** random.integers(-100, 100, 2000)
     recording = read_recording(csv_file("depth_m,force_N", [f"{x!r},{x!r}" for x in exact.tolist()]))
     np.testing.assert_array_equal(recording.force, exact)
+
+
+def test_the_force_of_rows_that_touch_nothing_is_taken_off(csv_file: Write) -> None:
+    path = csv_file(
+        "depth_mm,force_N", [f"{0.1 * k:.1f},{0.25 + max(0.0, 0.1 * k - 1.0):.6f}" for k in range(30)]
+    )
+    recording = read_recording(path, zero=(0, 10), rows=(2, None))
+    assert recording.force[:8] == pytest.approx(np.zeros(8))
+    assert recording.force[-1] == pytest.approx(1.9)
+    assert "0.25 N, the mean force of rows 0 to 9, is taken off" in recording.notes
+    with pytest.raises(InputError, match="--zero 0:2 holds none of the rows that are used"):
+        read_recording(path, zero=(0, 2), rows=(2, None))

@@ -64,6 +64,10 @@ struct Bench {
         guards.largest_speed *= length;
         guards.frozen_speed =
             std::max(guards.frozen_speed * length, 3.0 * device.encoder_step / device.period_s);
+        guards.buzz_force *= length * stiffness;
+        guards.device_damping = device.viscous_damping;
+        guards.device_friction = device.coulomb_friction;
+        guards.encoder_step = device.encoder_step;
         return guards;
     }
 };
@@ -148,6 +152,7 @@ namespace detail {
         bench.length = (model.domain().upper[0] - model.domain().lower[0]) / knob_travel;
         bench.stiffness = force / bench.length;
         bench.device.id += ", scaled";
+        bench.device.position_unit = "m";
         bench.device.inertia *= bench.stiffness;
         bench.device.viscous_damping *= bench.stiffness;
         bench.device.coulomb_friction *= force;

@@ -64,6 +64,7 @@ struct LoopProgress {
     std::atomic<std::uint64_t> missed{0};
     std::atomic<double> position{0.0};
     std::atomic<double> force{0.0};
+    std::atomic<double> object_force{0.0};  ///< of a real object against the handle
     RateCheck rate;
 };
 
@@ -75,6 +76,8 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
+    double least_energy = 0.0;  ///< the least that the rendering had taken in at any time [J]
+    std::uint64_t buzzes = 0;   ///< each made the object softer
 };
 
 [[nodiscard]] inline TickRecord record_of(const Tick& tick, const Wake& wake, Nanoseconds first) noexcept {
@@ -83,6 +86,7 @@ struct LoopReport {
     record.position = tick.reading.position;
     record.force = tick.command.force;
     record.applied = tick.reading.applied;
+    record.measured = tick.reading.measured;
     record.environment_position = tick.rendered.environment_position;
     record.velocity = tick.reading.velocity;
     record.device_time = tick.reading.device_time;
@@ -126,7 +130,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         const Wake wake = clock.wait();
         report.timing.add(wake);
         const Tick tick = controller.tick();
-        sink.push(record_of(tick, wake, report.timing.first));
+        const TickRecord record = record_of(tick, wake, report.timing.first);
+        sink.push(record);
         report.status = tick.status;
         ++report.ticks_by_status[static_cast<std::size_t>(tick.status)];
         bad_in_a_row = sends_force(tick.status) ? 0 : bad_in_a_row + 1;
@@ -135,6 +140,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         progress.missed.store(report.timing.missed, std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
         progress.force.store(tick.command.force, std::memory_order_relaxed);
+        progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);
         if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.ending)) {
@@ -153,6 +159,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
+    report.least_energy = controller.guards().observer.least();
+    report.buzzes = controller.guards().buzz.buzzes();
 }
 
 }  // namespace palpate

@@ -64,7 +64,7 @@ namespace palpate {
         text +=
             ", K_c = " + readable(scheme.coupling.stiffness) + ", B_c = " + readable(scheme.coupling.damping);
     }
-    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+    if (has_mass(scheme.structure)) {
         text += ", m = " + readable(scheme.inertia.mass) + ", B_o = " + readable(scheme.inertia.damping);
     }
     if (scheme.play_radius > 0.0) {
@@ -73,22 +73,29 @@ namespace palpate {
     return text;
 }
 
-/// The head of a flight record from a simulated device.
-[[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const std::string& model,
-                                              const Scheme& scheme, const Bench& bench,
+/// What a flight record says of a simulated device.
+[[nodiscard]] inline Metadata simulated_metadata(const Bench& bench) {
+    return {{"simulated", "yes: device and hand; nothing here was measured"},
+            {"device", bench.device.id},
+            {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
+                         ", to a point between " + readable(bench.hand.lower) + " and " +
+                         readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"}};
+}
+
+/// The head of a flight record.
+[[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const Metadata& device,
+                                              const std::string& model, const Scheme& scheme,
                                               const GuardSettings& guards, double rate_hz) {
-    return {
-        {"created_by", created_by},
-        {"simulated", "yes: device and hand; nothing here was measured"},
-        {"model", model},
-        {"structure", describe(scheme)},
-        {"device", bench.device.id},
-        {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
-                     ", to a point between " + readable(bench.hand.lower) + " and " +
-                     readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"},
-        {"guards", "force limit " + readable(guards.force_limit) + ", slew from nothing to the limit in " +
-                       readable(guards.slew_s) + " s, ramp " + readable(guards.ramp_s) + " s"},
-        {"rate_hz", readable(rate_hz)}};
+    Metadata metadata{{"created_by", created_by}};
+    metadata.insert(metadata.end(), device.begin(), device.end());
+    metadata.insert(
+        metadata.end(),
+        {{"model", model},
+         {"structure", describe(scheme)},
+         {"guards", "force limit " + readable(guards.force_limit) + ", slew from nothing to the limit in " +
+                        readable(guards.slew_s) + " s, ramp " + readable(guards.ramp_s) + " s"},
+         {"rate_hz", readable(rate_hz)}});
+    return metadata;
 }
 
 /// Writes how it ended into the recording and gives the file its name; `name` becomes the one that it has. Returns
