@@ -157,11 +157,12 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
     assert not frames(trace)[-1].enabled
 
 
-# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is
-# zero: the packet that shows it, the next one that carries zero, the frame in which it acts; or the
-# watchdog's 10 ms.
+# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is zero:
+# the packet that shows it, the next one that carries zero, the frame in which it acts, and up to four packets that
+# the host may be behind (in lock-step it does not catch up by itself, as it does by the clock); or the watchdog.
 WATCHDOG = 14
-PACKET = 6
+PACKET = 10
+UNSOUND = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
 FAULTS: dict[str, tuple[int, bool, int]] = {
     "stall-in": (1, False, WATCHDOG),
     "stall-out": (1, False, PACKET),
@@ -198,18 +199,22 @@ def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_pa
         at, script = 260, []
         for kind in kinds:
             script.append((kind, at))
-            at += generator.randrange(50, 90)
+            at += generator.randrange(40, 70)
         where = f"seed {seed}, run {run}: {script}"
         faults = [word for kind, frame in script for word in ("--fault", f"{kind}@{frame}x{FAULTS[kind][0]}")]
         record, trace = tmp_path / f"felt{run}.csv", tmp_path / "trace.csv"
         answer = uncertified(
-            "--duration-s", 1.2, "--record", record, "--json", device=[*faults, "--trace", str(trace)]
+            "--duration-s", 0.9, "--record", record, "--json", device=[*faults, "--trace", str(trace)]
         )
         ends = kinds[-1] in final
         assert answer.returncode == int(ends), f"{where}\n{answer.stderr}"
         summary = json.loads(answer.stdout)
         assert rows(record) == summary["ticks"], where
         assert summary["lost_records"] == 0, where
+        for row in record.read_text(encoding="utf-8").splitlines():
+            cells = row.split(",")
+            if cells[-1] in UNSOUND:
+                assert float(cells[2]) == 0.0, where  # in the tick that saw it
         felt = frames(trace)
         by_start = {frame.started: index for index, frame in enumerate(felt)}
         for kind, frame in script:

@@ -71,6 +71,9 @@ class Emulation {
         }
         changed_.notify_all();
         frames.join();
+        if (trace_.is_open() && !places_.empty()) {
+            trace_ << places_.back()->node->port().device().trace_row();  // how the command left it
+        }
         ::shutdown(orders_, SHUT_RDWR);
         obeying.join();
         ::close(orders_);
