@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the benchmarks of one run say about each claim: python bench/ratios.py build/bench
 
-Times are medians over the interleaved repetitions of one run: what the machine did meanwhile happened to
-both sides of a ratio.
+Times are medians over the interleaved repetitions of one run, so that what the machine did meanwhile happened
+to both sides of a ratio.
 """
 
 import json

@@ -29,6 +29,7 @@ for source in bench/*.cpp; do
         exit 1
     fi
 done
+.venv/bin/palpate chart speed build/bench --to build/bench/figures
 .venv/bin/python bench/ratios.py build/bench
 echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."
 

@@ -11,16 +11,25 @@ namespace py = pybind11;
 using namespace py::literals;
 
 void bind_device(py::module_& module) {
+    module.attr("longest_delay_samples") = longest_delay_samples;
     const DeviceProfile profile;
     py::class_<DeviceProfile>(
         module, "DeviceProfile",
         "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.")
         .def(py::init([](std::string id, double period_s, double inertia, double viscous_damping,
                          double coulomb_friction, double encoder_step, double force_step, int delay_samples,
-                         double force_limit) {
-                 DeviceProfile made{std::move(id),   period_s,         inertia,
-                                    viscous_damping, coulomb_friction, encoder_step,
-                                    force_step,      delay_samples,    force_limit};
+                         double force_limit, double jitter_s, std::string position_unit) {
+                 DeviceProfile made{std::move(id),
+                                    period_s,
+                                    inertia,
+                                    viscous_damping,
+                                    coulomb_friction,
+                                    encoder_step,
+                                    force_step,
+                                    delay_samples,
+                                    force_limit,
+                                    jitter_s,
+                                    std::move(position_unit)};
                  validate(made);
                  return made;
              }),
@@ -28,9 +37,10 @@ void bind_device(py::module_& module) {
              "inertia"_a = profile.inertia, "viscous_damping"_a = profile.viscous_damping,
              "coulomb_friction"_a = profile.coulomb_friction, "encoder_step"_a = profile.encoder_step,
              "force_step"_a = profile.force_step, "delay_samples"_a = profile.delay_samples,
-             "force_limit"_a = profile.force_limit)
+             "force_limit"_a = profile.force_limit, "jitter_s"_a = profile.jitter_s,
+             "position_unit"_a = profile.position_unit)
         .def_readonly("id", &DeviceProfile::id)
-        .def_readonly("period_s", &DeviceProfile::period_s, "Longest time between two samples [s].")
+        .def_readonly("period_s", &DeviceProfile::period_s, "T, time between two samples [s].")
         .def_readonly("inertia", &DeviceProfile::inertia, "[kg or kg*m^2]")
         .def_readonly("viscous_damping", &DeviceProfile::viscous_damping, "[N*s/m or N*m*s/rad]")
         .def_readonly("coulomb_friction", &DeviceProfile::coulomb_friction, "[N or N*m]")
@@ -38,6 +48,12 @@ void bind_device(py::module_& module) {
         .def_readonly("force_step", &DeviceProfile::force_step, "[N or N*m]; 0 = not quantised")
         .def_readonly("delay_samples", &DeviceProfile::delay_samples, "Whole samples from command to force.")
         .def_readonly("force_limit", &DeviceProfile::force_limit, "[N or N*m]")
+        .def_readonly("jitter_s", &DeviceProfile::jitter_s,
+                      "How much longer than period_s the time between two samples can get [s].")
+        .def_readonly("position_unit", &DeviceProfile::position_unit,
+                      "rad, and forces are in N*m; or m, and they are in N.")
+        .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,
+                               "period_s + jitter_s: what a certificate has to hold for [s].")
         .def("__repr__", [](const DeviceProfile& p) {
             return "DeviceProfile(id='" + p.id + "', period_s=" + std::to_string(p.period_s) +
                    ", inertia=" + std::to_string(p.inertia) +
@@ -46,7 +62,8 @@ void bind_device(py::module_& module) {
                    ", encoder_step=" + std::to_string(p.encoder_step) +
                    ", force_step=" + std::to_string(p.force_step) +
                    ", delay_samples=" + std::to_string(p.delay_samples) +
-                   ", force_limit=" + std::to_string(p.force_limit) + ")";
+                   ", force_limit=" + std::to_string(p.force_limit) +
+                   ", jitter_s=" + std::to_string(p.jitter_s) + ", position_unit='" + p.position_unit + "')";
         });
 
     const Hand hand;

@@ -76,7 +76,11 @@ void require_period(double period_s) {
 void bind_rendering(py::module_& module) {
     const Scheme scheme;
     const std::string structure{structure_names[static_cast<std::size_t>(scheme.structure)]};
-    module.attr("structure_names") = py::make_tuple("direct", "massless", "implicit", "explicit");
+    py::list names;
+    for (const std::string_view name : structure_names) {
+        names.append(std::string(name));
+    }
+    module.attr("structure_names") = py::tuple(names);
     py::class_<Scheme>(module, "Scheme", "How a model is rendered: the structure and its numbers, SI units.")
         .def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
                          double mass, double damping, bool compensated, double play_radius) {
@@ -101,8 +105,20 @@ void bind_rendering(py::module_& module) {
         .def_readonly("compensated", &Scheme::compensated)
         .def_readonly("play_radius", &Scheme::play_radius)
         .def(
-            "validate", [](const Scheme& s, const ForceModel& model) { validate(s, model); }, "model"_a,
-            "ValueError names the field, its value and what would be right for this model.")
+            "validate",
+            [](const Scheme& s, const ForceModel& model, std::optional<double> period_s) {
+                period_s ? validate(s, model, *period_s) : validate(s, model);
+            },
+            "model"_a, "period_s"_a = py::none(),
+            "ValueError names the field, its value and what would be right for this model; with a period "
+            "also\n"
+            "what is sure to diverge at it.")
+        .def(
+            "steepest_slope",
+            [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
+            "Largest slope of the model that the structure meets, never below 0; h / r is part of it while "
+            "a\n"
+            "hysteresis model sticks.")
         .def("__repr__", [](const Scheme& s) {
             return "Scheme(structure='" +
                    std::string(structure_names[static_cast<std::size_t>(s.structure)]) +
@@ -113,6 +129,17 @@ void bind_rendering(py::module_& module) {
                    ", compensated=" + (s.compensated ? "True" : "False") +
                    ", play_radius=" + std::to_string(s.play_radius) + ")";
         });
+
+    module.def(
+        "explicit_slope_limit",
+        [](const Scheme& s, double period_s, bool coupled) {
+            require_period(period_s);
+            return explicit_slope_limit(s.inertia, coupled ? s.coupling : VirtualCoupling{0.0, 0.0},
+                                        period_s);
+        },
+        "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
+        "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
+        "driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.");
 
     module.def(
         "solver_name",

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "options.hpp"
@@ -16,7 +17,8 @@
 #include "palpate/io/model_file.hpp"
 #include "palpate/session.hpp"
 #include "palpate/session_text.hpp"
-#include "telling.hpp"
+#include "rendering.hpp"
+#include "usb.hpp"
 
 namespace palpate::control {
 
@@ -27,6 +29,12 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it"
 
 void ask_to_stop(int /*signal*/) {
     asked.store(true, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+const std::atomic<bool>& asked_to_stop() {
+    return asked;
 }
 
 /// Ctrl-C and a request to terminate end the loop; a reader that is gone or a file that is full end nothing.
@@ -48,15 +56,12 @@ void refuse(const std::string& sentence) {
 }
 
 Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench) {
-    Scheme scheme = bench.scheme(model);
-    scheme.structure = structure_named(options.structure);
-    scheme.compensated = options.compensated;
-    scheme.coupling.stiffness = options.coupling_stiffness.value_or(scheme.coupling.stiffness);
-    scheme.coupling.damping = options.coupling_damping.value_or(scheme.coupling.damping);
-    scheme.inertia.mass = options.mass.value_or(scheme.inertia.mass);
-    scheme.inertia.damping = options.damping.value_or(scheme.inertia.damping);
-    scheme.play_radius = options.play_radius.value_or(scheme.play_radius);
-    validate(scheme, model);
+    SchemeChoices chosen = options.scheme;
+    if (options.structure) {
+        chosen.structure = structure_named(*options.structure);
+    }
+    const Scheme scheme = bench.scheme(model, chosen);
+    validate(scheme, model, bench.device.period_s);
     return scheme;
 }
 
@@ -67,20 +72,13 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
     guards.slew_s = options.slew_s;
     guards.ramp_s = options.ramp_s;
     guards.frozen_s = options.frozen_s;
+    guards.energy_tank = !options.no_energy_tank;
     validate(guards);
     if (guards.force_limit > bench.device.force_limit) {
         refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +
                readable(bench.device.force_limit));
     }
     return guards;
-}
-
-RecordUnits units_of(const ModelFile& file) {
-    if (file.force_unit == "A") {
-        refuse(
-            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A");
-    }
-    return {file.position_unit, file.force_unit == "N*m" ? "Nm" : file.force_unit};
 }
 
 void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
@@ -106,72 +104,51 @@ void open_outlets(const Options& options, const Metadata& metadata, const Record
     }
 }
 
-int run(const Options& options) {
-    if (options.device.rfind("usb", 0) == 0) {
-        refuse("--device " + options.device + ": this build has no USB device; use --device simulated");
+namespace {
+
+RecordUnits units_of(const ModelFile& file) {
+    if (file.force_unit == "A") {
+        refuse(
+            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A");
     }
-    if (options.device != "simulated") {
-        refuse("--device is '" + options.device + "', must be simulated or usb[:SERIAL]");
-    }
-    const ModelFile file = load_model_file(options.model);
-    const RecordUnits units = units_of(file);
-    if (file.inputs.size() != 1) {
-        refuse(options.model + " has " + std::to_string(file.inputs.size()) +
-               " inputs: a model of the position alone can be rendered");
-    }
+    return {file.position_unit, file.force_unit == "N*m" ? "Nm" : file.force_unit};
+}
+
+int run_on_simulated(const Options& options, ModelFile file, RecordUnits units) {
     const double period_s = 1.0 / options.loop.rate_hz;
     const Bench bench = bench_for(file.model, file.position_unit == "rad", period_s);
     const Scheme scheme = scheme_of(options, file.model, bench);
     const GuardSettings guards = guards_of(options, bench);
-    SessionSettings settings;
-    settings.loop = options.loop;
-    settings.real_time = options.real_time;
-    validate(settings.loop);
+    Job job{std::move(file), std::move(units), scheme, guards, {}};
+    job.settings.loop = options.loop;
+    job.settings.real_time = options.real_time;
+    validate(job.settings.loop);
     std::vector<Fault> faults;
     for (const std::string& fault : options.faults) {
         faults.push_back(parse_fault(fault, period_s));
     }
     Faulty device{SimulatedDevice{bench.device, bench.hand, simulated_substeps(period_s)}, faults,
                   3.0 * guards.largest_speed * period_s};
-
-    const Metadata metadata = flight_metadata(std::string("palpate-control ") + PALPATE_VERSION,
-                                              options.model, scheme, bench, guards, options.loop.rate_hz);
-    Outlets outlets;
     if (const Opened opened = device.open(); !opened) {
         refuse(opened.reason);
     }
-    try {
-        open_outlets(options, metadata, units, outlets);
-    } catch (...) {
-        device.close();
-        throw;
-    }
-    std::cerr << options.model << ": " << file.model.parameters().weight.size() << " wavelets, "
-              << describe(scheme) << "; " << bench.device.id << " (simulated: nothing moves) at "
-              << readable(options.loop.rate_hz) << " Hz for " << readable(options.loop.duration_s) << " s\n";
+    return render_on(device, bench.device.id + " (simulated: nothing moves)", options, job,
+                     simulated_metadata(bench), [] { return Story{}; });
+}
 
-    handle_signals();
-    LiveView view{settings.loop, units};
-    const SessionReport report = render_live(file.model, scheme, device, guards, settings, outlets, asked,
-                                             [&](const SessionView& now) { view.show(now); });
-    view.end();
-
-    std::string record = options.record;
-    if (!record.empty()) {
-        for (const std::string& warning : finish_record(outlets.file, report, settings.loop, record)) {
-            std::cerr << "warning: " << warning << "\n";
-        }
+int run(const Options& options) {
+    const std::string kind = options.device.substr(0, options.device.find(':'));
+    const bool has_serial = options.device.size() > kind.size() + 1;
+    if (options.device != "simulated" && options.device != "usb" && !(kind == "usb" && has_serial)) {
+        refuse("--device is '" + options.device + "', must be simulated or usb[:SERIAL]");
     }
-    if (!is_orderly(report.loop.ending)) {
-        std::cerr << "error: " << ending_text(report.loop, settings.loop)
-                  << "; zero force sent, device closed\n";
-        tell_last_ticks(report, units);
-        if (!options.record.empty()) {
-            std::cerr << write_last_ticks(options.record, units, metadata, report, settings.loop) << "\n";
-        }
+    ModelFile file = load_model_file(options.model);
+    const RecordUnits units = units_of(file);
+    if (file.inputs.size() != 1) {
+        refuse(options.model + " has " + std::to_string(file.inputs.size()) +
+               " inputs: a model of the position alone can be rendered");
     }
-    tell_summary(report, settings, outlets, record, options.as_json);
-    return is_orderly(report.loop.ending) ? 0 : 1;
+    return (kind == "usb" ? run_on_usb : run_on_simulated)(options, std::move(file), units);
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "palpate/bench.hpp"
 #include "palpate/guard/guard_settings.hpp"
+#include "palpate/io/telemetry.hpp"
 #include "palpate/loop.hpp"
 #include "palpate/realtime/privileges.hpp"
 #include "palpate/rendering/scheme.hpp"
@@ -20,21 +22,20 @@ struct Options {
     LoopSettings loop;
     std::string record;
     std::optional<std::uint16_t> telemetry_port;
-    double telemetry_hz = 50.0;
+    double telemetry_hz = Telemetry::usual_hz;
 
-    std::string structure{structure_names[static_cast<std::size_t>(Scheme{}.structure)]};
-    bool compensated = false;
-    std::optional<double> coupling_stiffness;
-    std::optional<double> coupling_damping;
-    std::optional<double> mass;
-    std::optional<double> damping;
-    std::optional<double> play_radius;
+    std::optional<std::string> structure;
+    SchemeChoices scheme;  ///< but for the structure, which stands above as a word
 
     std::optional<double> force_limit;
     std::optional<double> largest_speed;
     double slew_s = GuardSettings{}.slew_s;
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
+    bool no_energy_tank = false;
+
+    bool uncertified = false;
+    double wait_ms = 5.0;
 
     RealTimeOptions real_time;
     std::vector<std::string> faults;

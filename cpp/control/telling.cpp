@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "telling.hpp"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <iostream>
+#include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -18,13 +22,7 @@ namespace {
 
 constexpr std::size_t shown_ticks = 8;
 constexpr int calls_a_line = 5;  ///< the live line changes ten times a second
-
-nlohmann::json microseconds(const DurationHistogram& histogram) {
-    return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
-            {"p99_us", 1e-3 * histogram.quantile(0.99)},
-            {"p999_us", 1e-3 * histogram.quantile(0.999)},
-            {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
-}
+constexpr double held_rate_share = 0.99;
 
 nlohmann::json statuses(const LoopReport& loop) {
     nlohmann::json counts = nlohmann::json::object();
@@ -36,7 +34,31 @@ nlohmann::json statuses(const LoopReport& loop) {
     return counts;
 }
 
+/// As many of the parts as fit on one line of the terminal: a longer one would leave its first half behind.
+std::string fitting(const std::vector<std::string>& parts) {
+    constexpr std::size_t usual_columns = 80;
+    winsize size{};
+    const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+    const std::size_t columns = known ? size.ws_col : usual_columns;
+    std::string line;
+    for (const std::string& part : parts) {
+        const std::string more = (line.empty() ? "" : "  ") + part;
+        if (line.size() + more.size() >= columns) {
+            break;
+        }
+        line += more;
+    }
+    return line;
+}
+
 }  // namespace
+
+nlohmann::json microseconds(const DurationHistogram& histogram) {
+    return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
+            {"p99_us", 1e-3 * histogram.quantile(0.99)},
+            {"p999_us", 1e-3 * histogram.quantile(0.999)},
+            {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
+}
 
 LiveView::LiveView(const LoopSettings& settings, RecordUnits units)
     : settings_{settings}, units_{std::move(units)}, terminal_{isatty(STDERR_FILENO) == 1} {}
@@ -64,7 +86,7 @@ void LiveView::show(const SessionView& view) {
             std::generic_category().message(view.disk_error));
     }
     const double rate = view.progress.rate.rate_hz();
-    const bool is_short = rate > 0.0 && rate < 0.99 * settings_.rate_hz;
+    const bool is_short = rate > 0.0 && rate < held_rate_share * settings_.rate_hz;
     if (is_short && !std::exchange(short_of_rate_, is_short)) {
         say("warning: the loop runs at " + readable(rate) + " Hz, asked for " + readable(settings_.rate_hz) +
             " Hz");
@@ -73,16 +95,18 @@ void LiveView::show(const SessionView& view) {
     if (terminal_ && ++calls_ % calls_a_line == 0) {
         const auto ticks = view.progress.ticks.load(std::memory_order_relaxed);
         const auto missed = view.progress.missed.load(std::memory_order_relaxed);
-        std::cerr << "\r\033[K" << readable(static_cast<double>(ticks + missed) / settings_.rate_hz) << " s  "
-                  << readable(rate) << " Hz  position " << readable(view.progress.position.load()) << " "
-                  << units_.position << "  force " << readable(view.progress.force.load()) << " "
-                  << units_.force << "  missed " << missed << std::flush;
+        const std::string line =
+            fitting({readable(static_cast<double>(ticks + missed) / settings_.rate_hz) + " s",
+                     readable(view.progress.position.load(std::memory_order_relaxed)) + " " + units_.position,
+                     readable(view.progress.force.load(std::memory_order_relaxed)) + " " + units_.force,
+                     readable(rate) + " Hz", "missed " + std::to_string(missed)});
+        std::cerr << "\r\033[K" << line << std::flush;
         line_is_open_ = true;
     }
 }
 
 void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
-                  const std::string& record, bool as_json) {
+                  const std::string& record, const Story& device, bool as_json) {
     const LoopReport& loop = report.loop;
     const RecordingFile& file = outlets.file;
     const std::string ending = ending_text(loop, settings.loop);
@@ -105,6 +129,9 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
                                {"telemetry_sent", outlets.telemetry.sent()},
                                {"telemetry_dropped", outlets.telemetry.dropped()},
                                {"without", report.refused}};
+        if (!device.json.is_null()) {
+            summary["usb"] = device.json;
+        }
         std::cout << summary.dump() << std::endl;
         return;
     }
@@ -115,11 +142,17 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
     }
     std::cout << "ended      " << ending << "\n"
               << "rate       " << readable(loop.timing.rate_hz()) << " Hz of "
-              << readable(settings.loop.rate_hz) << " Hz, " << loop.timing.missed << " deadlines missed\n"
+              << readable(settings.loop.rate_hz) << " Hz"
+              << (loop.timing.rate_hz() < held_rate_share * settings.loop.rate_hz ? ", lower than asked, "
+                                                                                  : ", ")
+              << loop.timing.missed << " deadlines missed\n"
               << "period     " << percentiles(loop.timing.period) << " (the longest gap)\n"
               << "late by    " << percentiles(loop.timing.lateness) << "\n"
               << "ticks      " << counted << "\n"
               << "samples    " << loop.lost_samples << " lost, " << loop.repeated_samples << " repeated\n";
+    for (const auto& [title, text] : device.lines) {
+        std::cout << title << std::string(title.size() < 11 ? 11 - title.size() : 1, ' ') << text << "\n";
+    }
     if (!record.empty()) {
         std::cout << "recorded   " << record << ": " << file.written() << " rows, "
                   << report.lost_records + file.refused() << " lost\n";

@@ -2,6 +2,10 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "palpate/io/outlets.hpp"
 #include "palpate/session.hpp"
@@ -29,9 +33,17 @@ class LiveView {
     int calls_ = 0;
 };
 
+/// What a device adds to the summary: lines of a title and a text, and the same as JSON.
+struct Story {
+    std::vector<std::pair<std::string, std::string>> lines;
+    nlohmann::json json;
+};
+
+[[nodiscard]] nlohmann::json microseconds(const DurationHistogram& histogram);
+
 /// The summary on standard output, as lines or as one JSON object.
 void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
-                  const std::string& record, bool as_json);
+                  const std::string& record, const Story& device, bool as_json);
 
 /// The last ticks before a fault, on standard error.
 void tell_last_ticks(const SessionReport& report, const RecordUnits& units);

@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['DeviceProfile', 'EnvironmentFilters', 'ForceModel', 'Hand', 'Scheme', 'Status', 'TransferFunction', 'environment_filters', 'force_driven', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -33,7 +33,14 @@ class Status:
       Jump : the position moved farther in one sample than the device can; the force sent is zero
     
       Frozen : the position stood still at once out of full motion; the force sent is zero
+    
+      Ramp : the force is still on its way up from zero after the start
+    
+      Drained : the rendering had given all the energy it may; a force that gives more was scaled down
+    
+      Softened : the handle buzzed; all forces are scaled down from then on
     """
+    Drained: typing.ClassVar[Status]
     Fault: typing.ClassVar[Status]
     Frozen: typing.ClassVar[Status]
     Jump: typing.ClassVar[Status]
@@ -43,6 +50,8 @@ class Status:
     NonFinite: typing.ClassVar[Status]
     NotUnique: typing.ClassVar[Status]
     Ok: typing.ClassVar[Status]
+    Ramp: typing.ClassVar[Status]
+    Softened: typing.ClassVar[Status]
     Timeout: typing.ClassVar[Status]
     __members__: typing.ClassVar[dict[str, Status]]
     @typing.overload
@@ -245,7 +254,7 @@ class DeviceProfile:
     """
     What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
     """
-    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0) -> None:
+    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
         ...
     def __repr__(self) -> str:
         ...
@@ -283,9 +292,24 @@ class DeviceProfile:
         [kg or kg*m^2]
         """
     @property
+    def jitter_s(self) -> float:
+        """
+        How much longer than period_s the time between two samples can get [s].
+        """
+    @property
+    def longest_period_s(self) -> float:
+        """
+        period_s + jitter_s: what a certificate has to hold for [s].
+        """
+    @property
     def period_s(self) -> float:
         """
-        Longest time between two samples [s].
+        T, time between two samples [s].
+        """
+    @property
+    def position_unit(self) -> str:
+        """
+        rad, and forces are in N*m; or m, and they are in N.
         """
     @property
     def viscous_damping(self) -> float:
@@ -333,9 +357,15 @@ class Scheme:
         ...
     def __repr__(self) -> str:
         ...
-    def validate(self, model: ForceModel) -> None:
+    def steepest_slope(self, model: ForceModel) -> float:
         """
-        ValueError names the field, its value and what would be right for this model.
+        Largest slope of the model that the structure meets, never below 0; h / r is part of it while a
+        hysteresis model sticks.
+        """
+    def validate(self, model: ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        """
+        ValueError names the field, its value and what would be right for this model; with a period also
+        what is sure to diverge at it.
         """
     @property
     def compensated(self) -> bool:
@@ -358,14 +388,255 @@ class Scheme:
     @property
     def structure(self) -> str:
         ...
+class ForceBounds:
+    """
+    Proved bounds of a force over every position that can be reached, continuations included.
+    
+    With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h / r more while it sticks.
+    """
+    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
+        ...
+    @property
+    def hysteresis(self) -> bool:
+        ...
+    @property
+    def loss_max(self) -> float:
+        """
+        Largest h.
+        """
+    @property
+    def loss_min(self) -> float:
+        """
+        Smallest h.
+        """
+    @property
+    def loss_per_play(self) -> float:
+        """
+        max h / r
+        """
+    @property
+    def mean_force(self) -> float:
+        """
+        |mean| over a period of a model that repeats.
+        """
+    @property
+    def sliding(self) -> float:
+        """
+        max |f'|, or max(|g'| + |h'|).
+        """
+    @property
+    def slope_max(self) -> float:
+        """
+        Of every path.
+        """
+    @property
+    def slope_min(self) -> float:
+        """
+        Of every path.
+        """
+    @property
+    def steepest(self) -> float:
+        """
+        L = max |f'|, or max(|g'| + |h'| + h / r).
+        """
+class Inequality:
+    """
+    One line of a certificate: left >= right, or left > right where it is strict.
+    """
+    def __init__(self, *, name: str, formula: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, rests_on: str, source: str, strict: bool = False) -> None:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def formula(self) -> str:
+        ...
+    @property
+    def holds(self) -> bool:
+        ...
+    @property
+    def left(self) -> float:
+        """
+        What there is.
+        """
+    @property
+    def margin(self) -> float:
+        """
+        left - right
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def rests_on(self) -> str:
+        """
+        proved, linear (the linearised system only) or none (no bound is known beyond).
+        """
+    @property
+    def right(self) -> float:
+        """
+        What is needed.
+        """
+    @property
+    def source(self) -> str:
+        ...
+    @property
+    def strict(self) -> bool:
+        ...
+class Certificate:
+    """
+    What is proved of a model, rendered by a scheme, on a device.
+    """
+    def __init__(self, *, scheme: Scheme, device: DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, why: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        A certificate that stood in a file; nothing of it is to be believed before `check`.
+        """
+    def __repr__(self) -> str:
+        ...
+    def check(self, model: ForceModel) -> None:
+        """
+        Computes everything again; ValueError names the first field that is not what the model gives.
+        """
+    @property
+    def bounds(self) -> ForceBounds:
+        """
+        Of the force that is rendered, compensation included.
+        """
+    @property
+    def certified(self) -> bool:
+        ...
+    @property
+    def device(self) -> DeviceProfile:
+        ...
+    @property
+    def inequalities(self) -> list[Inequality]:
+        ...
+    @property
+    def longest_period_s(self) -> float:
+        """
+        Time between two samples up to which every inequality holds [s]; 0 where one does not.
+        """
+    @property
+    def model(self) -> str:
+        """
+        Fingerprint of the model.
+        """
+    @property
+    def refused(self) -> bool:
+        ...
+    @property
+    def scheme(self) -> Scheme:
+        ...
+    @property
+    def verdict(self) -> str:
+        ...
+    @property
+    def why(self) -> str:
+        """
+        One sentence.
+        """
+class Bench:
+    """
+    A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
+    """
+    def __repr__(self) -> str:
+        ...
+    def scheme(self, model: ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Scheme:
+        """
+        What is given, in the model's own units; what is None follows the model in this bench's scale.
+        """
+    @property
+    def device(self) -> DeviceProfile:
+        ...
+    @property
+    def hand(self) -> Hand:
+        ...
+    @property
+    def length(self) -> float:
+        """
+        Positions, over those of the default knob.
+        """
+    @property
+    def stiffness(self) -> float:
+        """
+        Force per position, over that of the default knob.
+        """
+class LoopSettings:
+    """
+    When a rendering ticks, and when it ends: the defaults.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def duration_s(self) -> float:
+        ...
+    @property
+    def lowest_rate_share(self) -> float:
+        ...
+    @property
+    def rate_hz(self) -> float:
+        ...
+def bench_for(model: ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Bench:
+    """
+    The bench on which a model of one position is tried. An angle is tried on the default knob;
+    for any other unit it is the same knob as a scale model: lengths and forces are multiplied so
+    that travel and largest force stand to the device as in the knob's own scene.
+    """
+def certify(model: ForceModel, scheme: Scheme, device: DeviceProfile) -> Certificate:
+    """
+    What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason;
+    ValueError where scheme or device is impossible.
+    """
+def certify_bounds(bounds: ForceBounds, scheme: Scheme, device: DeviceProfile) -> Certificate:
+    """
+    The same for any force within bounds.
+    """
+def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
+    """
+    Device damping over the longest period that a coupling of K_c and B_c needs for any passive object.
+    """
+def device_difference(certified: DeviceProfile, device: DeviceProfile) -> str:
+    """
+    The first field in which a device is not the certified one, as a sentence; empty where it is.
+    """
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
     The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
+    """
+def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
+    """
+    Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
+    driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.
+    """
+def failure_map(name: str, points: typing.SupportsInt | typing.SupportsIndex = 8) -> dict:
+    """
+    Where a method fails: boundaries measured in simulation, and what theory says of them.
+    
+    By name: along and limit (what the axes hold, with units) and lines, each with its name and the
+    arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known);
+    searched (up to how many times the theory, where none failed) and linear (the limit spans no decades).
+    """
+def fingerprint(model: ForceModel) -> str:
+    """
+    16 hexadecimal digits that change with every number of which the model's force is made.
+    """
+def force_bounds(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ForceBounds:
+    """
+    Proved bounds of a model of one position; play_radius in place of its own where above 0.
     """
 def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
     Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def measure(device: str = 'simulated', *, object: ForceModel | None = None, transducer: bool = True, position_unit: str = 'rad', force_unit: str = 'N*m', probe: bool = False, lower: typing.SupportsFloat | typing.SupportsIndex | None = None, upper: typing.SupportsFloat | typing.SupportsIndex | None = None, speed: typing.SupportsFloat | typing.SupportsIndex | None = None, stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, force_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, push: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', keep: bool = False, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, progress: collections.abc.Callable | None = None) -> dict:
+    """
+    A real object measured in real time; on the simulated device the model `object` is mounted.
+    
+    A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;
+    with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: until
+    Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a
+    second. `record` names the recording, which grows as record.part; with `keep` the summary, returned
+    by name, holds the ticks. ValueError where it is refused before anything moves.
     """
 def mexican_hat(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
@@ -397,12 +668,13 @@ def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radi
     State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
     otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).
     """
-def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1) -> dict:
+def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8) -> dict:
     """
     The model rendered in real time on a simulated device: the loop of palpate-control.
     
     Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the
     recording, which grows as record.part; a `telemetry_port` of this machine gets JSON lines over UDP.
+    A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.
     Returns the summary by name; ValueError where it is refused before anything moves.
     """
 def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
@@ -435,6 +707,10 @@ def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], 
     
     x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.
     """
+def wavelet_curvature_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[numpy.typing.NDArray[numpy.float64]]:
+    """
+    Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).
+    """
 def wavelet_integral_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
     An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).
@@ -449,9 +725,12 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
     """
 __version__: str = '0.1.0'
+failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'solver', 'pole', 'guard')
+longest_delay_samples: int = 16
 paper_sample_time_s: float = 0.001
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero'}
-structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit')
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}
+structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')
+usual_telemetry_hz: float = 50.0
 wavelet_curvature_bound: float = 3.0
 wavelet_jerk_bound: float = 5.7831
 wavelet_slope_bound: float = 1.3801190462

@@ -105,8 +105,7 @@ Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingF
                          run.observed};
         EXPECT_TRUE(device.open());
         Controller controller{device, std::move(structure),
-                              Guards{force_limit(run.guards), slew_limit(run.guards, period_s),
-                                     force_ramp(run.guards, period_s), reading_guard(run.guards, period_s)}};
+                              guards_of(run.guards, model, bench.scheme(model), period_s)};
         VirtualClock clock;
         Collected sink;
         sink.file = file;
@@ -147,7 +146,8 @@ TEST(Faults, ARunWithoutThemIsOrderly) {
     expect_safe(run);
     EXPECT_EQ(run.report->ending, Ending::TimeUp);
     EXPECT_EQ(run.ticks.size(), 2000U);
-    EXPECT_EQ(run.report->ticks_by_status[0], 2000U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ramp)], 20U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ok)], 1980U);
     const auto largest = std::max_element(run.ticks.begin(), run.ticks.end(),
                                           [](const auto& a, const auto& b) { return a.force < b.force; });
     EXPECT_GT(largest->force, 2.0);

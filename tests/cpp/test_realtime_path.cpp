@@ -187,7 +187,8 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
     with_structure(rendered, scheme, 1.0 / settings.rate_hz, [&](auto structure) {
         Sinful<Sin> device{sin};
         EXPECT_TRUE(device.open());
-        Controller controller{device, std::move(structure), Guards{}};
+        Controller controller{device, std::move(structure),
+                              guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
         Outlets outlets;
         using Recorder = FlightRecorder<TickRecord, Outlets>;
         Recorder recorder{outlets, 4096, std::chrono::milliseconds{5}};

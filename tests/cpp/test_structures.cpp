@@ -142,7 +142,8 @@ TEST(ExplicitLimit, BehindTheCouplingTheCouplingCountsToo) {
         }
         return last;
     };
-    const double limit = (4.0 * 0.001 - 2.0 * (0.5 + coupling.damping) * period) / (period * period) - 100.0;
+    const double limit = explicit_slope_limit({0.001, 0.5}, coupling, period);
+    EXPECT_NEAR(limit, 2860.0, 1e-9);
     EXPECT_LT(held(0.99 * limit), 1e-3);
     EXPECT_GT(held(1.01 * limit), 1.0);
 }
@@ -272,6 +273,37 @@ TEST(Scheme, RefusesWhatCannotBeRendered) {
     const ForceModel loose{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
     EXPECT_THROW((void)simulate(loose, {}, {}, {}, 10), std::invalid_argument);
+}
+
+TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
+    Scheme scheme;
+    scheme.structure = StructureKind::Explicit;
+    scheme.inertia = {0.001, 0.5};
+    EXPECT_NO_THROW(validate(scheme, spring_model(2859.0), period));
+    EXPECT_THROW(validate(scheme, spring_model(2861.0), period), std::invalid_argument);
+    EXPECT_NO_THROW(validate(scheme, spring_model(2861.0), 0.5 * period));
+    EXPECT_NO_THROW(validate(scheme, spring_model(2861.0)));
+    scheme.structure = StructureKind::Implicit;
+    EXPECT_NO_THROW(validate(scheme, spring_model(1e6), period));
+
+    // The door of every way to render is closed, not only that of the name.
+    scheme.structure = StructureKind::Explicit;
+    EXPECT_THROW((void)simulate(spring_model(2861.0), scheme, {}, {}, 10), std::invalid_argument);
+    EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, period), std::invalid_argument);
+
+    // While it sticks, h / r is part of the slope.
+    const ForceModel both{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
+    scheme.play_radius = 1e-4;
+    EXPECT_NO_THROW(validate(scheme, both, period));
+    scheme.play_radius = 3e-5;
+    EXPECT_THROW(validate(scheme, both, period), std::invalid_argument);
+
+    // Compensated, 45 N*m/rad behind 50 is 450.
+    scheme = {StructureKind::Explicit, {50.0, 0.0}, {2e-4, 0.15}, true, 0.0};
+    EXPECT_NEAR(steepest_slope(scheme, spring_model(45.0)), 450.0, 1e-9);
+    EXPECT_NO_THROW(validate(scheme, spring_model(40.0), period));
+    EXPECT_THROW(validate(scheme, spring_model(45.0), period), std::invalid_argument);
 }
 
 TEST(Scheme, SlopeBoundsOfAHysteresisModelKnowItsStick) {

@@ -20,33 +20,66 @@ ROOMS = ["recording", "model", "identification", "verification", "planning", "de
 # Leaves may import any room but cli; they are imported by cli and the report only.
 LEAVES = {"plotting", "analysis", "baselines"}
 
-# Folder or file of the headers -> what it may include, besides itself and status.hpp.
+# Folder or file of the headers -> what it may include, besides itself, status.hpp and readable.hpp.
 INCLUDES = {
     "status": set(),
+    "readable": set(),
     "model": set(),
     "dynamics": {"model"},
     "solver": {"dynamics", "model"},
     "rendering": {"solver", "dynamics", "model"},
     "stability": {"rendering", "solver", "dynamics", "model", "device"},
     "guard": {"rendering", "solver", "dynamics", "model"},
-    "device": set(),
+    "device": {"realtime"},
     "realtime": set(),
-    "io": {"model", "device", "realtime"},
-    "bench": {"rendering", "solver", "dynamics", "model", "device", "guard"},
+    "io": {"model", "device", "realtime", "rendering", "stability"},
+    "bench": {"simulation", "rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
+    "measure": {
+        "session",
+        "session_text",
+        "bench",
+        "controller",
+        "guard",
+        "rendering",
+        "model",
+        "device",
+        "io",
+    },
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
+    "closed_loop": {"controller", "guard", "rendering", "solver", "dynamics", "model", "device"},
+    "failure": {
+        "closed_loop",
+        "controller",
+        "guard",
+        "stability",
+        "rendering",
+        "solver",
+        "dynamics",
+        "model",
+        "device",
+    },
     "controller": {"guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
     "simulation": {"controller", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
 
-# Headers that need a library beside the standard one; no other header includes them, palpate.hpp neither.
-LEAF_HEADERS = {"device/usb.hpp", "io/model_file.hpp"}
+# Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
+LEAF_HEADERS = {
+    "device/detail/usb_connection.hpp",
+    "device/detail/usb_transfers.hpp",
+    "device/inverse3.hpp",
+    "device/usb.hpp",
+    "io/json_field.hpp",
+    "io/model_file.hpp",
+    "io/plan_file.hpp",
+}
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
-# in realtime; files and sockets in io.
+# and latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
-    "realtime": {"pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h"},
+    "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
+    | {"linux/futex.h", "sys/syscall.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 
@@ -130,12 +163,13 @@ def test_headers_include_only_what_stands_below_them(path: Path) -> None:
     name = path.relative_to(HEADERS)
     here = name.parts[0].removesuffix(".hpp")
     ours = [include.removeprefix("palpate/") for include in included(path) if include.startswith("palpate/")]
-    assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
+    if name.as_posix() not in LEAF_HEADERS:
+        assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
     if here == "palpate":
         return
     rooms = {include.split("/")[0].removesuffix(".hpp") for include in ours}
     assert here in INCLUDES, f"{here} is not drawn"
-    assert rooms <= {here, "status", *INCLUDES[here]}, f"{name} includes {sorted(rooms)}"
+    assert rooms <= {here, "status", "readable", *INCLUDES[here]}, f"{name} includes {sorted(rooms)}"
 
 
 @pytest.mark.parametrize("path", HEADER_FILES, ids=lambda path: str(path.relative_to(HEADERS)))

@@ -197,7 +197,7 @@ def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None
 
 def test_defaults_and_words_are_those_of_the_core() -> None:
     assert [status.name for status in _core.Status.__members__.values()] == list(_core.status_meanings)
-    assert _core.structure_names == ("direct", "massless", "implicit", "explicit")
+    assert _core.structure_names == ("direct", "massless", "implicit", "explicit", "energy-consistent")
     scheme = _core.Scheme()
     assert (scheme.structure, scheme.mass, scheme.damping) == ("massless", 0.001, 0.5)
     profile = _core.DeviceProfile()

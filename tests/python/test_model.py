@@ -88,6 +88,18 @@ def test_a_saved_model_is_the_same_to_the_last_bit(tmp_path: Path, hysteresis: b
     np.testing.assert_array_equal(again.force(x, **s), model.force(x, **s))
 
 
+PLAN = {
+    "structure": "direct",
+    "solver": None,
+    "coupling": None,
+    "inertia": None,
+    "compensated": False,
+    "play_radius": 2e-4,
+    "refused": ["none"],
+    "loss": {"largest": 0.1, "rms": 0.01},
+}
+
+
 def test_everything_that_a_model_carries_comes_back(tmp_path: Path) -> None:
     step = {"n_wavelets": 0, "rmse": 0.25, "criterion": None, "rung": "linear"}
     model = Model(
@@ -98,8 +110,7 @@ def test_everything_that_a_model_carries_comes_back(tmp_path: Path) -> None:
             mass=0.1,
             damping=0.2,
             slope_bounds=(-1.0, 2.0),
-            plan={"structure": "direct", "deep": [{"a": None}]},
-            certificate={"margin": 0.1},
+            plan=PLAN,
             notes={"who": "bench 3"},
             fit=Fit("hysteresis", "fresh", 0.1, N, 20, [step]),  # type: ignore[list-item]
             data=Source(("a.csv", "b.csv"), "aa bb", 30, {"force": "force_N"}, held_out_every=5),
@@ -114,7 +125,6 @@ def test_everything_that_a_model_carries_comes_back(tmp_path: Path) -> None:
         "damping",
         "slope_bounds",
         "plan",
-        "certificate",
         "below",
     ):
         assert getattr(again, name) == getattr(model, name), name

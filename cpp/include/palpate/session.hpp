@@ -9,11 +9,13 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "palpate/controller.hpp"
 #include "palpate/guard/guard_settings.hpp"
+#include "palpate/guard/guards.hpp"
 #include "palpate/io/outlets.hpp"
 #include "palpate/io/tick_record.hpp"
 #include "palpate/loop.hpp"
@@ -78,13 +80,14 @@ template <class Control, class Watch>
     std::atomic<bool> over{false};
     LastRecords<TickRecord> last{settings.last_ticks};
     const LockedMemory memory;
+    const WakefulCores cores;
     using Recorder = FlightRecorder<TickRecord, Outlets>;
     Recorder recorder{outlets, capacity, settings.hand_over_every};
 
     std::thread loop{[&] {
-        report.refused = become_real_time(settings.real_time, memory);
+        report.refused = become_real_time(settings.real_time, memory, cores);
         asked_for_privileges.store(true, std::memory_order_release);
-        Periodic clock{period};
+        std::conditional_t<Control::paced_by_device, PacedByDevice, Periodic> clock{period};
         detail::LoopSink<Recorder> sink{recorder, last};
         run_loop(controller, settings.loop, clock, asked, sink, progress, *loop_report);
         over.store(true, std::memory_order_release);
@@ -110,10 +113,9 @@ template <Device D, class Watch>
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
+    validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, [&](auto structure) {
-        Controller controller{device, std::move(structure),
-                              Guards{force_limit(guards), slew_limit(guards, period_s),
-                                     force_ramp(guards, period_s), reading_guard(guards, period_s)}};
+        Controller controller{device, std::move(structure), guards_of(guards, model, scheme, period_s)};
         return run_session(controller, settings, outlets, asked, watch);
     });
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <charconv>
 #include <cstddef>
 #include <string>
 #include <system_error>
@@ -13,18 +11,11 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/loop.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/session.hpp"
 
 namespace palpate {
-
-/// A number as a person reads it: four significant digits.
-[[nodiscard]] inline std::string readable(double value) {
-    std::array<char, 32> digits{};
-    const auto end =
-        std::to_chars(digits.data(), digits.data() + digits.size(), value, std::chars_format::general, 4).ptr;
-    return {digits.data(), end};
-}
 
 /// "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us"
 [[nodiscard]] inline std::string percentiles(const DurationHistogram& histogram) {
@@ -57,6 +48,11 @@ namespace palpate {
             return std::string("stopped by a guard: ") + status.word + ", " + status.meaning;
         case Ending::DeviceFault:
             return std::string("stopped by a fault of the device: ") + status.word + ", " + status.meaning;
+        case Ending::NotCertified:
+            return "stopped because a tick came " +
+                   readable(1e-6 * static_cast<double>(report.timing.period.largest())) +
+                   " ms after the one before: the certificate holds up to " +
+                   readable(1e3 * settings.longest_period_s) + " ms";
         case Ending::RateTooLow:
             break;
     }
@@ -73,7 +69,7 @@ namespace palpate {
         text +=
             ", K_c = " + readable(scheme.coupling.stiffness) + ", B_c = " + readable(scheme.coupling.damping);
     }
-    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+    if (has_mass(scheme.structure)) {
         text += ", m = " + readable(scheme.inertia.mass) + ", B_o = " + readable(scheme.inertia.damping);
     }
     if (scheme.play_radius > 0.0) {
@@ -82,22 +78,29 @@ namespace palpate {
     return text;
 }
 
-/// The head of a flight record from a simulated device.
-[[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const std::string& model,
-                                              const Scheme& scheme, const Bench& bench,
+/// What a flight record says of a simulated device.
+[[nodiscard]] inline Metadata simulated_metadata(const Bench& bench) {
+    return {{"simulated", "yes: device and hand; nothing here was measured"},
+            {"device", bench.device.id},
+            {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
+                         ", to a point between " + readable(bench.hand.lower) + " and " +
+                         readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"}};
+}
+
+/// The head of a flight record.
+[[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const Metadata& device,
+                                              const std::string& model, const Scheme& scheme,
                                               const GuardSettings& guards, double rate_hz) {
-    return {
-        {"created_by", created_by},
-        {"simulated", "yes: device and hand; nothing here was measured"},
-        {"model", model},
-        {"structure", describe(scheme)},
-        {"device", bench.device.id},
-        {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
-                     ", to a point between " + readable(bench.hand.lower) + " and " +
-                     readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"},
-        {"guards", "force limit " + readable(guards.force_limit) + ", slew from nothing to the limit in " +
-                       readable(guards.slew_s) + " s, ramp " + readable(guards.ramp_s) + " s"},
-        {"rate_hz", readable(rate_hz)}};
+    Metadata metadata{{"created_by", created_by}};
+    metadata.insert(metadata.end(), device.begin(), device.end());
+    metadata.insert(
+        metadata.end(),
+        {{"model", model},
+         {"structure", describe(scheme)},
+         {"guards", "force limit " + readable(guards.force_limit) + ", slew from nothing to the limit in " +
+                        readable(guards.slew_s) + " s, ramp " + readable(guards.ramp_s) + " s"},
+         {"rate_hz", readable(rate_hz)}});
+    return metadata;
 }
 
 /// Writes how it ended into the recording and gives the file its name; `name` becomes the one that it has. Returns

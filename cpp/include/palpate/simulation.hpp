@@ -33,6 +33,7 @@ struct Trace {
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
                                     int substeps = 20, double start_position = 0.0) {
+    validate(scheme, model, profile.period_s);
     return with_structure(model, scheme, profile.period_s, [&](auto structure) {
         SimulatedDevice device{profile, hand, substeps, start_position};
         (void)device.open();
@@ -61,6 +62,7 @@ struct Trace {
 /// A recorded motion moves the device: what force would have been rendered?
 [[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
                                                          std::span<const double> position, double period_s) {
+    validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, [&](auto&& structure) {
         std::vector<Rendered> rendered;
         rendered.reserve(position.size());

@@ -20,6 +20,9 @@ enum class Status : std::uint8_t {
     Limited,
     Jump,
     Frozen,
+    Ramp,
+    Drained,
+    Softened,
 };
 
 struct StatusText {
@@ -28,7 +31,7 @@ struct StatusText {
 };
 
 /// Word and meaning of every status, in the order of the enumeration.
-inline constexpr std::array<StatusText, 10> status_texts{{
+inline constexpr std::array<StatusText, 13> status_texts{{
     {"Ok", "the step is exact to its tolerance"},
     {"MaxIterations", "the solver used all its evaluations; the position is its best one"},
     {"NotUnique", "the load line meets the environment where it falls faster than the line rises"},
@@ -39,6 +42,9 @@ inline constexpr std::array<StatusText, 10> status_texts{{
     {"Limited", "the force was clipped to the limit of the host or of the device"},
     {"Jump", "the position moved farther in one sample than the device can; the force sent is zero"},
     {"Frozen", "the position stood still at once out of full motion; the force sent is zero"},
+    {"Ramp", "the force is still on its way up from zero after the start"},
+    {"Drained", "the rendering had given all the energy it may; a force that gives more was scaled down"},
+    {"Softened", "the handle buzzed; all forces are scaled down from then on"},
 }};
 
 [[nodiscard]] constexpr const StatusText& text(Status status) noexcept {
@@ -48,7 +54,8 @@ inline constexpr std::array<StatusText, 10> status_texts{{
 /// Whether a tick of this status sends a force. The others send zero.
 [[nodiscard]] constexpr bool sends_force(Status status) noexcept {
     return status == Status::Ok || status == Status::MaxIterations || status == Status::NotUnique ||
-           status == Status::Limited;
+           status == Status::Limited || status == Status::Ramp || status == Status::Drained ||
+           status == Status::Softened;
 }
 
 /// Whether nothing can follow a tick of this status: the device, or what it says, is not to be trusted again.

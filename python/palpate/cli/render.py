@@ -9,11 +9,14 @@ from typing import Any
 
 import click
 
+from .._core import LoopSettings, usual_telemetry_hz
 from .arguments import PATH, json_option
 from .ending import WorkError
 from .output import number, print_json, print_numbers, require_writable, talk
 from .scheme_options import scheme_options
 from .verb import Verb
+
+_LOOP = LoopSettings()
 
 
 @click.command(
@@ -22,8 +25,8 @@ from .verb import Verb
     epilog="Example: palpate render press.json --duration-s 10 --record felt.csv",
 )
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
-@click.option("--rate-hz", type=float, default=1000.0, help="Ticks a second.")
-@click.option("--duration-s", type=float, default=10.0, help="How long; inf: until Ctrl-C.")
+@click.option("--rate-hz", type=float, default=_LOOP.rate_hz, help="Ticks a second.")
+@click.option("--duration-s", type=float, default=_LOOP.duration_s, help="How long; inf: until Ctrl-C.")
 @click.option(
     "--record",
     type=PATH,
@@ -37,7 +40,15 @@ from .verb import Verb
     default=None,
     help="Send JSON lines over UDP to this port of this machine (PlotJuggler: 9870).",
 )
-@click.option("--telemetry-hz", type=click.FloatRange(0.1, 10000), default=50.0, help="Lines a second.")
+@click.option(
+    "--telemetry-hz", type=click.FloatRange(0.1, 10000), default=usual_telemetry_hz, help="Lines a second."
+)
+@click.option(
+    "--lowest-rate-share",
+    type=click.FloatRange(0, 1),
+    default=_LOOP.lowest_rate_share,
+    help="Of the rate: less for half a second ends the run, 0: never.",
+)
 @json_option
 @scheme_options
 def render(
@@ -47,6 +58,7 @@ def render(
     record: Path | None,
     telemetry_port: int | None,
     telemetry_hz: float,
+    lowest_rate_share: float,
     as_json: bool,
     **scheme: Any,
 ) -> None:
@@ -79,6 +91,7 @@ def render(
             model_name=str(model_file),
             telemetry_port=telemetry_port,
             telemetry_hz=telemetry_hz,
+            lowest_rate_share=lowest_rate_share,
         )
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -38,6 +38,7 @@ def checked(content: Any) -> ModelFile:
     _check_network(file)
     _check_domain(file)
     _check_rest(file)
+    _check_plan(file)
     return file
 
 
@@ -73,6 +74,8 @@ def _sentence(error: Any) -> str:
     right = {
         "greater_than": f"> {context.get('gt', 0):g}",
         "greater_than_equal": f">= {context.get('ge', 0):g}",
+        "less_than_equal": f"<= {context.get('le', 0):g}",
+        "bool_type": "true or false",
         "float_type": "a number",
         "int_type": "a whole number",
         "int_from_float": "a whole number",
@@ -160,4 +163,34 @@ def _check_rest(file: ModelFile) -> None:
         )
     _require(
         file.fit.n_wavelets == n, "fit.n_wavelets", file.fit.n_wavelets, f"{n}, the wavelets of the network"
+    )
+
+
+def _check_plan(file: ModelFile) -> None:
+    plan, certificate = file.plan, file.certificate
+    if plan is not None:
+        for name, used in (
+            ("coupling", plan.structure != "direct"),
+            ("inertia", plan.structure not in ("direct", "massless")),
+        ):
+            value = getattr(plan, name)
+            right = f"given: the structure has {name}" if used else f"null: the structure has no {name}"
+            found = None if value is None else value.model_dump()
+            _require((value is not None) == used, f"plan.{name}", found, right)
+    if certificate is None:
+        return
+    if plan is None:
+        raise InputError("certificate is given: must be null, because plan is")
+    _require(
+        certificate.structure == plan.structure,
+        "certificate.structure",
+        certificate.structure,
+        "that of the plan",
+    )
+    unit = certificate.device.position_unit
+    _require(
+        file.units.position in ("", unit),
+        "certificate.device.position_unit",
+        unit,
+        "the unit of the model's position",
     )

@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import InputError
 from ..recording.files import replacing, require_file
 
-_OPENED = ("network", "fit")
+_OPENED = ("network", "fit", "plan", "certificate")
 """Objects whose fields get a line each, as those of the file do."""
 
 
@@ -38,6 +38,7 @@ def _lines(content: dict[str, Any], indent: str) -> str:
     inner = indent + "  "
     fields = []
     for key, value in content.items():
-        text = _lines(value, inner) if key in _OPENED and not indent else json.dumps(value, allow_nan=False)
+        opened = key in _OPENED and not indent and value is not None
+        text = _lines(value, inner) if opened else json.dumps(value, allow_nan=False)
         fields.append(f"{inner}{json.dumps(key)}: {text}")
     return "{\n" + ",\n".join(fields) + f"\n{indent}}}"

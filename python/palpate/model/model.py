@@ -14,6 +14,7 @@ from .._core import ForceModel, __version__
 from .._typing import Float1D
 from ..errors import InputError
 from ..recording import Source
+from .certified import checked_certificate
 from .checks import checked
 from .fit import Fit, PathStep
 from .jsontext import read_json, write_json
@@ -63,7 +64,8 @@ class Model(ForceModel):
     slope_bounds : (min, max), optional
         Of df/dx over the domain; measured when not given (d = 1).
     plan, certificate : mapping, optional
-        How the model is to be rendered, and what was proved of that.
+        How the model is to be rendered, and what was proved of that. A certificate is computed again, and
+        refused where it says anything else.
     notes : mapping, optional
         Anything else worth keeping in the file.
     created_by : str, optional
@@ -136,6 +138,8 @@ class Model(ForceModel):
         self.notes = dict(notes or {})
         self.created_by = created_by or f"palpate {__version__}"
         checked(self.to_dict())
+        if self.plan is not None and self.certificate is not None:
+            checked_certificate(self, self.plan, self.certificate)
 
     @property
     def n_parameters(self) -> int:
@@ -232,8 +236,8 @@ class Model(ForceModel):
             mass=file.mass,
             damping=file.damping,
             slope_bounds=None if bounds is None else (bounds.min, bounds.max),
-            plan=file.plan,
-            certificate=file.certificate,
+            plan=None if file.plan is None else file.plan.model_dump(),
+            certificate=None if file.certificate is None else file.certificate.model_dump(),
             notes=file.notes,
             created_by=file.created_by,
         )

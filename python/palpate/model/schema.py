@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from .._core import longest_delay_samples
+
 VERSION = 1
 """Version of the file format that is read and written."""
 
@@ -107,6 +109,106 @@ class FitRecord(_Part):
     path: list[Step]
 
 
+Structure = Literal["direct", "massless", "implicit", "explicit", "energy-consistent"]
+
+
+class CouplingRecord(_Part):
+    """The spring and damper between device and object."""
+
+    stiffness: Positive
+    damping: NotNegative
+
+
+class InertiaRecord(_Part):
+    """What the object resists motion with besides its force."""
+
+    mass: Positive
+    damping: NotNegative
+
+
+class LossRecord(_Part):
+    """How far the rendered force is from the identified one, by what the device cannot render [force]."""
+
+    largest: NotNegative
+    rms: NotNegative
+
+
+class PlanRecord(_Part):
+    """How the model is rendered."""
+
+    structure: Structure
+    solver: str | None
+    coupling: CouplingRecord | None
+    """Null for the direct structure, which has none"""
+    inertia: InertiaRecord | None
+    """Null for structures without mass"""
+    compensated: bool
+    play_radius: Positive | None
+    """In place of the model's own"""
+    refused: list[str]
+    """Why simpler structures were refused"""
+    loss: LossRecord | None
+    """Null where the model is rendered as it was identified"""
+
+
+class DeviceRecord(_Part):
+    """The device that the certificate is for; SI units."""
+
+    id: str
+    position_unit: Literal["rad", "m"]
+    period_s: Positive
+    jitter_s: NotNegative
+    inertia: Positive
+    viscous_damping: NotNegative
+    coulomb_friction: NotNegative
+    encoder_step: NotNegative
+    force_step: NotNegative
+    delay_samples: Annotated[int, Field(ge=0, le=longest_delay_samples)]
+    force_limit: Positive
+
+
+class BoundsRecord(_Part):
+    """Proved bounds of the rendered force, continuations included."""
+
+    slope_min: Number
+    slope_max: Number
+    steepest: Number
+    sliding: Number
+    loss_min: Number
+    loss_max: Number
+    loss_per_play: Number
+    mean_force: Number
+
+
+class InequalityRecord(_Part):
+    """left >= right, or left > right where it is strict."""
+
+    name: str
+    formula: str
+    left: Number
+    right: Number
+    margin: Number
+    strict: bool
+    holds: bool
+    rests_on: Literal["proved", "linear", "none"]
+    source: str
+
+
+class CertificateRecord(_Part):
+    """What was proved of the plan. It is computed again whenever the file is read."""
+
+    model: str
+    """Fingerprint of the network, domain and continuation"""
+    structure: Structure
+    device: DeviceRecord
+    bounds: BoundsRecord
+    inequalities: list[InequalityRecord]
+    verdict: Literal["certified", "stable (local), passivity not certified", "refused"]
+    why: str
+    longest_period_s: NotNegative
+    """Time between two samples up to which every inequality holds"""
+
+
 class ModelFile(_Part):
     """A model of a force, identified by palpate. SI units."""
 
@@ -126,8 +228,8 @@ class ModelFile(_Part):
     slope_bounds: SlopeBounds | None
     data: Data
     fit: FitRecord
-    plan: dict[str, Any] | None
-    certificate: dict[str, Any] | None
+    plan: PlanRecord | None
+    certificate: CertificateRecord | None
     notes: dict[str, Any] = {}
     """Anything; the only place where keys are free"""
 

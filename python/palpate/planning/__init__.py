@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a model to a force that is rendered: how, on what device, and how far off it is."""
 
-from .bench import Bench, bench_for, sweeping_hand
+from .._core import Bench, Certificate, Inequality, explicit_slope_limit
+from .bench import bench_for
 from .comparison import Comparison, compare_structures
-from .plan import Plan, explicit_slope_limit, play_radius_for
+from .device_profile import EXAMPLES, DeviceProfile
+from .plan import Plan
 from .simulation import ForceError, describe, force_at, force_error, simulate
+from .slope_limit import Loss
 
 __all__ = [
+    "EXAMPLES",
     "Bench",
+    "Certificate",
     "Comparison",
+    "DeviceProfile",
     "ForceError",
+    "Inequality",
+    "Loss",
     "Plan",
     "bench_for",
     "compare_structures",
@@ -17,7 +25,5 @@ __all__ = [
     "explicit_slope_limit",
     "force_at",
     "force_error",
-    "play_radius_for",
     "simulate",
-    "sweeping_hand",
 ]

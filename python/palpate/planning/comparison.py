@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._core import DeviceProfile, Hand, Scheme
+from .._core import Bench, DeviceProfile, Hand, Scheme
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
-from .bench import Bench
 from .plan import Plan
 from .simulation import ForceError, describe, force_error, simulate
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a written recording says which column plays which part, so that it is read back with no option."""
+"""How a written recording says which column plays which part, so that it is read back with no option.
+
+A record of what was rendered names one more role than the reader has options for: "status", the column that
+says of every row whether its force was the model's alone.
+"""
 
 from __future__ import annotations
 

@@ -43,6 +43,7 @@ def read_recording(
     torque_constant: float | None = None,
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
+    zero: tuple[int | None, int | None] | None = None,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
     """Read a recording from CSV or Parquet.
@@ -73,6 +74,9 @@ def read_recording(
         "position", "force" or names of used columns whose sign is to be turned.
     rows : (start, stop), optional
         Half-open range of data rows to use, counted from 0; None for either end leaves it open.
+    zero : (start, stop), optional
+        Half-open range of data rows, counted as `rows`, in which the tool touches nothing: their mean force
+        is taken off all forces.
     invalid : {"refuse", "drop"}
         What to do with a row that has no number where one is needed, an infinite one, or a time that repeats
         or runs backward: refuse the file, naming the row, or drop the row and count it.
@@ -80,7 +84,9 @@ def read_recording(
     Returns
     -------
     Recording
-        SI arrays; its ``notes`` say what was chosen, dropped and noticed.
+        SI arrays; its ``notes`` say what was chosen, dropped and noticed. Of what was rendered live only the
+        rows whose force was the model's alone are kept: not the ramp at the start, nor what a limit clipped
+        or a fault set to zero.
 
     Raises
     ------
@@ -106,8 +112,12 @@ def read_recording(
         unstated=layout.roles.values(),
     )
     numeric = [column for column in (choice.position, choice.force, choice.time, *choice.inputs) if column]
+    status = layout.roles.get("status")
+    if status is not None and status not in table.names:
+        raise InputError(f"{file} has no column {status!r}, which its metadata names as the status")
     cells = table.read(
-        numbers=[column.name for column in numeric], text=[choice.direction] if choice.direction else []
+        numbers=[column.name for column in numeric],
+        text=[name for name in (choice.direction, status) if name is not None],
     )
     stroke = choice.direction
     if (
@@ -125,6 +135,8 @@ def read_recording(
         cells = {name: column[start:stop] for name, column in cells.items()}
 
     check = RowCheck(str(file), table, start, stop - start, drop=invalid == "drop")
+    if status is not None:
+        check.as_modelled(cells[status])
     for column in numeric:
         check.finite(column.name, cells[column.name])
     words = None if stroke is None else check.directions(stroke, cells[stroke])
@@ -148,7 +160,16 @@ def read_recording(
                 f"{choice.force.name}, which is not in A"
             )
         f, force_unit = f * torque_constant, "N*m"
-    _require_enough(file, choice.position, x)
+    if zero is not None:
+        first, last = _row_range(file, zero, total)
+        numbers = np.arange(start, stop)[check.kept]
+        free = (numbers >= first) & (numbers < last)
+        if not free.any():
+            raise InputError(f"{file}: --zero {first}:{last} holds none of the rows that are used")
+        offset = float(np.mean(f[free]))
+        f = f - offset
+        notes.append(f"{offset:.6g} {force_unit}, the mean force of rows {first} to {last - 1}, is taken off")
+    _require_enough(file, choice.position, x, check.notes)
     inputs_si = [_in_si(column, cells) for column in choice.inputs]
     used = {column.name for column in numeric} | {stroke}
     source = Source(
@@ -214,9 +235,10 @@ def _source_columns(choice: Choice, stroke: str | None) -> dict[str, str]:
     return columns | {_si_name(column): column.name for column in choice.inputs}
 
 
-def _require_enough(file: Path, position: Column, x: Float1D) -> None:
+def _require_enough(file: Path, position: Column, x: Float1D, left_out: Sequence[str]) -> None:
     if len(x) < MIN_ROWS:
-        raise InputError(f"{file} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}")
+        told = "".join(f"; {note}" for note in left_out)
+        raise InputError(f"{file} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}{told}")
     distinct = len(np.unique(x))
     if distinct < MIN_POSITIONS:
         plural = "s" * (distinct > 1)

@@ -7,10 +7,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from .._core import Status
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .direction import DIRECTION_WORDS, direction_of
-from .table import Cells, TableFile
+from .table import Cells, Places
 
 
 class RowCheck:
@@ -20,7 +21,7 @@ class RowCheck:
     ----------
     file : str
         The file's name, for the sentences.
-    table : TableFile
+    table : Places
         Where lines and cells are looked up when something is wrong.
     first_row : int
         Data row of the file that the arrays begin with.
@@ -30,10 +31,24 @@ class RowCheck:
         Drop bad rows and count them; else refuse the file at the first one.
     """
 
-    def __init__(self, file: str, table: TableFile, first_row: int, rows: int, drop: bool) -> None:
+    def __init__(self, file: str, table: Places, first_row: int, rows: int, drop: bool) -> None:
         self._file, self._table, self._first_row, self._drop = file, table, first_row, drop
         self.kept: NDArray[np.bool_] = np.ones(rows, dtype=bool)
         self.notes: list[str] = []
+
+    def as_modelled(self, words: Cells) -> None:
+        """Leave out the rows whose status says that the force was not the model's alone: not yet all of it
+        after the start, clipped, zero because of a fault. They are no property of the object.
+        """
+        others = ~np.isin(words, (Status.Ok.name,)) & self.kept
+        if others.any():
+            found, counts = np.unique(words[others].astype(str), return_counts=True)
+            told = ", ".join(f"{count} {word}" for word, count in zip(found, counts, strict=True))
+            count = int(np.count_nonzero(others))
+            self.notes.append(
+                f"{count} row{'s' * (count > 1)} whose force was not the model's alone are left out ({told})"
+            )
+            self.kept &= ~others
 
     def finite(self, name: str, values: Float1D) -> None:
         """Every row needs a finite number in this column."""

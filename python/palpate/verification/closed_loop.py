@@ -130,8 +130,8 @@ def force_driven(
         )
     scheme = _with(default, play_radius=_play_radius(model, default.play_radius))
     notes: tuple[str, ...] = ()
-    steepest = _steepest_slope(model, scheme)
-    limit = (4 * scheme.mass - 2 * scheme.damping * period_s) / period_s**2
+    steepest = scheme.steepest_slope(model)
+    limit = _core.explicit_slope_limit(scheme, period_s, coupled=False)
     if scheme.structure == "explicit" and not steepest < limit:
         scheme = _with(scheme, structure="implicit")
         notes = (
@@ -197,12 +197,6 @@ def _play_radius(model: Model, given: float) -> float:
     if given > 0 or not model.hysteretic or model.play_radius is not None:
         return given
     return PLAY_SHARE_OF_TRAVEL * (float(model.upper[0]) - float(model.lower[0]))
-
-
-def _steepest_slope(model: Model, scheme: Scheme) -> float:
-    """Largest slope that the environment can meet; while a hysteresis model sticks, h/r is part of it."""
-    radius = (scheme.play_radius or model.play_radius) if model.hysteretic else None
-    return max(0.0, float(model.slope_range(radius)[1]))
 
 
 def _with(scheme: Scheme, **changes: Any) -> Scheme:

@@ -42,4 +42,15 @@ concept Device = requires(D& device, const Command& command) {
     { device.close() } noexcept;
 };
 
+/// Whether a device paces the host: its exchange waits for the next sample of the device's own clock. Such a device
+/// says so by a member of this name; the others answer at once, and the host's clock paces both.
+template <Device D>
+inline constexpr bool paces_host = [] {
+    if constexpr (requires { D::paces_host; }) {
+        return D::paces_host;
+    } else {
+        return false;
+    }
+}();
+
 }  // namespace palpate

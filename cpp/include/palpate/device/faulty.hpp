@@ -45,6 +45,8 @@ struct Fault {
 template <Device D>
 class Faulty {
   public:
+    static constexpr bool paces_host = palpate::paces_host<D>;
+
     /// `jump`: by how much a jumping encoder is off [m or rad].
     Faulty(D device, std::vector<Fault> script, double jump)
         : device_{std::move(device)}, script_{std::move(script)}, jump_{jump} {

@@ -2,13 +2,43 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <numbers>
 
 namespace palpate {
 
-/// A simulated hand: a spring to a point that sweeps between two positions, and a damper to ground,
+/// Where something is and how fast it moves.
+struct Motion {
+    double position = 0.0;  ///< [m or rad]
+    double velocity = 0.0;  ///< [m/s or rad/s]
+};
+
+/// What a hand does to a handle during one tick: a force, a spring to a target, a damper to ground, and the
+/// mass that moves along,
 ///
-///     F = stiffness (target(t) - x) - damping v,   target(t) = lower + (upper - lower)(1 - cos 2 pi f t)/2.
+///     F = push + stiffness (target - x) - damping v - mass v'.
+struct Grip {
+    double stiffness = 0.0;  ///< [N/m or N*m/rad]
+    double damping = 0.0;    ///< [N*s/m or N*m*s/rad]
+    double target = 0.0;     ///< [m or rad]
+    double push = 0.0;       ///< [N or N*m]
+    double mass = 0.0;       ///< [kg or kg*m^2]
+
+    /// Without the mass, which the handle's own equation of motion has to carry.
+    [[nodiscard]] double force(const Motion& handle) const noexcept {
+        return push + stiffness * (target - handle.position) - damping * handle.velocity;
+    }
+};
+
+/// A simulated hand: asked once a tick how it grips a handle that moves so.
+template <class H>
+concept SimulatedHand = requires(H& hand, double time, const Motion& handle) {
+    { hand.grip(time, handle) } noexcept -> std::same_as<Grip>;
+};
+
+/// A hand that sweeps: a spring to a point that goes to and fro between two positions, and a damper to ground,
+///
+///     target(t) = lower + (upper - lower)(1 - cos 2 pi f t)/2.
 struct Hand {
     double stiffness = 15.0;    ///< [N/m or N*m/rad]
     double damping = 0.05;      ///< [N*s/m or N*m*s/rad]
@@ -21,9 +51,11 @@ struct Hand {
         return lower + 0.5 * (upper - lower) * (1.0 - std::cos(phase));
     }
 
-    [[nodiscard]] double force(double target, double position, double velocity) const noexcept {
-        return stiffness * (target - position) - damping * velocity;
+    [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
+        return {stiffness, damping, target(time), 0.0, 0.0};
     }
 };
+
+static_assert(SimulatedHand<Hand>);
 
 }  // namespace palpate

@@ -6,75 +6,69 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <utility>
 
 #include "palpate/device/device.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/device/hand.hpp"
+#include "palpate/device/plant.hpp"
 
 namespace palpate {
 
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
-/// friction, encoder, force step and limit, hold over the tick, whole samples of delay.
+/// friction, encoder, force step and limit, hold over the tick, whole samples of delay. `Plant` moves the
+/// handle: SemiImplicitEuler, Midpoint where energy is accounted for, or MountedObject where the device is there
+/// to measure a real thing.
 ///
 /// It does not model: motor electrical dynamics, torque ripple, backlash, flexible parts, jitter of the
-/// sample time, the noise of a force transducer (it has none).
-class SimulatedDevice {
+/// sample time, the noise of a force transducer.
+template <SimulatedHand H, class Plant>
+class SimulatedHandle {
   public:
-    explicit SimulatedDevice(DeviceProfile profile, Hand hand = {}, int substeps = 20, double start = 0.0)
-        : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start} {
+    explicit SimulatedHandle(DeviceProfile profile, H hand = {}, int substeps = 20, double start = 0.0,
+                             double start_velocity = 0.0)
+        : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start, start_velocity} {
         validate(profile_);
     }
 
-    /// Puts the handle at rest at its start position.
+    /// Puts in what moves the handle, if it has anything to be told.
+    void mount(Plant plant) { plant_ = std::move(plant); }
+
+    /// Puts the handle at its start, at rest unless it was given a velocity.
     Opened open() {
-        position_ = start_;
-        velocity_ = 0.0;
+        handle_ = start_;
+        plant_.start();
         applied_ = 0.0;
         tick_ = 0;
         pending_.fill(0.0);
-        last_reading_ = encoded(position_);
+        last_reading_ = encoded(handle_.position);
         return {};
     }
 
     /// Applies the command over one period (later by the delay) and samples the encoder at its end.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         applied_ = delayed(converted(command.force));
-        const double target = hand_.target(time());
-        const double step = profile_.period_s / substeps_;
-        for (int k = 0; k < substeps_; ++k) {
-            substep(target, step);
-        }
+        plant_.tick({profile_.inertia, profile_.viscous_damping, profile_.coulomb_friction},
+                    hand_.grip(time(), handle_), applied_, profile_.period_s / substeps_, substeps_, handle_);
         ++tick_;
-        const double measured = encoded(position_);
+        const double measured = encoded(handle_.position);
         const double velocity = (measured - last_reading_) / profile_.period_s;
         last_reading_ = measured;
-        return {measured, velocity, applied_,  std::numeric_limits<double>::quiet_NaN(),
-                time(),   tick_,    Status::Ok};
+        return {measured, velocity, applied_, plant_.measured(handle_), time(), tick_, Status::Ok};
     }
 
     void close() noexcept { applied_ = 0.0; }
 
     [[nodiscard]] const DeviceProfile& profile() const noexcept { return profile_; }
-    /// The handle's true position, which no real host knows.
-    [[nodiscard]] double handle_position() const noexcept { return position_; }
-    [[nodiscard]] double handle_velocity() const noexcept { return velocity_; }
+    /// The handle's true motion, which no real host knows.
+    [[nodiscard]] const Motion& handle() const noexcept { return handle_; }
+    [[nodiscard]] double handle_position() const noexcept { return handle_.position; }
+    [[nodiscard]] double handle_velocity() const noexcept { return handle_.velocity; }
     [[nodiscard]] double applied_force() const noexcept { return applied_; }
+    [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
 
   private:
     [[nodiscard]] double time() const noexcept { return static_cast<double>(tick_) * profile_.period_s; }
-
-    /// Semi-implicit Euler. Coulomb friction takes away at most the velocity there is: it can stop the handle
-    /// but never turn it round.
-    void substep(double target, double step) noexcept {
-        const double driving =
-            hand_.force(target, position_, velocity_) - profile_.viscous_damping * velocity_ - applied_;
-        const double free = velocity_ + step / profile_.inertia * driving;
-        const double friction = step / profile_.inertia * profile_.coulomb_friction;
-        velocity_ = std::copysign(std::max(0.0, std::abs(free) - friction), free);
-        position_ += step * velocity_;
-    }
 
     [[nodiscard]] double encoded(double position) const noexcept {
         const double step = profile_.encoder_step;
@@ -98,18 +92,25 @@ class SimulatedDevice {
     }
 
     DeviceProfile profile_;
-    Hand hand_;
+    H hand_;
+    Plant plant_;
     int substeps_;
-    double start_;
-    double position_ = 0.0;
-    double velocity_ = 0.0;
+    Motion start_;
+    Motion handle_;
     double applied_ = 0.0;
     double last_reading_ = 0.0;
     std::uint64_t tick_ = 0;
     std::array<double, longest_delay_samples + 1> pending_{};  ///< forces on their way, by tick
 };
 
+/// The device of demonstrations, tests and examples, with a hand that sweeps.
+using SimulatedDevice = SimulatedHandle<Hand, SemiImplicitEuler>;
+
+/// The same with a real object on it: what a recording is made of.
+using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
+
 static_assert(Device<SimulatedDevice>);
+static_assert(Device<SimulatedRig>);
 
 /// Substeps of a tick that keep the inner step of the simulation at 1/20 ms, whatever the rate.
 [[nodiscard]] inline int simulated_substeps(double period_s) noexcept {

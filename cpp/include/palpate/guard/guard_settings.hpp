@@ -10,6 +10,7 @@
 
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/reading_guard.hpp"
+#include "palpate/readable.hpp"
 
 namespace palpate {
 
@@ -21,14 +22,22 @@ struct GuardSettings {
     double largest_speed = 100.0;  ///< of the handle: beyond, the encoder jumped [m/s or rad/s]
     double frozen_speed = 0.3;     ///< a handle this fast cannot stand still at once [m/s or rad/s]
     double frozen_s = 0.05;        ///< how long it may seem to; 0 = not looked at [s]
+    bool energy_tank = true;  ///< whether what the rendering gives is paid from a tank of the model's size
+    double buzz_force =
+        0.05;  ///< a handle that shakes fast with such a swing buzzes; 0 = not looked at [N or N*m]
+    double device_damping = 0.0;   ///< b that the device is known to have [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;  ///< f_c likewise [N or N*m]
+    double encoder_step = 0.0;     ///< [m or rad]
 };
+
+/// Shaking faster than this is no hand's doing.
+inline constexpr double slowest_buzz_hz = 20.0;
 
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const GuardSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", must be " +
-                                        right);
+            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
         }
     };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
@@ -39,6 +48,10 @@ inline void validate(const GuardSettings& settings) {
     require(settings.largest_speed > 0.0, "largest_speed", settings.largest_speed, "> 0");
     require(not_negative(settings.frozen_speed), "frozen_speed", settings.frozen_speed, ">= 0");
     require(not_negative(settings.frozen_s), "frozen_s", settings.frozen_s, ">= 0");
+    require(not_negative(settings.buzz_force), "buzz_force", settings.buzz_force, ">= 0");
+    require(not_negative(settings.device_damping), "device_damping", settings.device_damping, ">= 0");
+    require(not_negative(settings.device_friction), "device_friction", settings.device_friction, ">= 0");
+    require(not_negative(settings.encoder_step), "encoder_step", settings.encoder_step, ">= 0");
 }
 
 inline constexpr std::uint64_t fewest_frozen_samples = 5;

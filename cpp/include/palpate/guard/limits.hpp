@@ -34,11 +34,11 @@ struct SlewLimit {
     [[nodiscard]] Status apply(double& force) noexcept {
         const double wanted = force;
         force = std::clamp(force, last - largest_step, last + largest_step);
-        last = force;
         return force == wanted ? Status::Ok : Status::Limited;
     }
 
-    void zeroed() noexcept { last = 0.0; }
+    /// To be told of every force, whoever had a say in it after this limit.
+    void sent(double force) noexcept { last = force; }
 };
 
 /// The way from no force to all of it: the first `ticks` forces are scaled by 0, 1/ticks, 2/ticks, ...
@@ -46,11 +46,12 @@ struct ForceRamp {
     std::uint64_t ticks = 0;
     std::uint64_t done = 0;
 
-    [[nodiscard]] double next() noexcept {
+    [[nodiscard]] Status apply(double& force) noexcept {
         if (done >= ticks) {
-            return 1.0;
+            return Status::Ok;
         }
-        return static_cast<double>(done++) / static_cast<double>(ticks);
+        force *= static_cast<double>(done++) / static_cast<double>(ticks);
+        return Status::Ramp;
     }
 };
 

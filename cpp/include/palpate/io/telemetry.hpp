@@ -21,6 +21,8 @@ namespace palpate {
 /// datagram that the system does not take at once is dropped and counted.
 class Telemetry {
   public:
+    static constexpr double usual_hz = 50.0;  ///< ticks a second
+
     Telemetry() = default;
     ~Telemetry() {
         if (socket_ >= 0) {

@@ -52,4 +52,23 @@ class Periodic {
     Nanoseconds next_ = 0;
 };
 
+/// The clock of a loop whose device paces it: a tick is due one period after the last one and waits for its sample
+/// in the device. There is nothing to skip; what the device did not deliver is missing in its sequence.
+class PacedByDevice {
+  public:
+    explicit PacedByDevice(Nanoseconds period) noexcept : period_{period} {}
+
+    void start() noexcept { last_ = monotonic_now() - period_; }
+
+    [[nodiscard]] Wake wait() noexcept {
+        const Nanoseconds deadline = last_ + period_;
+        last_ = monotonic_now();
+        return {std::min(deadline, last_), last_, 0};
+    }
+
+  private:
+    Nanoseconds period_;
+    Nanoseconds last_ = 0;
+};
+
 }  // namespace palpate

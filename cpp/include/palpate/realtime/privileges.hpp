@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -41,6 +44,32 @@ class LockedMemory {
     int error_;
 };
 
+/// Cores that do not sleep deeply while this lives: waking up from a deep sleep takes longer than the rest of a
+/// tick, and on a virtual machine even a shallow one is left to the host's scheduler. The kernel keeps to the
+/// latency that stands in its file (Documentation/power/pm_qos_interface.rst) for as long as that is open.
+class WakefulCores {
+  public:
+    WakefulCores() noexcept : file_{open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)} {
+        constexpr std::int32_t latency_us = 0;
+        const bool kept = file_ >= 0 && write(file_, &latency_us, sizeof latency_us) == sizeof latency_us;
+        error_ = kept ? 0 : errno;
+    }
+    ~WakefulCores() {
+        if (file_ >= 0) {
+            close(file_);
+        }
+    }
+    WakefulCores(const WakefulCores&) = delete;
+    WakefulCores& operator=(const WakefulCores&) = delete;
+
+    /// 0, or why the cores may sleep.
+    [[nodiscard]] int error() const noexcept { return error_; }
+
+  private:
+    int file_;
+    int error_;
+};
+
 namespace detail {
 
 [[nodiscard]] inline int last_allowed_cpu() noexcept {
@@ -65,10 +94,11 @@ inline void touch_stack() noexcept {
 
 }  // namespace detail
 
-/// Makes the calling thread a real-time one: no signals but its own mistakes, one core, first-in-first-out scheduling, a stack that
-/// is there. Returns a sentence for each thing that was refused.
+/// Makes the calling thread a real-time one: no signals but its own mistakes, one core, first-in-first-out
+/// scheduling, a stack that is there. Returns a sentence for each thing that was refused.
 [[nodiscard]] inline std::vector<std::string> become_real_time(const RealTimeOptions& options,
-                                                               const LockedMemory& memory) {
+                                                               const LockedMemory& memory,
+                                                               const WakefulCores& cores) {
     std::vector<std::string> refused;
     sigset_t others;
     sigfillset(&others);
@@ -80,6 +110,11 @@ inline void touch_stack() noexcept {
         refused.push_back(std::string("memory is not locked (") +
                           std::generic_category().message(memory.error()) +
                           "): swapping can delay a tick; raise the limit with ulimit -l");
+    }
+    if (cores.error() != 0) {
+        refused.push_back(std::string("the cores may sleep deeply between ticks (") +
+                          std::generic_category().message(cores.error()) +
+                          "): waking up can delay a tick; allow writing to /dev/cpu_dma_latency");
     }
     if (options.cpu != -2) {
         const int cpu = options.cpu == -1 ? detail::last_allowed_cpu() : options.cpu;

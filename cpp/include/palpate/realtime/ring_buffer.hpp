@@ -43,6 +43,10 @@ class RingBuffer {
         return count;
     }
 
+    /// Elements that wait, as the reading thread sees it.
+    [[nodiscard]] std::size_t size() const noexcept {
+        return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed);
+    }
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:

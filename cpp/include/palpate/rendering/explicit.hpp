@@ -10,9 +10,20 @@
 
 namespace palpate {
 
+/// Slope of the environment below which the explicit structure is stable at a held device, behind a coupling or
+/// (K_c = B_c = 0) driven by a force: linearised at an equilibrium, its poles stay inside the unit circle for
+/// 0 < K and
+///
+///     K + K_c < (4 m - 2 (B_o + B_c) T) / T^2.
+[[nodiscard]] constexpr double explicit_slope_limit(const Inertia& inertia, const VirtualCoupling& coupling,
+                                                    double period) noexcept {
+    const double damping = inertia.damping + coupling.damping;
+    return (4.0 * inertia.mass - 2.0 * damping * period) / (period * period) - coupling.stiffness;
+}
+
 /// m v' = F_c - f(x) - B_o v with the paper's delayed integrator (figure 14): everything on the right is one
 /// sample old, so nothing has to be solved, and the step is stable only for slopes below
-/// (4m - 2 B_o T) / T^2 with B_o T < 2m:
+/// `explicit_slope_limit`:
 ///
 ///     v_k = v_{k-1} + (T/m)(F_{k-1} - f(y_{k-1}) - B_o v_{k-1}),   y_k = y_{k-1} + T v_k,
 ///     F_k = K_c (x_k - y_k) + B_c (v_device - v_k).

@@ -14,8 +14,10 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/inertia.hpp"
@@ -26,10 +28,19 @@
 
 namespace palpate {
 
-enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit };
+enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
 
-inline constexpr std::array<std::string_view, 4> structure_names{"direct", "massless", "implicit",
-                                                                 "explicit"};
+inline constexpr std::array<std::string_view, 5> structure_names{"direct", "massless", "implicit", "explicit",
+                                                                 "energy-consistent"};
+
+[[nodiscard]] constexpr std::string_view name_of(StructureKind structure) noexcept {
+    return structure_names[static_cast<std::size_t>(structure)];
+}
+
+/// Whether an object has mass in this structure.
+[[nodiscard]] constexpr bool has_mass(StructureKind structure) noexcept {
+    return structure != StructureKind::Direct && structure != StructureKind::Massless;
+}
 
 [[nodiscard]] inline StructureKind structure_named(std::string_view name) {
     for (std::size_t k = 0; k < structure_names.size(); ++k) {
@@ -38,7 +49,7 @@ inline constexpr std::array<std::string_view, 4> structure_names{"direct", "mass
         }
     }
     throw std::invalid_argument("structure is '" + std::string(name) +
-                                "', must be direct, massless, implicit or explicit");
+                                "', must be direct, massless, implicit, explicit or energy-consistent");
 }
 
 /// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are
@@ -54,7 +65,7 @@ struct Scheme {
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
-        detail::require(holds, std::string(field) + " is " + std::to_string(value) + ", must be " + right);
+        detail::require(holds, std::string(field) + " is " + readable(value) + ", must be " + right);
     };
     const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
@@ -63,7 +74,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
         require(positive(scheme.coupling.stiffness), "coupling_stiffness", scheme.coupling.stiffness, "> 0");
         require(not_negative(scheme.coupling.damping), "coupling_damping", scheme.coupling.damping, ">= 0");
     }
-    if (scheme.structure == StructureKind::Implicit || scheme.structure == StructureKind::Explicit) {
+    if (has_mass(scheme.structure)) {
         require(positive(scheme.inertia.mass), "mass", scheme.inertia.mass, "> 0");
         require(not_negative(scheme.inertia.damping), "damping", scheme.inertia.damping, ">= 0");
     }
@@ -78,9 +89,33 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
             "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
         const double steepest = std::max(model.slope_bounds().upper, 0.0);
         detail::require(steepest <= 0.9 * scheme.coupling.stiffness,
-                        "coupling_stiffness is " + std::to_string(scheme.coupling.stiffness) +
-                            ", must be at least " + std::to_string(steepest / 0.9) +
-                            " to compensate a model whose steepest slope is " + std::to_string(steepest));
+                        "coupling_stiffness is " + readable(scheme.coupling.stiffness) +
+                            ", must be at least " + readable(steepest / 0.9) +
+                            " to compensate a model whose steepest slope is " + readable(steepest));
+    }
+}
+
+/// Largest slope that the structure meets, never below 0. While a hysteresis model sticks, h / r is part of it;
+/// a compensated model has had the coupling's spring taken out.
+[[nodiscard]] inline double steepest_slope(const Scheme& scheme, const ForceModel& model) {
+    const std::optional<double> radius =
+        scheme.play_radius > 0.0 ? std::optional{scheme.play_radius} : model.play_radius();
+    const double steepest = std::max(model.slope_bounds(radius).upper, 0.0);
+    const double stiffness = scheme.coupling.stiffness;
+    return scheme.compensated ? stiffness * steepest / (stiffness - steepest) : steepest;
+}
+
+/// The same, and refuses what is sure to diverge at this period.
+inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
+    validate(scheme, model);
+    if (scheme.structure == StructureKind::Explicit) {
+        const double steepest = steepest_slope(scheme, model);
+        const double limit = explicit_slope_limit(scheme.inertia, scheme.coupling, period_s);
+        detail::require(
+            steepest < limit,
+            "structure is explicit, which diverges: the model's steepest slope is " + readable(steepest) +
+                ", must be below " + readable(limit) +
+                " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
     }
 }
 
@@ -107,6 +142,9 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
                 return visit(Implicit<E, Solver>{std::move(environment), scheme.inertia, scheme.coupling,
                                                  period_s, solver_of(p)});
             }
+            case StructureKind::EnergyConsistent:
+                return visit(EnergyConsistent{std::move(environment), scheme.inertia, scheme.coupling,
+                                              period_s, 1e-2 * model.finest_width()});
             case StructureKind::Explicit:
                 break;
         }
@@ -130,9 +168,11 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
     return with_structure(model, scheme, period_s,
-                          [](const auto& structure) -> std::optional<std::string_view> {
+                          [&](const auto& structure) -> std::optional<std::string_view> {
                               if constexpr (requires { structure.solver(); }) {
                                   return structure.solver().tabulated() ? "table" : "newton";
+                              } else if (scheme.structure == StructureKind::EnergyConsistent) {
+                                  return "newton";
                               } else {
                                   return std::nullopt;
                               }

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+
+#include "bindings.hpp"
+#include "palpate/stability/certificate.hpp"
+#include "palpate/stability/certificate_check.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+template <class Enum, std::size_t n>
+Enum named(const std::string& name, const std::array<std::string_view, n>& names, const char* field) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    detail::require(found != names.end(),
+                    std::string(field) + " is '" + name + "', which is none of its words");
+    return static_cast<Enum>(found - names.begin());
+}
+
+void bind_bounds(py::module_& module) {
+    const auto end = [](auto member, auto side) {
+        return [member, side](const ForceBounds& bounds) { return bounds.*member.*side; };
+    };
+    py::class_<ForceBounds>(
+        module, "ForceBounds",
+        "Proved bounds of a force over every position that can be reached, continuations "
+        "included.\n\n"
+        "With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', "
+        "and h / r more while it sticks.")
+        .def(py::init([](double slope_min, double slope_max, double steepest, double sliding, double loss_min,
+                         double loss_max, double loss_per_play, double mean_force, bool hysteresis) {
+                 return ForceBounds{hysteresis,           {slope_min, slope_max}, steepest,  sliding,
+                                    {loss_min, loss_max}, loss_per_play,          mean_force};
+             }),
+             py::kw_only(), "slope_min"_a, "slope_max"_a, "steepest"_a, "sliding"_a, "loss_min"_a = 0.0,
+             "loss_max"_a = 0.0, "loss_per_play"_a = 0.0, "mean_force"_a = 0.0, "hysteresis"_a = false)
+        .def_readonly("hysteresis", &ForceBounds::hysteresis)
+        .def_property_readonly("slope_min", end(&ForceBounds::slope, &Interval::lower), "Of every path.")
+        .def_property_readonly("slope_max", end(&ForceBounds::slope, &Interval::upper), "Of every path.")
+        .def_readonly("steepest", &ForceBounds::steepest, "L = max |f'|, or max(|g'| + |h'| + h / r).")
+        .def_readonly("sliding", &ForceBounds::sliding, "max |f'|, or max(|g'| + |h'|).")
+        .def_property_readonly("loss_min", end(&ForceBounds::loss, &Interval::lower), "Smallest h.")
+        .def_property_readonly("loss_max", end(&ForceBounds::loss, &Interval::upper), "Largest h.")
+        .def_readonly("loss_per_play", &ForceBounds::loss_per_play, "max h / r")
+        .def_readonly("mean_force", &ForceBounds::mean_force,
+                      "|mean| over a period of a model that repeats.");
+    module.def("force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0,
+               "Proved bounds of a model of one position; play_radius in place of its own where above 0.");
+}
+
+void bind_inequality(py::module_& module) {
+    py::class_<Inequality>(module, "Inequality",
+                           "One line of a certificate: left >= right, or left > right where it is strict.")
+        .def(py::init([](std::string name, std::string formula, double left, double right,
+                         const std::string& rests_on, std::string source, bool strict) {
+                 return Inequality{std::move(name),
+                                   std::move(formula),
+                                   left,
+                                   right,
+                                   named<Basis>(rests_on, basis_names, "rests_on"),
+                                   std::move(source),
+                                   strict};
+             }),
+             py::kw_only(), "name"_a, "formula"_a, "left"_a, "right"_a, "rests_on"_a, "source"_a,
+             "strict"_a = false)
+        .def_readonly("name", &Inequality::name)
+        .def_readonly("formula", &Inequality::formula)
+        .def_readonly("left", &Inequality::left, "What there is.")
+        .def_readonly("right", &Inequality::right, "What is needed.")
+        .def_property_readonly("margin", &Inequality::margin, "left - right")
+        .def_readonly("strict", &Inequality::strict)
+        .def_property_readonly("holds", &Inequality::holds)
+        .def_property_readonly(
+            "rests_on", [](const Inequality& line) { return std::string(name_of(line.rests_on)); },
+            "proved, linear (the linearised system only) or none (no bound is known beyond).")
+        .def_readonly("source", &Inequality::source)
+        .def("__repr__", [](const Inequality& line) {
+            return "<Inequality " + line.formula + ": " + readable(line.left) + " against " +
+                   readable(line.right) + (line.holds() ? ", holds>" : ", fails>");
+        });
+}
+
+}  // namespace
+
+void bind_stability(py::module_& module) {
+    bind_bounds(module);
+    bind_inequality(module);
+    py::class_<Certificate>(module, "Certificate",
+                            "What is proved of a model, rendered by a scheme, on a device.")
+        .def(py::init([](const Scheme& scheme, const DeviceProfile& device, std::string model,
+                         const ForceBounds& bounds, std::vector<Inequality> inequalities,
+                         const std::string& verdict, std::string why, double longest_period_s) {
+                 return Certificate{scheme,
+                                    device,
+                                    std::move(model),
+                                    bounds,
+                                    std::move(inequalities),
+                                    named<Verdict>(verdict, verdict_names, "verdict"),
+                                    std::move(why),
+                                    longest_period_s};
+             }),
+             py::kw_only(), "scheme"_a, "device"_a, "model"_a, "bounds"_a, "inequalities"_a, "verdict"_a,
+             "why"_a, "longest_period_s"_a,
+             "A certificate that stood in a file; nothing of it is to be believed before `check`.")
+        .def_readonly("scheme", &Certificate::scheme)
+        .def_readonly("device", &Certificate::device)
+        .def_readonly("model", &Certificate::model, "Fingerprint of the model.")
+        .def_readonly("bounds", &Certificate::bounds, "Of the force that is rendered, compensation included.")
+        .def_readonly("inequalities", &Certificate::inequalities)
+        .def_property_readonly(
+            "verdict",
+            [](const Certificate& certificate) { return std::string(name_of(certificate.verdict)); })
+        .def_property_readonly("certified", &Certificate::certified)
+        .def_property_readonly(
+            "refused", [](const Certificate& certificate) { return certificate.verdict == Verdict::Refused; })
+        .def_readonly("why", &Certificate::why, "One sentence.")
+        .def_readonly(
+            "longest_period_s", &Certificate::longest_period_s,
+            "Time between two samples up to which every inequality holds [s]; 0 where one does not.")
+        .def(
+            "check",
+            [](const Certificate& certificate, const ForceModel& model) {
+                const std::string wrong = disagreement(certificate, model);
+                detail::require(wrong.empty(), wrong);
+            },
+            "model"_a,
+            "Computes everything again; ValueError names the first field that is not what the model gives.")
+        .def("__repr__", [](const Certificate& certificate) {
+            return "<Certificate for " + certificate.device.id + ": " +
+                   std::string(name_of(certificate.verdict)) + "; " + certificate.why + ">";
+        });
+    module.def(
+        "certify",
+        [](const ForceModel& model, const Scheme& scheme, const DeviceProfile& device) {
+            const py::gil_scoped_release unlocked;
+            return certify(model, scheme, device);
+        },
+        "model"_a, "scheme"_a, "device"_a,
+        "What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its "
+        "reason;\n"
+        "ValueError where scheme or device is impossible.");
+    module.def(
+        "certify_bounds",
+        [](const ForceBounds& bounds, const Scheme& scheme, const DeviceProfile& device) {
+            return certify(bounds, scheme, device);
+        },
+        "bounds"_a, "scheme"_a, "device"_a, "The same for any force within bounds.");
+    module.def(
+        "coupling_need",
+        [](double stiffness, double damping, double period_s, int delay_samples) {
+            return coupling_need({stiffness, damping}, period_s, delay_samples);
+        },
+        "stiffness"_a, "damping"_a, "period_s"_a, "delay_samples"_a = 0,
+        "Device damping over the longest period that a coupling of K_c and B_c needs for any passive "
+        "object.");
+    module.def(
+        "device_difference", &device_difference, "certified"_a, "device"_a,
+        "The first field in which a device is not the certified one, as a sentence; empty where it is.");
+    module.def("fingerprint", &fingerprint, "model"_a,
+               "16 hexadecimal digits that change with every number of which the model's force is made.");
+}
+
+}  // namespace palpate::bindings

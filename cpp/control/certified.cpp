@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "certified.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "palpate/readable.hpp"
+
+namespace palpate::control {
+
+namespace {
+
+constexpr double rounding = 1e-6;  ///< what a profile written by hand may be off by, relative
+
+[[nodiscard]] bool differs(double certified, double measured) {
+    return std::abs(certified - measured) > rounding * std::abs(measured);
+}
+
+[[nodiscard]] bool chooses_rendering(const Options& options) {
+    const SchemeChoices& scheme = options.scheme;
+    return options.structure || scheme.compensated || scheme.coupling_stiffness || scheme.coupling_damping ||
+           scheme.mass || scheme.damping || scheme.play_radius;
+}
+
+}  // namespace
+
+std::string not_certified(const ModelFile& file, const Options& options, const DeviceProfile& device) {
+    if (!file.certificate) {
+        return "has no certificate";
+    }
+    const DeviceProfile& certified = file.certificate->device;
+    if (!file.certificate->certified()) {
+        return "is not certified: " + file.certificate->why;
+    }
+    if (certified.id != device.id) {
+        return "is certified for the device " + certified.id + ", not for " + device.id;
+    }
+    if (differs(certified.period_s, device.period_s)) {
+        return "is certified for a period of " + readable(1e3 * certified.period_s) + " ms, the device has " +
+               readable(1e3 * device.period_s) + " ms";
+    }
+    if (certified.encoder_step < device.encoder_step &&
+        differs(certified.encoder_step, device.encoder_step)) {
+        return "is certified for an encoder step of " + readable(certified.encoder_step) +
+               " rad, the device has " + readable(device.encoder_step) + " rad";
+    }
+    if (certified.force_limit > device.force_limit && differs(certified.force_limit, device.force_limit)) {
+        return "is certified for " + readable(certified.force_limit) + " N*m, the device makes " +
+               readable(device.force_limit) + " N*m";
+    }
+    if (chooses_rendering(options)) {
+        return "is certified as it was planned: leave --structure and its numbers out";
+    }
+    return "";
+}
+
+}  // namespace palpate::control

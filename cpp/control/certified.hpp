@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "options.hpp"
+#include "palpate/device/device_profile.hpp"
+#include "palpate/io/model_file.hpp"
+
+namespace palpate::control {
+
+/// Below this share of its rate the certificate of a run no longer holds: it is for the period asked for.
+inline constexpr double certified_rate_share = 0.99;
+
+/// Why a model may not move a device, whose own word is `device`: empty where its certificate is for this device, at
+/// this rate, and for the rendering that was asked for. That it fits the model was seen to when the file was read.
+[[nodiscard]] std::string not_certified(const ModelFile& file, const Options& options,
+                                        const DeviceProfile& device);
+
+}  // namespace palpate::control

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cmath>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "options.hpp"
+#include "palpate/bench.hpp"
+#include "palpate/io/model_file.hpp"
+#include "palpate/session.hpp"
+#include "palpate/session_text.hpp"
+#include "telling.hpp"
+
+namespace palpate::control {
+
+[[noreturn]] void refuse(const std::string& sentence);
+
+/// A model and how it is rendered: settled before anything moves.
+struct Job {
+    ModelFile file;
+    RecordUnits units;
+    Scheme scheme;
+    GuardSettings guards;
+    SessionSettings settings;
+};
+
+[[nodiscard]] Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench);
+/// Throws where the device of the bench cannot make the force that is asked for.
+[[nodiscard]] GuardSettings guards_of(const Options& options, const Bench& bench);
+
+void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
+                  Outlets& outlets);
+
+/// Set by the signals that end a run.
+[[nodiscard]] const std::atomic<bool>& asked_to_stop();
+void handle_signals();
+
+/// Renders on an open device until it ends, and tells of it. `story` is asked for afterwards: what the device has to
+/// add. Returns the exit code.
+template <Device D, class Story>
+int render_on(D& device, const std::string& called, const Options& options, const Job& job,
+              const Metadata& about_device, Story story) {
+    const Metadata metadata =
+        flight_metadata(std::string("palpate-control ") + PALPATE_VERSION, about_device, options.model,
+                        job.scheme, job.guards, job.settings.loop.rate_hz);
+    Outlets outlets;
+    try {
+        open_outlets(options, metadata, job.units, outlets);
+    } catch (...) {
+        device.close();
+        throw;
+    }
+    const double seconds = job.settings.loop.duration_s;
+    std::cerr << options.model << ": " << job.file.model.parameters().weight.size() << " wavelets, "
+              << describe(job.scheme) << "; " << called << " at " << readable(job.settings.loop.rate_hz)
+              << " Hz " << (std::isfinite(seconds) ? "for " + readable(seconds) + " s" : "until Ctrl-C")
+              << "\n";
+
+    handle_signals();
+    LiveView view{job.settings.loop, job.units};
+    const SessionReport report =
+        render_live(job.file.model, job.scheme, device, job.guards, job.settings, outlets, asked_to_stop(),
+                    [&](const SessionView& now) { view.show(now); });
+    view.end();
+
+    std::string record = options.record;
+    if (!record.empty()) {
+        for (const std::string& warning : finish_record(outlets.file, report, job.settings.loop, record)) {
+            std::cerr << "warning: " << warning << "\n";
+        }
+    }
+    if (!is_orderly(report.loop.ending)) {
+        std::cerr << "error: " << ending_text(report.loop, job.settings.loop)
+                  << "; zero force sent, device closed\n";
+        tell_last_ticks(report, job.units);
+        if (!options.record.empty()) {
+            std::cerr << write_last_ticks(options.record, job.units, metadata, report, job.settings.loop)
+                      << "\n";
+        }
+    }
+    tell_summary(report, job.settings, outlets, record, story(), options.as_json);
+    return is_orderly(report.loop.ending) ? 0 : 1;
+}
+
+}  // namespace palpate::control

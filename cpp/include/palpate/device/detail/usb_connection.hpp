@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <libusb-1.0/libusb.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/device/device.hpp"
+#include "palpate/device/wire.hpp"
+
+namespace palpate {
+
+/// Which device it is: for people, and to find it again.
+struct UsbName {
+    std::string manufacturer;
+    std::string product;
+    std::string serial;
+    int bus = 0;
+    int address = 0;
+
+    /// "emulated knob EMU-1 (bus 1, address 2)"
+    [[nodiscard]] std::string text() const {
+        const std::string place =
+            "(bus " + std::to_string(bus) + ", address " + std::to_string(address) + ")";
+        return (product.empty() ? "USB device" : product) + (serial.empty() ? " " : " " + serial + " ") +
+               place;
+    }
+};
+
+namespace detail {
+
+/// What an error of libusb means, and what helps.
+[[nodiscard]] inline std::string usb_reason(int code) {
+    switch (code) {
+        case LIBUSB_ERROR_ACCESS:
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
+                   "again";
+        case LIBUSB_ERROR_BUSY:
+            return "another program uses it; end that program, then try again";
+        case LIBUSB_ERROR_NO_DEVICE:
+        case LIBUSB_ERROR_NOT_FOUND:
+            return "it was unplugged meanwhile; plug it in and try again";
+        case LIBUSB_ERROR_TIMEOUT:
+            return "it does not answer; unplug it and plug it in again";
+        case LIBUSB_ERROR_PIPE:
+            return "it refused a request; its firmware may be of another version";
+        case LIBUSB_ERROR_NO_MEM:
+            return "the system has no memory left for USB; see "
+                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
+        case LIBUSB_ERROR_IO:
+            return "the transfer failed on the bus; try another cable or port";
+        default:
+            return std::string(libusb_error_name(code)) + ", " + libusb_strerror(code);
+    }
+}
+
+struct CloseContext {
+    void operator()(libusb_context* context) const noexcept { libusb_exit(context); }
+};
+struct CloseHandle {
+    void operator()(libusb_device_handle* handle) const noexcept {
+        libusb_release_interface(handle, wire::interface_number);
+        libusb_close(handle);
+    }
+};
+struct FreeList {
+    void operator()(libusb_device** list) const noexcept { libusb_free_device_list(list, 1); }
+};
+
+/// One device that answers as it should, its interface claimed for this program.
+class UsbConnection {
+  public:
+    static constexpr unsigned request_timeout_ms = 500;
+
+    /// Opens the device of this serial number, or the only one there is.
+    [[nodiscard]] Opened open(const std::string& serial) {
+        libusb_context* context = nullptr;
+        if (const int code = libusb_init(&context); code != 0) {
+            return {"libusb does not start: " + usb_reason(code)};
+        }
+        context_.reset(context);
+        Opened opened = choose(serial);
+        if (!opened) {
+            close();
+        }
+        return opened;
+    }
+
+    void close() noexcept {
+        handle_.reset();
+        context_.reset();
+    }
+
+    /// A request without data. 0, or an error of libusb.
+    [[nodiscard]] int request(wire::Request request, std::uint16_t value) const noexcept {
+        const int moved = libusb_control_transfer(handle_.get(), wire::request_to_device,
+                                                  static_cast<std::uint8_t>(request), value,
+                                                  wire::interface_number, nullptr, 0, request_timeout_ms);
+        return moved < 0 ? moved : 0;
+    }
+
+    [[nodiscard]] libusb_context* context() const noexcept { return context_.get(); }
+    [[nodiscard]] libusb_device_handle* handle() const noexcept { return handle_.get(); }
+    [[nodiscard]] const UsbName& name() const noexcept { return name_; }
+    [[nodiscard]] const wire::Info& info() const noexcept { return info_; }
+
+  private:
+    using Handle = std::unique_ptr<libusb_device_handle, CloseHandle>;
+
+    struct Candidate {
+        Handle handle;
+        UsbName name;
+        wire::Info info;
+    };
+
+    [[nodiscard]] Opened choose(const std::string& serial) {
+        libusb_device** found = nullptr;
+        const auto count = libusb_get_device_list(context_.get(), &found);
+        if (count < 0) {
+            return {"the USB devices cannot be listed: " + usb_reason(static_cast<int>(count))};
+        }
+        const std::unique_ptr<libusb_device*, FreeList> list{found};
+        std::vector<Candidate> fitting;
+        std::vector<std::string> others;   // serial numbers
+        std::vector<std::string> reasons;  // why one is out of the question
+        for (libusb_device* device : std::span{found, static_cast<std::size_t>(count)}) {
+            if (is_ours(device)) {
+                examine(device, serial, fitting, others, reasons);
+            }
+        }
+        if (fitting.size() == 1) {
+            handle_ = std::move(fitting.front().handle);
+            name_ = fitting.front().name;
+            info_ = fitting.front().info;
+            return {};
+        }
+        return {refusal(serial, fitting, others, reasons)};
+    }
+
+    [[nodiscard]] static std::string refusal(const std::string& serial, const std::vector<Candidate>& fitting,
+                                             const std::vector<std::string>& others,
+                                             const std::vector<std::string>& reasons) {
+        const auto listed = [](std::vector<std::string> words) {
+            std::sort(words.begin(), words.end());
+            std::string text;
+            for (const std::string& word : words) {
+                text += (text.empty() ? "" : ", ") + word;
+            }
+            return text;
+        };
+        if (!fitting.empty()) {
+            std::vector<std::string> serials;
+            for (const Candidate& candidate : fitting) {
+                serials.push_back(candidate.name.serial);
+            }
+            return std::to_string(fitting.size()) + " USB devices could be meant (" + listed(serials) +
+                   "): choose with usb:SERIAL";
+        }
+        if (!reasons.empty()) {
+            return reasons.front();
+        }
+        if (!others.empty()) {
+            return "no USB device has the serial number " + serial + "; there is " + listed(others);
+        }
+        return "no USB device 1209:0001 of this protocol is plugged in; 'lsusb -d 1209:0001' shows whether "
+               "the "
+               "system sees one";
+    }
+
+    /// By what the system knows without opening it.
+    [[nodiscard]] static bool is_ours(libusb_device* device) noexcept {
+        libusb_device_descriptor descriptor{};
+        if (libusb_get_device_descriptor(device, &descriptor) != 0 ||
+            descriptor.idVendor != wire::vendor_id || descriptor.idProduct != wire::product_id) {
+            return false;
+        }
+        libusb_config_descriptor* read = nullptr;
+        if (libusb_get_config_descriptor(device, 0, &read) != 0) {
+            return false;
+        }
+        struct Free {
+            void operator()(libusb_config_descriptor* config) const noexcept {
+                libusb_free_config_descriptor(config);
+            }
+        };
+        const std::unique_ptr<libusb_config_descriptor, Free> config{read};
+        if (config->bNumInterfaces < 1 || config->interface[0].num_altsetting < 1) {
+            return false;
+        }
+        const libusb_interface_descriptor& interface = config->interface[0].altsetting[0];
+        return interface.bInterfaceClass == wire::interface_kind[0] &&
+               interface.bInterfaceSubClass == wire::interface_kind[1] &&
+               interface.bInterfaceProtocol == wire::interface_kind[2];
+    }
+
+    /// Opens it and asks it who it is.
+    static void examine(libusb_device* device, const std::string& serial, std::vector<Candidate>& fitting,
+                        std::vector<std::string>& others, std::vector<std::string>& reasons) {
+        UsbName name;
+        name.bus = libusb_get_bus_number(device);
+        name.address = libusb_get_device_address(device);
+        const auto refuse = [&](const std::string& what, int code) {
+            reasons.push_back(name.text() + " " + what + ": " + usb_reason(code));
+        };
+        libusb_device_handle* opened = nullptr;
+        if (const int code = libusb_open(device, &opened); code != 0) {
+            return refuse("cannot be opened", code);
+        }
+        Handle handle{opened};
+        libusb_device_descriptor descriptor{};
+        libusb_get_device_descriptor(device, &descriptor);
+        name.manufacturer = text_of(opened, descriptor.iManufacturer);
+        name.product = text_of(opened, descriptor.iProduct);
+        name.serial = text_of(opened, descriptor.iSerialNumber);
+        if (!serial.empty() && name.serial != serial) {
+            others.push_back(name.serial);
+            return;
+        }
+        if (const int code = libusb_claim_interface(opened, wire::interface_number); code != 0) {
+            return refuse("cannot be used", code);
+        }
+        std::array<std::uint8_t, wire::largest_packet> bytes{};
+        const int moved = libusb_control_transfer(
+            opened, wire::request_to_host, static_cast<std::uint8_t>(wire::Request::GetInfo), 0,
+            wire::interface_number, bytes.data(), bytes.size(), request_timeout_ms);
+        if (moved < 0) {
+            return refuse("does not say what it is (GET_INFO)", moved);
+        }
+        wire::Info info;
+        const wire::Decoded decoded =
+            wire::decode(std::span{bytes}.first(static_cast<std::size_t>(moved)), info);
+        if (decoded != wire::Decoded::Ok) {
+            reasons.push_back(name.text() +
+                              " is 1209:0001 but not of this protocol: its answer to GET_INFO " +
+                              wire::decoded_texts[static_cast<std::size_t>(decoded)]);
+            return;
+        }
+        fitting.push_back({std::move(handle), name, info});
+    }
+
+    [[nodiscard]] static std::string text_of(libusb_device_handle* handle, std::uint8_t index) {
+        std::array<unsigned char, 256> letters{};
+        const int length =
+            index == 0 ? 0
+                       : libusb_get_string_descriptor_ascii(handle, index, letters.data(), letters.size());
+        return {letters.begin(), letters.begin() + (length > 0 ? length : 0)};
+    }
+
+    std::unique_ptr<libusb_context, CloseContext> context_;
+    Handle handle_;
+    UsbName name_;
+    wire::Info info_;
+};
+
+}  // namespace detail
+
+}  // namespace palpate

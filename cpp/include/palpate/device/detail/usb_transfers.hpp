@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <libusb-1.0/libusb.h>
+#include <pthread.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <thread>
+
+#include "palpate/device/wire.hpp"
+#include "palpate/realtime/periodic.hpp"
+#include "palpate/realtime/ring_buffer.hpp"
+#include "palpate/realtime/wake_up.hpp"
+
+namespace palpate::detail {
+
+/// What came in, as it came in.
+struct UsbArrival {
+    std::array<std::uint8_t, wire::largest_packet> bytes{};
+    std::uint32_t size = 0;
+    Nanoseconds time = 0;
+
+    [[nodiscard]] std::span<const std::uint8_t> packet() const noexcept {
+        return std::span{bytes}.first(size);
+    }
+};
+
+/// The transfers of one stream: two reads always queued, one write and one request at most on their way, one thread
+/// for libusb's events. All memory is taken when it starts.
+///
+/// The owner's thread writes and takes arrivals; the event thread runs the callbacks. What both see is atomic; a
+/// transfer counts as in flight until the last line of its callback.
+class UsbTransfers {
+  public:
+    UsbTransfers(libusb_context* context, libusb_device_handle* handle)
+        : context_{context}, handle_{handle}, arrivals_{most_waiting} {
+        for (Read& read : reads_) {
+            read.owner = this;
+            read.transfer.reset(libusb_alloc_transfer(0));
+        }
+        write_.reset(libusb_alloc_transfer(0));
+        request_.reset(libusb_alloc_transfer(0));
+    }
+    ~UsbTransfers() { stop(); }
+    UsbTransfers(const UsbTransfers&) = delete;
+    UsbTransfers& operator=(const UsbTransfers&) = delete;
+
+    /// 0, or why nothing runs: an error of libusb.
+    [[nodiscard]] int start() {
+        if (write_ == nullptr || request_ == nullptr ||
+            std::any_of(reads_.begin(), reads_.end(),
+                        [](const Read& read) { return read.transfer == nullptr; })) {
+            return LIBUSB_ERROR_NO_MEM;
+        }
+        runs_.store(true, std::memory_order_release);
+        events_ = std::thread{[this] { handle_events(); }};
+        for (Read& read : reads_) {
+            submit(read);
+        }
+        return error_.load(std::memory_order_acquire);
+    }
+
+    /// Takes back every transfer and waits until none is left. What the device does is nobody's business then.
+    void stop() noexcept {
+        if (!events_.joinable()) {
+            return;
+        }
+        stopping_.store(true, std::memory_order_release);
+        cancel_all();
+        const Nanoseconds last = monotonic_now() + longest_stop;
+        while (in_flight() > 0 && monotonic_now() < last) {
+            const std::uint32_t seen = changes_.events();
+            if (in_flight() > 0) {
+                (void)changes_.wait(seen, std::min(last, monotonic_now() + cancel_again));
+                cancel_all();
+            }
+        }
+        runs_.store(false, std::memory_order_release);
+        libusb_interrupt_event_handler(context_);
+        events_.join();
+    }
+
+    /// Sends a command, unless the last one is still on its way. 0, LIBUSB_ERROR_BUSY or another error of libusb.
+    [[nodiscard]] int write(const wire::OutPacket& command) noexcept {
+        if (is_gone()) {
+            return LIBUSB_ERROR_NO_DEVICE;
+        }
+        if (writes_in_flight_.load(std::memory_order_acquire) != 0) {
+            return LIBUSB_ERROR_BUSY;
+        }
+        out_bytes_ = wire::encode(command);
+        constexpr unsigned no_timeout = 0;  // the device's watchdog is the one that counts
+        libusb_fill_interrupt_transfer(write_.get(), handle_, wire::out_endpoint, out_bytes_.data(),
+                                       static_cast<int>(out_bytes_.size()), &UsbTransfers::written, this,
+                                       no_timeout);
+        writes_in_flight_.store(1, std::memory_order_relaxed);
+        const int code = libusb_submit_transfer(write_.get());
+        if (code != 0) {
+            writes_in_flight_.store(0, std::memory_order_relaxed);
+            note(code);
+        }
+        return code;
+    }
+
+    /// A request without data, waited for. 0, or an error of libusb. Only one at a time, and by the owner's thread.
+    [[nodiscard]] int request(wire::Request request, std::uint16_t value) noexcept {
+        if (requests_in_flight_.load(std::memory_order_acquire) != 0) {
+            return LIBUSB_ERROR_BUSY;
+        }
+        libusb_fill_control_setup(setup_.data(), wire::request_to_device, static_cast<std::uint8_t>(request),
+                                  value, wire::interface_number, 0);
+        libusb_fill_control_transfer(request_.get(), handle_, setup_.data(), &UsbTransfers::requested, this,
+                                     request_timeout_ms);
+        requests_in_flight_.store(1, std::memory_order_relaxed);
+        if (const int code = libusb_submit_transfer(request_.get()); code != 0) {
+            requests_in_flight_.store(0, std::memory_order_relaxed);
+            return code;
+        }
+        const Nanoseconds last = monotonic_now() + longest_stop;
+        return wait_until_zero(requests_in_flight_, last) ? answer_.load(std::memory_order_relaxed)
+                                                          : static_cast<int>(LIBUSB_ERROR_TIMEOUT);
+    }
+
+    /// Waits for packets; false: none came before the deadline, or none can come any more.
+    [[nodiscard]] bool wait_for_arrival(Nanoseconds deadline) noexcept {
+        while (!is_gone()) {
+            const std::uint32_t seen = changes_.events();
+            if (arrived() > 0 || is_gone()) {
+                break;
+            }
+            if (!changes_.wait(seen, deadline)) {
+                return arrived() > 0;
+            }
+        }
+        return arrived() > 0;
+    }
+    /// Waits until the write on its way has ended; false: it has not.
+    [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
+        return wait_until_zero(writes_in_flight_, deadline);
+    }
+
+    /// Packets that wait to be taken.
+    [[nodiscard]] std::size_t arrived() const noexcept { return arrivals_.size(); }
+    [[nodiscard]] bool take(UsbArrival& arrival) noexcept { return arrivals_.pop({&arrival, 1}) == 1; }
+
+    /// Nothing comes back from this: unplugged, or an error that repeats itself.
+    [[nodiscard]] bool is_gone() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
+    [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
+    [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint64_t bus_errors() const noexcept {
+        return bus_errors_.load(std::memory_order_relaxed);
+    }
+    /// Commands that were on their way and did not arrive.
+    [[nodiscard]] std::uint64_t lost_writes() const noexcept {
+        return lost_writes_.load(std::memory_order_relaxed);
+    }
+    [[nodiscard]] int in_flight() const noexcept {
+        return reads_in_flight_.load(std::memory_order_acquire) +
+               writes_in_flight_.load(std::memory_order_acquire) +
+               requests_in_flight_.load(std::memory_order_acquire);
+    }
+
+  private:
+    static constexpr std::size_t most_waiting = 64;
+    static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
+    static constexpr Nanoseconds cancel_again = nanoseconds_a_second / 10;
+    static constexpr unsigned request_timeout_ms = 500;
+    static constexpr int errors_to_give_up = 100;  ///< in a row
+
+    struct FreeTransfer {
+        void operator()(libusb_transfer* transfer) const noexcept { libusb_free_transfer(transfer); }
+    };
+    using Transfer = std::unique_ptr<libusb_transfer, FreeTransfer>;
+
+    struct Read {
+        UsbTransfers* owner = nullptr;
+        Transfer transfer;
+        std::array<std::uint8_t, wire::largest_packet> bytes{};
+    };
+
+    // ---------------------------------------------------------------------------------------- event thread
+
+    void handle_events() noexcept {
+        // A packet that waits for its turn on the processor is late for the loop: this thread stands above it.
+        const sched_param priority{90};
+        (void)pthread_setschedparam(pthread_self(), SCHED_FIFO,
+                                    &priority);  // refused: told by the loop's own
+        while (runs_.load(std::memory_order_acquire)) {
+            timeval wait{0, 100'000};
+            const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
+            if (code != 0 && code != LIBUSB_ERROR_INTERRUPTED && code != LIBUSB_ERROR_TIMEOUT) {
+                note(code);
+                std::this_thread::yield();
+            }
+            recover();
+        }
+    }
+
+    /// A halted endpoint: its other transfers are taken back, then it is cleared and goes on.
+    void recover() noexcept {
+        if (stopping_.load(std::memory_order_acquire) || is_gone()) {
+            return;
+        }
+        if (reads_halted_) {
+            if (reads_in_flight_.load(std::memory_order_acquire) > 0) {
+                for (Read& read : reads_) {
+                    (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has ended
+                }
+                return;
+            }
+            note(libusb_clear_halt(handle_, wire::in_endpoint));
+            reads_halted_ = false;
+            for (Read& read : reads_) {
+                submit(read);
+            }
+        }
+        if (writes_halted_) {
+            note(libusb_clear_halt(handle_, wire::out_endpoint));
+            writes_halted_ = false;
+            writes_in_flight_.store(0, std::memory_order_release);
+            changes_.happened();
+        }
+    }
+
+    /// By start() before the event thread has anything to do with it, then by the event thread only.
+    void submit(Read& read) noexcept {
+        constexpr unsigned no_timeout = 0;
+        libusb_fill_interrupt_transfer(read.transfer.get(), handle_, wire::in_endpoint, read.bytes.data(),
+                                       static_cast<int>(read.bytes.size()), &UsbTransfers::arrived_here,
+                                       &read, no_timeout);
+        reads_in_flight_.fetch_add(1, std::memory_order_acq_rel);
+        if (const int code = libusb_submit_transfer(read.transfer.get()); code != 0) {
+            note(code);
+            ended_one_read();
+        }
+    }
+
+    static void LIBUSB_CALL arrived_here(libusb_transfer* transfer) {
+        auto& read = *static_cast<Read*>(transfer->user_data);
+        read.owner->read_ended(read);
+    }
+
+    void read_ended(Read& read) noexcept {
+        const libusb_transfer& transfer = *read.transfer;
+        switch (transfer.status) {
+            case LIBUSB_TRANSFER_COMPLETED:
+                errors_in_a_row_ = 0;
+                deliver(read);
+                break;
+            case LIBUSB_TRANSFER_STALL:
+                stalls_.fetch_add(1, std::memory_order_relaxed);
+                reads_halted_ = true;
+                break;
+            case LIBUSB_TRANSFER_TIMED_OUT:
+            case LIBUSB_TRANSFER_CANCELLED:
+                break;
+            case LIBUSB_TRANSFER_NO_DEVICE:
+                note(LIBUSB_ERROR_NO_DEVICE);
+                break;
+            default:
+                failed();
+        }
+        const bool again = !is_gone() && !stopping_.load(std::memory_order_acquire) && !reads_halted_;
+        if (!again) {
+            ended_one_read();
+        } else if (const int code = libusb_submit_transfer(read.transfer.get()); code != 0) {
+            note(code);
+            ended_one_read();
+        }
+    }
+
+    void deliver(const Read& read) noexcept {
+        UsbArrival arrival;
+        arrival.time = monotonic_now();
+        arrival.size = static_cast<std::uint32_t>(read.transfer->actual_length);
+        std::copy_n(read.bytes.begin(), arrival.size, arrival.bytes.begin());
+        (void)arrivals_.push(arrival);  // full: nobody has read for long, and will begin anew
+        changes_.happened();
+    }
+
+    void ended_one_read() noexcept {
+        reads_in_flight_.fetch_sub(1, std::memory_order_acq_rel);
+        changes_.happened();
+    }
+
+    static void LIBUSB_CALL written(libusb_transfer* transfer) {
+        static_cast<UsbTransfers*>(transfer->user_data)->write_ended(*transfer);
+    }
+
+    void write_ended(const libusb_transfer& transfer) noexcept {
+        if (transfer.status != LIBUSB_TRANSFER_COMPLETED) {
+            lost_writes_.fetch_add(1, std::memory_order_relaxed);
+        }
+        switch (transfer.status) {
+            case LIBUSB_TRANSFER_STALL:
+                stalls_.fetch_add(1, std::memory_order_relaxed);
+                if (!stopping_.load(std::memory_order_acquire)) {
+                    writes_halted_ = true;  // in flight until it is cleared
+                    return;
+                }
+                break;
+            case LIBUSB_TRANSFER_NO_DEVICE:
+                note(LIBUSB_ERROR_NO_DEVICE);
+                break;
+            case LIBUSB_TRANSFER_ERROR:
+            case LIBUSB_TRANSFER_OVERFLOW:
+                failed();
+                break;
+            default:
+                break;
+        }
+        writes_in_flight_.store(0, std::memory_order_release);
+        changes_.happened();
+    }
+
+    static void LIBUSB_CALL requested(libusb_transfer* transfer) {
+        auto& self = *static_cast<UsbTransfers*>(transfer->user_data);
+        self.answer_.store(error_of(transfer->status), std::memory_order_relaxed);
+        self.requests_in_flight_.store(0, std::memory_order_release);
+        self.changes_.happened();
+    }
+
+    [[nodiscard]] static int error_of(libusb_transfer_status status) noexcept {
+        switch (status) {
+            case LIBUSB_TRANSFER_COMPLETED:
+                return 0;
+            case LIBUSB_TRANSFER_STALL:
+                return LIBUSB_ERROR_PIPE;
+            case LIBUSB_TRANSFER_NO_DEVICE:
+                return LIBUSB_ERROR_NO_DEVICE;
+            case LIBUSB_TRANSFER_TIMED_OUT:
+            case LIBUSB_TRANSFER_CANCELLED:
+                return LIBUSB_ERROR_TIMEOUT;
+            default:
+                return LIBUSB_ERROR_IO;
+        }
+    }
+
+    // ------------------------------------------------------------------------------------------- both threads
+
+    [[nodiscard]] bool wait_until_zero(const std::atomic<int>& in_flight, Nanoseconds deadline) noexcept {
+        while (in_flight.load(std::memory_order_acquire) != 0) {
+            const std::uint32_t seen = changes_.events();
+            if (in_flight.load(std::memory_order_acquire) != 0 && !changes_.wait(seen, deadline)) {
+                return in_flight.load(std::memory_order_acquire) == 0;
+            }
+        }
+        return true;
+    }
+
+    void failed() noexcept {
+        bus_errors_.fetch_add(1, std::memory_order_relaxed);
+        if (++errors_in_a_row_ >= errors_to_give_up) {
+            note(LIBUSB_ERROR_IO);
+        }
+    }
+
+    /// The first error from which nothing comes back.
+    void note(int code) noexcept {
+        if (code == 0) {
+            return;
+        }
+        int none = 0;
+        (void)error_.compare_exchange_strong(none, code, std::memory_order_acq_rel);
+        changes_.happened();
+    }
+
+    void cancel_all() noexcept {
+        for (Read& read : reads_) {
+            (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has ended
+        }
+        (void)libusb_cancel_transfer(write_.get());
+        (void)libusb_cancel_transfer(request_.get());
+    }
+
+    libusb_context* context_;
+    libusb_device_handle* handle_;
+    std::array<Read, 2> reads_;
+    Transfer write_;
+    std::array<std::uint8_t, wire::out_size> out_bytes_{};
+    Transfer request_;
+    std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE> setup_{};
+    std::atomic<int> answer_{0};
+
+    RingBuffer<UsbArrival> arrivals_;
+    WakeUp changes_;  ///< something arrived, ended or broke
+    std::atomic<int> reads_in_flight_{0};
+    std::atomic<int> writes_in_flight_{0};
+    std::atomic<int> requests_in_flight_{0};
+    std::atomic<bool> stopping_{false};
+    std::atomic<bool> runs_{false};
+    std::atomic<int> error_{0};
+    std::atomic<std::uint64_t> stalls_{0};
+    std::atomic<std::uint64_t> bus_errors_{0};
+    std::atomic<std::uint64_t> lost_writes_{0};
+    bool reads_halted_ = false;   ///< of the event thread
+    bool writes_halted_ = false;  ///< of the event thread
+    int errors_in_a_row_ = 0;     ///< of the event thread
+
+    std::thread events_;
+};
+
+}  // namespace palpate::detail

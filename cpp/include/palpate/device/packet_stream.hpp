@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "palpate/device/device.hpp"
+#include "palpate/device/wire.hpp"
+#include "palpate/realtime/timing.hpp"
+
+namespace palpate {
+
+/// How well a stream of packets goes, counted since it was opened.
+struct StreamHealth {
+    std::uint64_t packets = 0;         ///< that were understood
+    std::uint64_t lost = 0;            ///< samples of the device that nobody saw
+    std::uint64_t repeated = 0;        ///< samples that came again, or from before
+    std::uint64_t malformed = 0;       ///< of the wrong size, magic or version
+    std::uint64_t late_echoes = 0;     ///< of an OUT packet from before the last one echoed
+    std::uint64_t watchdog_trips = 0;  ///< times that the device's watchdog ended a torque
+    std::uint64_t refused_commands =
+        0;  ///< packets that told of an OUT packet that the device did not understand
+    std::uint64_t late_commands = 0;  ///< that took longer to the device than they may
+    DurationHistogram round_trip;     ///< from an OUT packet's way out to its echo's arrival, host clock [ns]
+    DurationHistogram delay;          ///< from a sample to the force computed from it, device clock [ns]
+};
+
+/// Makes readings of the packets of one device: counters that wrap become ones that do not, counts become SI, status
+/// bits become a Status, the echo of a command tells how long it was on its way.
+///
+/// The delay needs no clock but the device's: a command that was computed from the sample latched at t_k and is
+/// echoed by a packet latched at t_m, `out_age` after it was accepted, came t_m - out_age - t_k after its sample.
+class PacketStream {
+  public:
+    PacketStream() = default;
+    explicit PacketStream(const wire::Info& info, Nanoseconds longest_delay) noexcept
+        : info_{info}, longest_delay_{longest_delay} {}
+
+    /// A packet that arrived at `now`, of the host's clock. False: not a packet of this protocol.
+    [[nodiscard]] bool take(std::span<const std::uint8_t> bytes, Nanoseconds now) noexcept {
+        wire::InPacket packet;
+        if (wire::decode(bytes, packet) != wire::Decoded::Ok) {
+            ++health_.malformed;
+            return false;
+        }
+        const bool first = !sequence_.started();
+        const std::int64_t step = sequence_.follow(packet.sequence);
+        clock_us_.follow(packet.clock_us);
+        ++health_.packets;
+        health_.lost += follows_ ? static_cast<std::uint64_t>(std::max<std::int64_t>(step - 1, 0)) : 0;
+        health_.repeated += !first && step <= 0 ? 1 : 0;
+        is_late_ = false;
+        if (first) {
+            sent_ = echoed_ = packet.out_sequence;
+        } else {
+            follow_echo(packet, now);
+        }
+        read(packet, first, step);
+        status_bits_ = packet.status;
+        follows_ = true;
+        return true;
+    }
+
+    /// Packets were thrown away: the next one does not follow the last, and what is sent before it is no answer.
+    void pause() noexcept { follows_ = false; }
+    [[nodiscard]] bool follows() const noexcept { return follows_; }
+
+    /// The next command on its way out at `now`.
+    [[nodiscard]] wire::OutPacket next_command(double force, std::uint16_t time_to_live_ms,
+                                               Nanoseconds now) const noexcept {
+        return {static_cast<std::uint16_t>(sent_ + 1), wire::torque_of(force, info_.max_torque_uNm),
+                time_to_live_ms, static_cast<std::uint32_t>(now / 1000)};
+    }
+    /// It went out.
+    void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
+        sent_ = command.sequence;
+        flights_[sent_ % flights_.size()] = {sent_, now, follows_ ? clock_us_.value() : Flight{}.sample_us};
+    }
+
+    [[nodiscard]] const Reading& reading() const noexcept { return reading_; }
+    [[nodiscard]] const StreamHealth& health() const noexcept { return health_; }
+    /// Of the last packet.
+    [[nodiscard]] std::uint16_t status_bits() const noexcept { return status_bits_; }
+
+  private:
+    struct Flight {
+        std::uint16_t sequence = 0;
+        Nanoseconds sent = 0;
+        std::int64_t sample_us =
+            std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
+    };
+
+    /// Commands are numbered on from the echo in the first packet, so that an echo is of this session or none.
+    void follow_echo(const wire::InPacket& packet, Nanoseconds now) noexcept {
+        const auto ahead = static_cast<std::int16_t>(packet.out_sequence - echoed_);
+        const auto unsent = static_cast<std::int16_t>(packet.out_sequence - sent_);
+        if (ahead == 0) {
+            return;
+        }
+        if (ahead < 0 || unsent > 0) {
+            ++health_.late_echoes;
+            return;
+        }
+        echoed_ = packet.out_sequence;
+        is_acknowledged_ = true;
+        const Flight& flight = flights_[echoed_ % flights_.size()];
+        if (flight.sequence != echoed_) {
+            return;
+        }
+        health_.round_trip.add(now - flight.sent);
+        if (flight.sample_us != Flight{}.sample_us &&
+            packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
+            const Nanoseconds delay = 1000 * (clock_us_.value() - packet.out_age_us - flight.sample_us);
+            health_.delay.add(delay);
+            is_late_ = delay > longest_delay_;
+            health_.late_commands += is_late_ ? 1 : 0;
+        }
+    }
+
+    void read(const wire::InPacket& packet, bool first, std::int64_t step) noexcept {
+        Reading now;
+        now.position = wire::position_of(packet.count, info_.counts_per_rev);
+        now.device_time = 1e-6 * static_cast<double>(clock_us_.value());
+        now.velocity = velocity(packet, now, first, step);
+        now.applied = wire::force_of(packet.torque_uNm);
+        if ((info_.capabilities & wire::has_transducer) != 0) {
+            now.measured = wire::force_of(packet.sensor_uNm);
+        }
+        now.sequence = static_cast<std::uint64_t>(sequence_.value());
+        now.status = status_of(packet.status);
+        reading_ = now;
+    }
+
+    [[nodiscard]] double velocity(const wire::InPacket& packet, const Reading& now, bool first,
+                                  std::int64_t step) const noexcept {
+        if ((info_.capabilities & wire::measures_velocity) != 0) {
+            return wire::position_of(packet.velocity_cps, info_.counts_per_rev);
+        }
+        const double passed = now.device_time - reading_.device_time;
+        const bool follows = !first && step > 0 && passed > 0.0;
+        return follows ? (now.position - reading_.position) / passed : first ? 0.0 : reading_.velocity;
+    }
+
+    /// The watchdog counts once this session's commands have reached the device: what tripped before is past. Once
+    /// the torque was on, it is off only where the device lost its mind.
+    [[nodiscard]] Status status_of(std::uint16_t bits) noexcept {
+        const bool tripped = (bits & wire::watchdog_tripped) != 0 && is_acknowledged_;
+        const bool refused = (bits & wire::bad_packet) != 0 && is_acknowledged_;
+        health_.watchdog_trips += tripped && (status_bits_ & wire::watchdog_tripped) == 0 ? 1 : 0;
+        health_.refused_commands += refused ? 1 : 0;
+        const bool disabled = was_enabled_ && (bits & wire::enabled) == 0;
+        was_enabled_ = was_enabled_ || (bits & wire::enabled) != 0;
+        if ((bits & wire::fault_bits) != 0 || disabled) {
+            return Status::Fault;
+        }
+        if (tripped || is_late_) {
+            return Status::Timeout;
+        }
+        if (refused) {
+            return Status::Lost;
+        }
+        return (bits & wire::torque_saturated) != 0 ? Status::Limited : Status::Ok;
+    }
+
+    wire::Info info_;
+    Nanoseconds longest_delay_ = std::numeric_limits<Nanoseconds>::max();
+    wire::Unwrapped<std::uint16_t> sequence_;
+    wire::Unwrapped<std::uint32_t> clock_us_;
+    std::uint16_t sent_ = 0;
+    std::uint16_t echoed_ = 0;
+    bool is_acknowledged_ = false;
+    bool is_late_ = false;  ///< the command that the last packet echoed
+    bool was_enabled_ = false;
+    bool follows_ = false;  ///< the next packet, the last one that was taken
+    std::uint16_t status_bits_ = 0;
+    std::array<Flight, 64> flights_{};
+    Reading reading_;
+    StreamHealth health_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "palpate/device/detail/usb_connection.hpp"
+#include "palpate/device/detail/usb_transfers.hpp"
+#include "palpate/device/device.hpp"
+#include "palpate/device/device_profile.hpp"
+#include "palpate/device/packet_stream.hpp"
+#include "palpate/device/wire.hpp"
+
+namespace palpate {
+
+/// How a USB device is found and spoken to.
+struct UsbOptions {
+    std::string serial;                     ///< empty: the only one there is
+    std::chrono::microseconds wait{5'000};  ///< how long an exchange waits for the device's next packet
+    std::uint16_t time_to_live_ms = 10;     ///< how long a torque outlives its packet
+    double longest_delay_s = 0.0;           ///< from a sample to its force; 0 = any [s]
+    bool makes_force = true;                ///< else it is listened to: it is never enabled
+};
+
+/// What happened on the wire, packets and transfers.
+struct UsbHealth {
+    StreamHealth stream;
+    std::uint64_t skipped_commands = 0;  ///< not sent, since the last one was still on its way
+    std::uint64_t lost_commands = 0;     ///< that did not arrive
+    std::uint64_t timeouts = 0;          ///< exchanges in which no packet came
+    std::uint64_t discarded = 0;         ///< packets that nobody had taken for too long
+    std::uint64_t stalls = 0;            ///< endpoints that halted and were cleared
+    std::uint64_t bus_errors = 0;        ///< transfers that failed on the bus
+};
+
+/// A haptic device of one degree of freedom over USB; packets and signs: device/wire.hpp.
+///
+/// The device paces the host: an exchange sends its command at once and waits for the next packet, in the order in
+/// which they were sampled, but no longer than `UsbOptions::wait`. A host that falls behind by a packet or two
+/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. In the exchange nothing is
+/// allocated or thrown; libusb takes its own locks, and the wait is a futex.
+///
+/// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
+/// to the device than `UsbOptions::longest_delay_s`; Fault when the
+/// device reports one, was disabled or is gone, and then for good; Lost when a command did not arrive or was not understood; Limited
+/// when it clipped one. Lost and repeated samples speak through Reading::sequence.
+class UsbDevice {
+  public:
+    static constexpr bool paces_host = true;
+
+    explicit UsbDevice(UsbOptions options = {}) : options_{std::move(options)} {}
+    UsbDevice(UsbDevice&&) noexcept = default;
+    UsbDevice& operator=(UsbDevice&&) = delete;
+    ~UsbDevice() { close(); }
+
+    /// Finds the device, starts its packets and, if it is to make force, lets it; the torque is zero until the first
+    /// exchange.
+    Opened open() {
+        close();
+        open_ = std::make_unique<OpenDevice>();
+        std::string reason = open_->connection.open(options_.serial).reason;
+        if (reason.empty() && !(reason = start()).empty()) {
+            reason = name().text() + " " + reason;
+        }
+        if (!reason.empty()) {
+            const UsbName tried = name();
+            close();
+            last_name_ = tried;
+        }
+        return {reason};
+    }
+
+    /// Sends the command, waits for the next sample.
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        if (open_ == nullptr) {
+            return failed(Status::Fault);
+        }
+        detail::UsbTransfers& transfers = *open_->transfers;
+        discard_old();
+        // A host that is behind takes what waits, and sends what follows from it at once afterwards; but not twice.
+        open_->catches_up = transfers.arrived() > 0 && !open_->catches_up;
+        if (open_->catches_up) {
+            ++open_->skipped_commands;
+        } else {
+            send(command.force);
+        }
+        const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
+        while (transfers.wait_for_arrival(deadline)) {
+            detail::UsbArrival arrival;
+            if (transfers.take(arrival) && open_->stream.take(arrival.packet(), arrival.time)) {
+                return judged(open_->stream.reading());
+            }
+        }
+        if (transfers.is_gone()) {
+            return failed(Status::Fault);
+        }
+        ++open_->timeouts;
+        return failed(Status::Timeout);
+    }
+
+    /// Zero torque, disabled, nothing in flight, let go: in this order, as far as the device still takes part.
+    void close() noexcept {
+        if (open_ == nullptr) {
+            return;
+        }
+        if (open_->transfers != nullptr && !open_->transfers->is_gone()) {
+            last_word();
+        }
+        last_name_ = name();
+        last_info_ = info();
+        last_health_ = health();
+        if (open_->transfers != nullptr) {
+            open_->transfers->stop();
+        }
+        open_.reset();
+    }
+
+    // The three below tell of the device that is open, or of the last one that was.
+    [[nodiscard]] const UsbName& name() const noexcept {
+        return open_ == nullptr ? last_name_ : open_->connection.name();
+    }
+    [[nodiscard]] const wire::Info& info() const noexcept {
+        return open_ == nullptr ? last_info_ : open_->connection.info();
+    }
+    [[nodiscard]] UsbHealth health() const noexcept {
+        if (open_ == nullptr) {
+            return last_health_;
+        }
+        UsbHealth health;
+        health.stream = open_->stream.health();
+        health.skipped_commands = open_->skipped_commands;
+        health.timeouts = open_->timeouts;
+        health.discarded = open_->discarded;
+        if (open_->transfers != nullptr) {
+            health.lost_commands = open_->transfers->lost_writes();
+            health.stalls = open_->transfers->stalls();
+            health.bus_errors = open_->transfers->bus_errors();
+        }
+        return health;
+    }
+    /// Transfers that the system has and has not given back.
+    [[nodiscard]] int in_flight() const noexcept {
+        return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
+    }
+
+    /// What the device says of itself as a profile; its mechanics are nobody's to ask it, and stay `otherwise`.
+    [[nodiscard]] DeviceProfile profile(DeviceProfile otherwise = {}) const {
+        otherwise.id = name().serial.empty() ? name().product : name().serial;
+        otherwise.period_s = 1.0 / info().rate_hz;
+        otherwise.encoder_step = wire::position_of(1, info().counts_per_rev);
+        otherwise.force_step = 1e-6;
+        otherwise.force_limit = 1e-6 * info().max_torque_uNm;
+        return otherwise;
+    }
+
+  private:
+    static constexpr std::size_t most_waiting = 4;  ///< packets: a host that is later than this begins anew
+    static constexpr Nanoseconds first_packet = nanoseconds_a_second;
+    static constexpr Nanoseconds one_write = nanoseconds_a_second / 50;
+
+    struct OpenDevice {
+        detail::UsbConnection connection;
+        PacketStream stream;
+        std::unique_ptr<detail::UsbTransfers> transfers;
+        Nanoseconds frame = 0;
+        bool catches_up = false;
+        bool sent_last = true;
+        std::uint64_t skipped_commands = 0;
+        std::uint64_t lost_commands = 0;
+        std::uint64_t timeouts = 0;
+        std::uint64_t discarded = 0;
+    };
+
+    /// Empty, or what the device does not do, and what helps.
+    [[nodiscard]] std::string start() {
+        detail::UsbConnection& connection = open_->connection;
+        open_->stream = PacketStream{connection.info(), longest_delay()};
+        open_->frame = nanoseconds_a_second / connection.info().rate_hz;
+        if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
+            return "cannot be disabled: " + detail::usb_reason(code);
+        }
+        open_->transfers = std::make_unique<detail::UsbTransfers>(connection.context(), connection.handle());
+        if (const int code = open_->transfers->start(); code != 0) {
+            return "does not stream: " + detail::usb_reason(code);
+        }
+        const Nanoseconds deadline = monotonic_now() + first_packet;
+        if (!next_packet(deadline)) {
+            return open_->transfers->is_gone()
+                       ? "does not stream: " + detail::usb_reason(open_->transfers->error())
+                       : "sends no packets; unplug it and plug it in again";
+        }
+        if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
+            return "reports " + fault_text(open_->stream.status_bits()) +
+                   "; when its cause is gone, run 'palpate devices --clear', then try again";
+        }
+        if (!options_.makes_force) {
+            return "";
+        }
+        if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
+            return "cannot be enabled: " + detail::usb_reason(code);
+        }
+        while ((open_->stream.status_bits() & wire::enabled) == 0) {
+            if (!next_packet(deadline)) {
+                return "does not let itself be enabled; run 'palpate devices --clear', then try again";
+            }
+        }
+        open_->stream.pause();
+        return "";
+    }
+
+    [[nodiscard]] Nanoseconds longest_delay() const noexcept {
+        return options_.longest_delay_s > 0.0 ? static_cast<Nanoseconds>(1e9 * options_.longest_delay_s)
+                                              : std::numeric_limits<Nanoseconds>::max();
+    }
+
+    [[nodiscard]] static std::string fault_text(std::uint16_t bits) {
+        return (bits & wire::emergency_stop) != 0     ? "an emergency stop"
+               : (bits & wire::over_temperature) != 0 ? "over-temperature"
+                                                      : "a fault of its encoder";
+    }
+
+    [[nodiscard]] bool next_packet(Nanoseconds deadline) noexcept {
+        detail::UsbArrival arrival;
+        while (open_->transfers->wait_for_arrival(deadline)) {
+            if (open_->transfers->take(arrival) && open_->stream.take(arrival.packet(), arrival.time)) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    void discard_old() noexcept {
+        detail::UsbArrival old;
+        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
+            return;
+        }
+        while (open_->transfers->take(old)) {
+            ++open_->discarded;
+        }
+        open_->stream.pause();
+    }
+
+    /// The end of the last command and the packet that wakes a host come in the same frame, in any order: up to a
+    /// frame of waiting keeps every frame a command. A device that takes longer is not taking commands.
+    void send(double force) noexcept {
+        (void)open_->transfers->wait_for_write(monotonic_now() + open_->frame);
+        const Nanoseconds now = monotonic_now();
+        const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
+        const int code = open_->transfers->write(packet);
+        open_->sent_last = code == 0;
+        if (open_->sent_last) {
+            open_->stream.sent(packet, now);
+        }
+        open_->skipped_commands += code == LIBUSB_ERROR_BUSY ? 1 : 0;
+    }
+
+    void last_word() noexcept {
+        (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
+        send(0.0);
+        (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
+        (void)open_->transfers->request(wire::Request::Enable, 0);  // where it fails the watchdog is left
+    }
+
+    /// Where a command did not go out, or was lost on its way, an older force acts.
+    [[nodiscard]] Reading judged(Reading reading) noexcept {
+        const std::uint64_t lost = open_->transfers->lost_writes();
+        const bool arrived = std::exchange(open_->lost_commands, lost) == lost && open_->sent_last;
+        if (!arrived && sends_force(reading.status)) {
+            reading.status = Status::Lost;
+        }
+        return reading;
+    }
+
+    /// The last reading again, of no use but for its position.
+    [[nodiscard]] Reading failed(Status status) const noexcept {
+        Reading reading = open_ == nullptr ? Reading{} : open_->stream.reading();
+        reading.status = status;
+        return reading;
+    }
+
+    UsbOptions options_;
+    std::unique_ptr<OpenDevice> open_;
+    UsbName last_name_;
+    wire::Info last_info_;
+    UsbHealth last_health_;
+};
+
+static_assert(Device<UsbDevice>);
+
+}  // namespace palpate

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <span>
+
+/// What a USB device and its host say to each other, version 1: packets of fixed size, little endian, packed. A wrong
+/// size, magic or version is an error, never a guess.
+///
+/// Signs: position = 2 pi count / counts_per_rev; a torque > 0 on the wire accelerates the handle towards growing
+/// count. A force of this library is that of the object against the handle, so it is -1e-6 times the torque.
+namespace palpate::wire {
+
+inline constexpr std::uint16_t vendor_id = 0x1209;
+inline constexpr std::uint16_t product_id = 0x0001;  ///< of pid.codes' test pair: for development only
+inline constexpr std::uint8_t interface_number = 0;
+inline constexpr std::array<std::uint8_t, 3> interface_kind{0xFF, 0x01, 0x01};  ///< class, subclass, protocol
+inline constexpr std::uint8_t in_endpoint = 0x81;
+inline constexpr std::uint8_t out_endpoint = 0x01;
+inline constexpr std::uint8_t protocol_version = 1;
+
+inline constexpr std::uint8_t request_to_host = 0xC1;  ///< bmRequestType: vendor, interface
+inline constexpr std::uint8_t request_to_device = 0x41;
+
+/// bRequest of a control transfer.
+enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
+
+/// Bits of InPacket::status.
+enum Bit : std::uint16_t {
+    enabled = 1,
+    watchdog_tripped = 2,
+    torque_saturated = 4,
+    bad_packet = 8,
+    encoder_fault = 16,
+    over_temperature = 32,
+    emergency_stop = 64,
+};
+/// The bits after which nothing that the device says or does is to be relied on.
+inline constexpr std::uint16_t fault_bits = encoder_fault | over_temperature | emergency_stop;
+
+/// Bits of Info::capabilities.
+inline constexpr std::uint32_t has_transducer = 1;
+inline constexpr std::uint32_t measures_velocity = 2;
+
+inline constexpr std::size_t largest_packet = 64;  ///< what a full-speed interrupt endpoint can send
+inline constexpr std::size_t in_size = 32;
+inline constexpr std::size_t out_size = 16;
+inline constexpr std::size_t info_size = 32;
+
+/// From the device, once every frame.
+struct InPacket {
+    std::uint16_t sequence = 0;
+    std::uint32_t clock_us = 0;  ///< the device's, at the encoder latch; wraps after 71 minutes
+    std::int32_t count = 0;
+    std::int32_t velocity_cps = 0;  ///< counts a second; 0 where it is not measured
+    std::int32_t torque_uNm = 0;    ///< applied
+    std::uint16_t status = 0;
+    std::uint16_t out_sequence = 0;  ///< of the last OUT packet that was accepted
+    std::uint16_t out_age_us = 0;    ///< since it was accepted; saturates
+    std::uint16_t temperature_dC = 0;
+    std::int32_t sensor_uNm = 0;  ///< force transducer; 0 without one
+};
+
+/// To the device.
+struct OutPacket {
+    std::uint16_t sequence = 0;
+    std::int32_t torque_uNm = 0;
+    std::uint16_t time_to_live_ms = 10;  ///< the torque ends when no other packet came for so long
+    std::uint32_t host_us = 0;
+};
+
+/// What a device says of itself.
+struct Info {
+    std::uint16_t firmware = 0;
+    std::uint32_t counts_per_rev = 0;
+    std::int32_t max_torque_uNm = 0;
+    std::uint16_t rate_hz = 0;
+    std::uint16_t watchdog_ms = 0;
+    std::uint32_t capabilities = 0;
+    std::uint64_t uid = 0;
+};
+
+/// What is wrong with received bytes.
+enum class Decoded : std::uint8_t { Ok, WrongSize, WrongMagic, WrongVersion, WrongField };
+
+inline constexpr std::array<const char*, 5> decoded_texts{
+    "is as it should be", "has the wrong size", "begins with the wrong byte",
+    "is of another version of the protocol", "has a field that no device can have"};
+
+namespace detail {
+
+/// Integers taken from bytes, least byte first, one after the other.
+class Taking {
+  public:
+    explicit Taking(std::span<const std::uint8_t> bytes) noexcept : bytes_{bytes} {}
+
+    template <std::integral... Integer>
+    void operator()(Integer&... values) noexcept {
+        (take(values), ...);
+    }
+
+  private:
+    template <std::integral Integer>
+    void take(Integer& value) noexcept {
+        std::uint64_t bits = 0;
+        for (std::size_t k = 0; k < sizeof value; ++k) {
+            bits |= static_cast<std::uint64_t>(bytes_[at_++]) << (8U * k);
+        }
+        value = static_cast<Integer>(bits);
+    }
+
+    std::span<const std::uint8_t> bytes_;
+    std::size_t at_ = 0;
+};
+
+/// The same the other way round.
+class Putting {
+  public:
+    explicit Putting(std::span<std::uint8_t> bytes) noexcept : bytes_{bytes} {}
+
+    template <std::integral... Integer>
+    void operator()(Integer... values) noexcept {
+        (put(values), ...);
+    }
+
+  private:
+    template <std::integral Integer>
+    void put(Integer value) noexcept {
+        const auto bits = static_cast<std::uint64_t>(value);
+        for (std::size_t k = 0; k < sizeof value; ++k) {
+            bytes_[at_++] = static_cast<std::uint8_t>(bits >> (8U * k));
+        }
+    }
+
+    std::span<std::uint8_t> bytes_;
+    std::size_t at_ = 0;
+};
+
+/// What every packet begins with.
+[[nodiscard]] inline Decoded begins(std::span<const std::uint8_t> bytes, std::size_t size,
+                                    char magic) noexcept {
+    if (bytes.size() != size) {
+        return Decoded::WrongSize;
+    }
+    if (bytes[0] != static_cast<std::uint8_t>(magic)) {
+        return Decoded::WrongMagic;
+    }
+    return bytes[1] == protocol_version ? Decoded::Ok : Decoded::WrongVersion;
+}
+
+}  // namespace detail
+
+[[nodiscard]] inline Decoded decode(std::span<const std::uint8_t> bytes, InPacket& packet) noexcept {
+    const Decoded begun = detail::begins(bytes, in_size, 'H');
+    if (begun == Decoded::Ok) {
+        detail::Taking{bytes.subspan(2)}(packet.sequence, packet.clock_us, packet.count, packet.velocity_cps,
+                                         packet.torque_uNm, packet.status, packet.out_sequence,
+                                         packet.out_age_us, packet.temperature_dC, packet.sensor_uNm);
+    }
+    return begun;
+}
+
+[[nodiscard]] inline Decoded decode(std::span<const std::uint8_t> bytes, Info& info) noexcept {
+    if (const Decoded begun = detail::begins(bytes, info_size, 'I'); begun != Decoded::Ok) {
+        return begun;
+    }
+    std::uint8_t in_bytes = 0;
+    std::uint8_t out_bytes = 0;
+    std::uint8_t degrees_of_freedom = 0;
+    std::uint8_t reserved = 0;
+    detail::Taking{bytes.subspan(2)}(info.firmware, info.counts_per_rev, info.max_torque_uNm, info.rate_hz,
+                                     info.watchdog_ms, info.capabilities, in_bytes, out_bytes,
+                                     degrees_of_freedom, reserved, info.uid);
+    const bool fits = in_bytes == in_size && out_bytes == out_size && degrees_of_freedom == 1 &&
+                      reserved == 0 && (info.capabilities & ~(has_transducer | measures_velocity)) == 0;
+    const bool possible = fits && info.counts_per_rev > 0 && info.max_torque_uNm > 0 && info.rate_hz > 0;
+    return possible ? Decoded::Ok : Decoded::WrongField;
+}
+
+[[nodiscard]] inline std::array<std::uint8_t, out_size> encode(const OutPacket& packet) noexcept {
+    constexpr std::uint16_t flags = 0;
+    std::array<std::uint8_t, out_size> bytes{};
+    detail::Putting{bytes}(std::uint8_t{'T'}, protocol_version, packet.sequence, packet.torque_uNm, flags,
+                           packet.time_to_live_ms, packet.host_us);
+    return bytes;
+}
+
+/// [rad]
+[[nodiscard]] inline double position_of(std::int32_t count, std::uint32_t counts_per_rev) noexcept {
+    return 2.0 * std::numbers::pi * static_cast<double>(count) / static_cast<double>(counts_per_rev);
+}
+
+/// The force of the object against the handle [N*m] that a torque on the wire is.
+[[nodiscard]] inline double force_of(std::int32_t torque_uNm) noexcept {
+    return 0.0 - 1e-6 * static_cast<double>(torque_uNm);
+}
+
+/// The torque that is such a force, at most the device's largest; a force that is not a number is none.
+[[nodiscard]] inline std::int32_t torque_of(double force, std::int32_t max_torque_uNm) noexcept {
+    if (std::isnan(force)) {
+        return 0;
+    }
+    const auto largest = static_cast<double>(max_torque_uNm);
+    return static_cast<std::int32_t>(std::lround(std::clamp(-1e6 * force, -largest, largest)));
+}
+
+/// A counter that wraps around, made one that does not. What is less than half a turn behind is before.
+template <std::unsigned_integral Counter>
+class Unwrapped {
+  public:
+    /// Takes the next reading; returns how far it is from the last one, 0 for the first.
+    std::int64_t follow(Counter reading) noexcept {
+        using Signed = std::make_signed_t<Counter>;
+        const auto step = started_ ? static_cast<Signed>(static_cast<Counter>(reading - last_)) : Signed{0};
+        value_ = started_ ? value_ + step : static_cast<std::int64_t>(reading);
+        last_ = reading;
+        started_ = true;
+        return step;
+    }
+
+    [[nodiscard]] std::int64_t value() const noexcept { return value_; }
+    [[nodiscard]] bool started() const noexcept { return started_; }
+
+  private:
+    bool started_ = false;
+    Counter last_ = 0;
+    std::int64_t value_ = 0;
+};
+
+}  // namespace palpate::wire

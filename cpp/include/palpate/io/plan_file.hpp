@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "palpate/device/device_profile.hpp"
+#include "palpate/io/json_field.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/stability/certificate_check.hpp"
+
+// The two parts of a model file that say how it is rendered: the plan, and what is proved of it.
+namespace palpate::detail {
+
+template <class Enum, std::size_t n>
+[[nodiscard]] Enum read_name(const JsonField& field, const std::array<std::string_view, n>& names) {
+    std::string right;
+    for (std::size_t k = 0; k < n; ++k) {
+        if (field.value().is_string() && field.value().get<std::string>() == names[k]) {
+            return static_cast<Enum>(k);
+        }
+        right += (k == 0 ? "one of '" : ", '") + std::string(names[k]) + "'";
+    }
+    field.refuse(right);
+}
+
+/// Given where the structure has a use for it, null where it has none.
+inline void require_given(const JsonField& field, bool used, const char* structure_has) {
+    field.require(field.is_null() != used, (used ? "given: " : "null: ") + std::string("the structure has ") +
+                                               (used ? "" : "no ") + structure_has);
+}
+
+[[nodiscard]] inline std::optional<Scheme> read_plan(const JsonField& plan) {
+    if (plan.is_null()) {
+        return std::nullopt;
+    }
+    plan.only(
+        {"structure", "solver", "coupling", "inertia", "compensated", "play_radius", "refused", "loss"});
+    Scheme scheme;
+    scheme.structure = read_name<StructureKind>(plan["structure"], structure_names);
+    if (const JsonField solver = plan["solver"]; !solver.is_null()) {
+        (void)solver.words();
+    }
+    const JsonField coupling = plan["coupling"];
+    if (!coupling.is_null()) {
+        coupling.only({"stiffness", "damping"});
+        scheme.coupling = {coupling["stiffness"].positive(), coupling["damping"].not_negative()};
+    }
+    require_given(coupling, scheme.structure != StructureKind::Direct, "coupling");
+    const JsonField inertia = plan["inertia"];
+    if (!inertia.is_null()) {
+        inertia.only({"mass", "damping"});
+        scheme.inertia = {inertia["mass"].positive(), inertia["damping"].not_negative()};
+    }
+    require_given(inertia, has_mass(scheme.structure), "inertia");
+    scheme.compensated = plan["compensated"].flag();
+    if (const JsonField radius = plan["play_radius"]; !radius.is_null()) {
+        scheme.play_radius = radius.positive();
+    }
+    for (const JsonField& sentence : plan["refused"].items()) {
+        (void)sentence.words();
+    }
+    if (const JsonField loss = plan["loss"]; !loss.is_null()) {
+        loss.only({"largest", "rms"});
+        (void)loss["largest"].not_negative();
+        (void)loss["rms"].not_negative();
+    }
+    return scheme;
+}
+
+[[nodiscard]] inline DeviceProfile read_device(const JsonField& device) {
+    device.only({"id", "position_unit", "period_s", "jitter_s", "inertia", "viscous_damping",
+                 "coulomb_friction", "encoder_step", "force_step", "delay_samples", "force_limit"});
+    DeviceProfile profile;
+    profile.id = device["id"].words();
+    profile.position_unit = device["position_unit"].one_of({"rad", "m"});
+    profile.period_s = device["period_s"].positive();
+    profile.jitter_s = device["jitter_s"].not_negative();
+    profile.inertia = device["inertia"].positive();
+    profile.viscous_damping = device["viscous_damping"].not_negative();
+    profile.coulomb_friction = device["coulomb_friction"].not_negative();
+    profile.encoder_step = device["encoder_step"].not_negative();
+    profile.force_step = device["force_step"].not_negative();
+    const JsonField delay = device["delay_samples"];
+    profile.delay_samples = static_cast<int>(
+        std::min<std::uint64_t>(delay.count(0), static_cast<std::uint64_t>(longest_delay_samples) + 1));
+    delay.require(profile.delay_samples <= longest_delay_samples,
+                  "<= " + std::to_string(longest_delay_samples));
+    profile.force_limit = device["force_limit"].positive();
+    return profile;
+}
+
+[[nodiscard]] inline ForceBounds read_bounds(const JsonField& bounds, bool hysteresis) {
+    bounds.only({"slope_min", "slope_max", "steepest", "sliding", "loss_min", "loss_max", "loss_per_play",
+                 "mean_force"});
+    ForceBounds read;
+    read.hysteresis = hysteresis;
+    read.slope = {bounds["slope_min"].number(), bounds["slope_max"].number()};
+    read.steepest = bounds["steepest"].number();
+    read.sliding = bounds["sliding"].number();
+    read.loss = {bounds["loss_min"].number(), bounds["loss_max"].number()};
+    read.loss_per_play = bounds["loss_per_play"].number();
+    read.mean_force = bounds["mean_force"].number();
+    return read;
+}
+
+[[nodiscard]] inline Inequality read_inequality(const JsonField& line) {
+    line.only({"name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source"});
+    Inequality read;
+    read.name = line["name"].words();
+    read.formula = line["formula"].words();
+    read.left = line["left"].number();
+    read.right = line["right"].number();
+    read.rests_on = read_name<Basis>(line["rests_on"], basis_names);
+    read.source = line["source"].words();
+    read.strict = line["strict"].flag();
+    line["margin"].require(agree(line["margin"].number(), read.margin()), "left - right");
+    line["holds"].require(line["holds"].flag() == read.holds(), "what left and right say");
+    return read;
+}
+
+/// The certificate of a plan, recomputed from model and device: one that says anything else is refused.
+[[nodiscard]] inline std::optional<Certificate> read_certificate(const JsonField& file,
+                                                                 const std::optional<Scheme>& plan,
+                                                                 const ForceModel& model,
+                                                                 const std::string& position_unit) {
+    if (file.is_null()) {
+        return std::nullopt;
+    }
+    file.only(
+        {"model", "structure", "device", "bounds", "inequalities", "verdict", "why", "longest_period_s"});
+    file.require(plan.has_value(), "null, because plan is");
+    Certificate read;
+    read.scheme = *plan;
+    read.model = file["model"].words();
+    file["structure"].require(read_name<StructureKind>(file["structure"], structure_names) == plan->structure,
+                              "that of the plan");
+    read.device = read_device(file["device"]);
+    file["device"]["position_unit"].require(
+        position_unit.empty() || position_unit == read.device.position_unit,
+        "the unit of the model's position");
+    read.bounds = read_bounds(file["bounds"], model.hysteresis() != nullptr);
+    for (const JsonField& line : file["inequalities"].items()) {
+        read.inequalities.push_back(read_inequality(line));
+    }
+    read.verdict = read_name<Verdict>(file["verdict"], verdict_names);
+    read.why = file["why"].words();
+    read.longest_period_s = file["longest_period_s"].not_negative();
+    if (const std::string wrong = disagreement(read, model); !wrong.empty()) {
+        throw std::invalid_argument(wrong);
+    }
+    return read;
+}
+
+}  // namespace palpate::detail

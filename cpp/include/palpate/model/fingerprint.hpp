@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "palpate/model/force_model.hpp"
+
+namespace palpate {
+
+namespace detail {
+
+/// FNV-1a over the bits of numbers: another number anywhere gives another value.
+class NumberHash {
+  public:
+    void add(std::uint64_t bits) noexcept {
+        for (int byte = 0; byte < 8; ++byte) {
+            value_ = (value_ ^ ((bits >> (8 * byte)) & 0xFFU)) * 0x100000001B3U;
+        }
+    }
+    void add(double number) noexcept { add(std::bit_cast<std::uint64_t>(number)); }
+    void add(const std::vector<double>& numbers) noexcept {
+        add(static_cast<std::uint64_t>(numbers.size()));
+        for (const double number : numbers) {
+            add(number);
+        }
+    }
+    [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
+
+  private:
+    std::uint64_t value_ = 0xCBF29CE484222325U;
+};
+
+}  // namespace detail
+
+/// 16 hexadecimal digits that change with every number of which a model's force is made: network, domain,
+/// continuation, play radius. It tells an edited model from the one that was certified; it is no signature.
+[[nodiscard]] inline std::string fingerprint(const ForceModel& model) {
+    detail::NumberHash hash;
+    const NetworkParameters& network = model.parameters();
+    hash.add(static_cast<std::uint64_t>(network.dimension));
+    hash.add(network.alpha);
+    hash.add(network.beta);
+    hash.add(network.weight);
+    hash.add(network.linear);
+    hash.add(network.bias);
+    if (const HysteresisNetwork* pair = model.hysteresis()) {
+        const NetworkParameters& loss = pair->loss().parameters();
+        hash.add(loss.weight);
+        hash.add(loss.linear);
+        hash.add(loss.bias);
+    }
+    const Domain& domain = model.domain();
+    hash.add(domain.lower);
+    hash.add(domain.upper);
+    hash.add(static_cast<std::uint64_t>(domain.below));
+    hash.add(static_cast<std::uint64_t>(domain.above));
+    hash.add(domain.period.value_or(0.0));
+    hash.add(model.play_radius().value_or(0.0));
+    constexpr std::array<char, 17> digits{"0123456789abcdef"};
+    std::string text;
+    for (int shift = 60; shift >= 0; shift -= 4) {
+        text += digits[(hash.value() >> shift) & 0xFU];
+    }
+    return text;
+}
+
+}  // namespace palpate

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <string>
+
+namespace palpate {
+
+/// A number as a person reads it: four significant digits, and no exponent where whole digits say it better.
+[[nodiscard]] inline std::string readable(double value) {
+    std::array<char, 32> digits{};
+    char* const first = digits.data();
+    char* const last = first + digits.size();
+    const double size = std::abs(value);
+    const bool whole = size >= 1e3 && size < 1e7;
+    return {first, whole ? std::to_chars(first, last, value, std::chars_format::fixed, 0).ptr
+                         : std::to_chars(first, last, value, std::chars_format::general, 4).ptr};
+}
+
+}  // namespace palpate

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "palpate/device/device_profile.hpp"
+#include "palpate/model/fingerprint.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/readable.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
+#include "palpate/stability/direct_inequalities.hpp"
+#include "palpate/stability/explicit_inequalities.hpp"
+#include "palpate/stability/force_bounds.hpp"
+#include "palpate/stability/inequality.hpp"
+
+namespace palpate {
+
+enum class Verdict : std::uint8_t {
+    Certified,      ///< no motion of the handle can take more energy out than went in
+    StableLocally,  ///< the linearised system is stable; energy is not accounted for
+    Refused,
+};
+
+inline constexpr std::array<std::string_view, 3> verdict_names{
+    "certified", "stable (local), passivity not certified", "refused"};
+
+[[nodiscard]] constexpr std::string_view name_of(Verdict verdict) noexcept {
+    return verdict_names[static_cast<std::size_t>(verdict)];
+}
+
+/// What is proved of a model, rendered by a scheme, on a device: every inequality with both its sides.
+struct Certificate {
+    Scheme scheme;
+    DeviceProfile device;
+    std::string model;   ///< its fingerprint; empty where only bounds were certified
+    ForceBounds bounds;  ///< of the force that is rendered, compensation included
+    std::vector<Inequality> inequalities;
+    Verdict verdict = Verdict::Refused;
+    std::string why;                ///< one sentence
+    double longest_period_s = 0.0;  ///< up to which all inequalities hold; 0 where they do not
+
+    [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
+};
+
+/// The inequalities of a scheme, whatever they say. Fields that the structure has no use for are ignored.
+[[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
+                                                             const DeviceProfile& device) {
+    switch (scheme.structure) {
+        case StructureKind::Direct:
+            return bounds.hysteresis ? hysteresis_inequalities(bounds, device)
+                                     : direct_inequalities(bounds, device);
+        case StructureKind::Massless:
+            return massless_inequalities(bounds, scheme.coupling, device);
+        case StructureKind::Implicit:
+            return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
+        case StructureKind::EnergyConsistent:
+            return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
+        case StructureKind::Explicit:
+            break;
+    }
+    return explicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
+}
+
+namespace detail {
+
+/// The longest period for which every line holds, all else as it is: right sides grow with it in proportion.
+[[nodiscard]] inline double longest_period(const std::vector<Inequality>& lines, const ForceBounds& bounds,
+                                           const Scheme& scheme, const DeviceProfile& device) {
+    constexpr double most = 100.0;  // of the longest period asked for: as good as any
+    DeviceProfile later = device;
+    later.jitter_s += device.longest_period_s();
+    const std::vector<Inequality> doubled = inequalities_of(bounds, scheme, later);
+    double factor = most;
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+        const double growth = doubled[k].right - lines[k].right;
+        if (growth > 0.0) {
+            factor = std::min(factor, 1.0 + lines[k].margin() / growth);
+        }
+    }
+    return factor * device.longest_period_s();
+}
+
+[[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
+    const Inequality* least = nullptr;
+    const auto room = [](const Inequality& line) { return line.margin() / std::abs(line.left); };
+    for (const Inequality& line : lines) {
+        if (line.left != 0.0 && (least == nullptr || room(line) < room(*least))) {
+            least = &line;
+        }
+    }
+    return least;
+}
+
+[[nodiscard]] inline std::string reason(const std::vector<Inequality>& lines, Verdict verdict) {
+    for (const Inequality& line : lines) {
+        if (!line.holds()) {
+            return (line.rests_on == Basis::None ? "no bound is known: " : "") + shortfall(line);
+        }
+    }
+    std::string text = verdict == Verdict::Certified
+                           ? "every inequality is proved and holds"
+                           : "the linearised system is stable; energy is not accounted for";
+    if (const Inequality* least = tightest(lines)) {
+        text += "; the tightest, " + least->name + ", has " +
+                readable(100.0 * least->margin() / std::abs(least->left)) + " % to spare";
+    }
+    return text;
+}
+
+}  // namespace detail
+
+/// What is proved of any force within bounds.
+[[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
+                                         const DeviceProfile& device) {
+    Certificate certificate{scheme, device, "", bounds, {}, Verdict::Refused, "", 0.0};
+    if (scheme.compensated) {
+        certificate.bounds = compensated(bounds, scheme.coupling.stiffness);
+    }
+    std::vector<Inequality> lines = inequalities_of(certificate.bounds, scheme, device);
+    const auto all = [&](const auto& condition) {
+        return std::all_of(lines.begin(), lines.end(), condition);
+    };
+    if (!certificate.bounds.finite()) {
+        certificate.why = "a bound of the model is not a finite number";
+        certificate.inequalities = std::move(lines);
+        return certificate;
+    }
+    if (all([](const Inequality& line) { return line.holds(); })) {
+        const bool proved = all([](const Inequality& line) { return line.rests_on != Basis::Linear; });
+        certificate.verdict = proved ? Verdict::Certified : Verdict::StableLocally;
+        certificate.longest_period_s = detail::longest_period(lines, certificate.bounds, scheme, device);
+    }
+    certificate.why = detail::reason(lines, certificate.verdict);
+    certificate.inequalities = std::move(lines);
+    return certificate;
+}
+
+/// What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason; a scheme
+/// or a profile that is impossible throws std::invalid_argument.
+[[nodiscard]] inline Certificate certify(const ForceModel& model, const Scheme& scheme,
+                                         const DeviceProfile& device) {
+    validate(device);
+    validate(scheme, model);
+    Certificate certificate = certify(force_bounds(model, scheme.play_radius), scheme, device);
+    certificate.model = fingerprint(model);
+    return certificate;
+}
+
+}  // namespace palpate

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "palpate/model/force_model.hpp"
+#include "palpate/stability/certificate.hpp"
+
+namespace palpate {
+
+/// Whether two computations of one number agree: on another machine the last digits may differ.
+[[nodiscard]] inline bool agree(double stored, double recomputed) noexcept {
+    return std::abs(stored - recomputed) <= 1e-9 * std::max(std::abs(stored), std::abs(recomputed));
+}
+
+namespace detail {
+
+[[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed) {
+    return "certificate." + path + " is " + readable(stored) + ": must be " + readable(recomputed) +
+           ", which is what model and device give; plan it again";
+}
+
+[[nodiscard]] inline std::string bounds_disagree(const ForceBounds& stored, const ForceBounds& now) {
+    for (const auto& [name, left, right] : {std::tuple{"slope_min", stored.slope.lower, now.slope.lower},
+                                            {"slope_max", stored.slope.upper, now.slope.upper},
+                                            {"steepest", stored.steepest, now.steepest},
+                                            {"sliding", stored.sliding, now.sliding},
+                                            {"loss_min", stored.loss.lower, now.loss.lower},
+                                            {"loss_max", stored.loss.upper, now.loss.upper},
+                                            {"loss_per_play", stored.loss_per_play, now.loss_per_play},
+                                            {"mean_force", stored.mean_force, now.mean_force}}) {
+        if (!agree(left, right)) {
+            return disagrees(std::string("bounds.") + name, left, right);
+        }
+    }
+    return "";
+}
+
+[[nodiscard]] inline std::string line_disagrees(const std::string& path, const Inequality& stored,
+                                                const Inequality& now) {
+    if (stored.name != now.name) {
+        return "certificate." + path + ".name is \"" + stored.name + "\": must be \"" + now.name + "\"";
+    }
+    if (!agree(stored.left, now.left)) {
+        return disagrees(path + ".left", stored.left, now.left);
+    }
+    if (!agree(stored.right, now.right)) {
+        return disagrees(path + ".right", stored.right, now.right);
+    }
+    if (stored.rests_on != now.rests_on) {
+        return "certificate." + path + ".rests_on is \"" + std::string(name_of(stored.rests_on)) +
+               "\": must be \"" + std::string(name_of(now.rests_on)) + "\"";
+    }
+    if (stored.strict != now.strict) {
+        return "certificate." + path + ".strict is " + (stored.strict ? "true" : "false") + ": must be " +
+               (now.strict ? "true" : "false");
+    }
+    return "";
+}
+
+}  // namespace detail
+
+/// The first field in which a device is not the one that was certified, as a sentence; empty where it is that one.
+[[nodiscard]] inline std::string device_difference(const DeviceProfile& certified,
+                                                   const DeviceProfile& device) {
+    const std::string opening = "the certificate is for the device " + certified.id;
+    if (device.id != certified.id) {
+        return opening + ", and this is " + device.id + "; plan it again for this one";
+    }
+    if (device.position_unit != certified.position_unit) {
+        return opening + " in " + certified.position_unit + ", and here it moves in " + device.position_unit;
+    }
+    for (const auto& [name, before, now] :
+         {std::tuple{"period_s", certified.period_s, device.period_s},
+          {"jitter_s", certified.jitter_s, device.jitter_s},
+          {"inertia", certified.inertia, device.inertia},
+          {"viscous_damping", certified.viscous_damping, device.viscous_damping},
+          {"coulomb_friction", certified.coulomb_friction, device.coulomb_friction},
+          {"encoder_step", certified.encoder_step, device.encoder_step},
+          {"force_step", certified.force_step, device.force_step},
+          {"delay_samples", double(certified.delay_samples), double(device.delay_samples)},
+          {"force_limit", certified.force_limit, device.force_limit}}) {
+        if (!agree(before, now)) {
+            return opening + " with " + name + " = " + readable(before) + ", and here it is " +
+                   readable(now) + "; plan it again";
+        }
+    }
+    return "";
+}
+
+/// The first thing in a stored certificate that is not what the model gives today, as a sentence that begins with
+/// its field; empty where everything agrees. Everything is computed again: nothing that is stored is believed.
+[[nodiscard]] inline std::string disagreement(const Certificate& stored, const ForceModel& model) {
+    if (const std::string now = fingerprint(model); stored.model != now) {
+        return "certificate.model is \"" + stored.model + "\": must be \"" + now +
+               "\", that of this network; it was changed after it was certified, plan it again";
+    }
+    Certificate now;
+    try {
+        now = certify(model, stored.scheme, stored.device);
+    } catch (const std::invalid_argument& error) {
+        return std::string("certificate is of an impossible plan: ") + error.what();
+    }
+    if (now.verdict == Verdict::Refused) {
+        return "certificate.verdict is \"" + std::string(name_of(stored.verdict)) +
+               "\": must be \"refused\", " + now.why;
+    }
+    if (stored.verdict != now.verdict) {
+        return "certificate.verdict is \"" + std::string(name_of(stored.verdict)) + "\": must be \"" +
+               std::string(name_of(now.verdict)) + "\"";
+    }
+    if (std::string wrong = detail::bounds_disagree(stored.bounds, now.bounds); !wrong.empty()) {
+        return wrong;
+    }
+    if (stored.inequalities.size() != now.inequalities.size()) {
+        return "certificate.inequalities has " + std::to_string(stored.inequalities.size()) +
+               " lines: must have " + std::to_string(now.inequalities.size());
+    }
+    for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
+        const std::string path = "inequalities[" + std::to_string(k) + "]";
+        if (std::string wrong = detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]);
+            !wrong.empty()) {
+            return wrong;
+        }
+    }
+    if (!agree(stored.longest_period_s, now.longest_period_s)) {
+        return detail::disagrees("longest_period_s", stored.longest_period_s, now.longest_period_s);
+    }
+    return "";
+}
+
+}  // namespace palpate

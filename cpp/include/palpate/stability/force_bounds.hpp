@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "palpate/model/bounds.hpp"
+#include "palpate/model/force_model.hpp"
+
+namespace palpate {
+
+/// Proved bounds of a model over every position that can be reached, continuations included. For a force with
+/// hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h/r more while it sticks.
+struct ForceBounds {
+    bool hysteresis = false;
+    Interval slope;              ///< of every path: f', or g' - |h'| to g' + |h'| + h/r
+    double steepest = 0.0;       ///< L = max |f'|, or max(|g'| + |h'| + h/r)
+    double sliding = 0.0;        ///< max |f'|, or max(|g'| + |h'|)
+    Interval loss;               ///< h; 0 without hysteresis
+    double loss_per_play = 0.0;  ///< max h/r
+    double mean_force = 0.0;     ///< |mean| over a period; what is left of it makes a motor
+
+    /// M = max(0, max f'); NaN stays NaN
+    [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
+    /// s_ = max(0, -min f'); NaN stays NaN
+    [[nodiscard]] double falling() const noexcept { return slope.lower >= 0.0 ? 0.0 : -slope.lower; }
+
+    /// Whether every bound is a number. Nothing is certified of one that is not.
+    [[nodiscard]] bool finite() const noexcept {
+        return std::isfinite(slope.lower) && std::isfinite(slope.upper) && std::isfinite(steepest) &&
+               std::isfinite(sliding) && std::isfinite(loss.lower) && std::isfinite(loss.upper) &&
+               std::isfinite(loss_per_play) && std::isfinite(mean_force);
+    }
+};
+
+/// The slope K_c k / (K_c + k) that is felt through a coupling where the object's is k > -K_c.
+[[nodiscard]] inline double felt_slope(double slope, double coupling_stiffness) noexcept {
+    return coupling_stiffness * slope / (coupling_stiffness + slope);
+}
+
+/// The bounds of a static force whose coupling was taken out of it beforehand: slopes K_c f' / (K_c - f').
+[[nodiscard]] inline ForceBounds compensated(const ForceBounds& bounds, double coupling_stiffness) noexcept {
+    const auto hardened = [&](double slope) {
+        return slope < coupling_stiffness ? -felt_slope(-slope, coupling_stiffness)
+                                          : std::numeric_limits<double>::infinity();
+    };
+    ForceBounds result = bounds;
+    result.slope = {hardened(bounds.slope.lower), hardened(bounds.slope.upper)};
+    result.steepest = result.sliding = result.slope.largest();
+    return result;
+}
+
+namespace detail {
+
+/// How much wider than the true range the bounds of a slope may be [of the steepest]: what they are wider by is
+/// stiffness that is not rendered.
+inline constexpr double slope_slack = 0.002;
+
+/// Proved bounds over [from, to] of a g' + b h' + c h, where h shares the wavelets of g.
+struct SlopeReading {
+    double of_force_slope = 1.0;  ///< a
+    double of_loss_slope = 0.0;   ///< b
+    double of_loss = 0.0;         ///< c
+};
+
+[[nodiscard]] inline Interval reading_bounds(const NetworkParameters& force, const NetworkParameters& loss,
+                                             const SlopeReading& reading, double from, double to,
+                                             double relative = slope_slack) {
+    NetworkParameters slope_of = force;
+    NetworkParameters value_of = loss;
+    for (std::size_t i = 0; i < force.weight.size(); ++i) {
+        slope_of.weight[i] =
+            reading.of_force_slope * force.weight[i] + reading.of_loss_slope * loss.weight[i];
+        value_of.weight[i] = reading.of_loss * loss.weight[i];
+    }
+    slope_of.linear[0] = reading.of_force_slope * force.linear[0] + reading.of_loss_slope * loss.linear[0];
+    value_of.linear[0] = reading.of_loss * loss.linear[0];
+    value_of.bias = reading.of_loss * loss.bias;
+    const double c = slope_of.linear[0];
+    const double d = value_of.linear[0];
+    double absolute =
+        std::abs(c) + std::abs(value_of.bias) + std::abs(d) * std::max(std::abs(from), std::abs(to));
+    for (std::size_t i = 0; i < slope_of.weight.size(); ++i) {
+        absolute += std::abs(slope_of.weight[i]) * slope_of.alpha[i] * wavelet_slope_bound +
+                    std::abs(value_of.weight[i]);
+    }
+    const auto value = [&](double x) noexcept {
+        double sum = c + d * x + value_of.bias;
+        for (std::size_t i = 0; i < slope_of.weight.size(); ++i) {
+            const double alpha = slope_of.alpha[i];
+            const MexicanHat hat = mexican_hat(alpha * (x - slope_of.beta[i]));
+            sum += slope_of.weight[i] * alpha * hat.slope + value_of.weight[i] * hat.value;
+        }
+        return sum;
+    };
+    const auto rate = [&](double left, double right) noexcept {
+        const Interval bend = sum_of_ranges(slope_of, hat_curvature, 2, left, right);
+        const Interval tilt = sum_of_ranges(value_of, hat_slope, 1, left, right);
+        return Interval{bend.lower + tilt.lower + d, bend.upper + tilt.upper + d};
+    };
+    return with_rounding(enclose(from, to, relative, value, rate), absolute, force.weight.size());
+}
+
+/// The slopes that a continuation can have: its line's, and none beyond its reach.
+[[nodiscard]] inline Interval line_slopes(const EdgeLine& line) noexcept {
+    const double slope = line.at_edge.slope;
+    return std::isfinite(line.reach) ? Interval{std::min(slope, 0.0), std::max(slope, 0.0)}
+                                     : Interval{slope, slope};
+}
+
+/// Bounds of h, sharpened until its sign is certain or does not matter: h >= 0 is imposed with a margin that
+/// is small beside its largest value.
+[[nodiscard]] inline Interval loss_bounds(const NetworkParameters& loss, double from, double to) {
+    Interval bounds;
+    for (const double relative : {1e-2, 1e-4, 1e-6}) {
+        bounds = value_bounds(loss, from, to, relative);
+        if (bounds.lower >= 0.0) {
+            break;
+        }
+    }
+    return bounds;
+}
+
+/// |mean| over a period; what rounding alone can have left counts as none.
+[[nodiscard]] inline double mean_over_period(const NetworkCurve& curve) noexcept {
+    if (!curve.periodic()) {
+        return 0.0;
+    }
+    const NetworkParameters& network = curve.parameters();
+    const double reach = std::max(std::abs(curve.lower()), std::abs(curve.upper()));
+    double size = std::abs(network.bias) + std::abs(network.linear[0]) * reach;
+    for (const double weight : network.weight) {
+        size += std::abs(weight);
+    }
+    const double turn = curve.inside(curve.upper()).integral - curve.inside(curve.lower()).integral;
+    const double mean = std::abs(turn / (curve.upper() - curve.lower()));
+    return mean <= 1e-12 * size * std::max(1.0, reach / (curve.upper() - curve.lower())) ? 0.0 : mean;
+}
+
+[[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve) {
+    ForceBounds bounds;
+    bounds.slope = slope_bounds(curve.parameters(), curve.lower(), curve.upper(), slope_slack);
+    if (!curve.periodic()) {
+        for (const EdgeLine& line : {curve.below(), curve.above()}) {
+            const Interval slopes = line_slopes(line);
+            bounds.slope = {std::min(bounds.slope.lower, slopes.lower),
+                            std::max(bounds.slope.upper, slopes.upper)};
+        }
+    }
+    bounds.steepest = bounds.sliding = bounds.slope.largest();
+    bounds.mean_force = mean_over_period(curve);
+    return bounds;
+}
+
+[[nodiscard]] inline ForceBounds hysteresis_bounds(const HysteresisNetwork& pair, double radius) {
+    const NetworkCurve& g = pair.force();
+    const NetworkCurve& h = pair.loss();
+    const auto over_domain = [&](double a, double b, double c) {
+        return reading_bounds(g.parameters(), h.parameters(), {a, b, c}, g.lower(), g.upper());
+    };
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    ForceBounds bounds;
+    bounds.hysteresis = true;
+    bounds.slope = {infinite, -infinite};
+    for (const double s : {-1.0, 1.0}) {
+        const Interval slide = over_domain(1.0, s, 0.0);
+        const double rising_stick = over_domain(1.0, s, 1.0 / radius).upper;
+        const double falling_stick = over_domain(-1.0, s, 1.0 / radius).upper;
+        bounds.slope = {std::min(bounds.slope.lower, slide.lower),
+                        std::max({bounds.slope.upper, slide.upper, rising_stick})};
+        bounds.sliding = std::max(bounds.sliding, slide.largest());
+        bounds.steepest = std::max({bounds.steepest, slide.largest(), rising_stick, falling_stick});
+    }
+    bounds.loss = loss_bounds(h.parameters(), g.lower(), g.upper());
+    if (!g.periodic()) {
+        for (const auto& [line, loss] : {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
+            const Interval slopes = line_slopes(line);
+            const double loss_slope = std::abs(loss.at_edge.slope);
+            if (std::isfinite(loss.reach)) {  // it dies out
+                bounds.loss.lower = std::min(bounds.loss.lower, 0.0);
+            }
+            const double stick = std::max(0.0, loss.at_edge.value) / radius;
+            const double rounding = 1e-12 * (slopes.largest() + loss_slope + stick);
+            const double slide = slopes.largest() + loss_slope + rounding;
+            bounds.slope = {std::min(bounds.slope.lower, slopes.lower - loss_slope - rounding),
+                            std::max(bounds.slope.upper, slopes.upper + loss_slope + stick + rounding)};
+            bounds.sliding = std::max(bounds.sliding, slide);
+            bounds.steepest = std::max(bounds.steepest, slide + stick);
+        }
+    }
+    bounds.loss_per_play = std::max(0.0, bounds.loss.upper) / radius;
+    bounds.mean_force = mean_over_period(g);
+    return bounds;
+}
+
+}  // namespace detail
+
+/// The bounds of a model of one position; `play_radius` in place of the model's own where it is above 0.
+/// Throws std::invalid_argument for a model of several inputs.
+[[nodiscard]] inline ForceBounds force_bounds(const ForceModel& model, double play_radius = 0.0) {
+    require_one_input(model.parameters());
+    if (const WaveletNetwork* network = model.network()) {
+        return detail::static_bounds(network->curve());
+    }
+    const HysteresisNetwork& pair = *model.hysteresis();
+    return detail::hysteresis_bounds(pair, play_radius > 0.0 ? play_radius : pair.play_radius());
+}
+
+}  // namespace palpate

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <ostream>
+
+#include "palpate/closed_loop.hpp"
+#include "palpate/device/hands.hpp"
+#include "palpate/model/energy.hpp"
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/stability/certificate.hpp"
+#include "support.hpp"
+
+namespace palpate::test {
+
+/// A hand that takes hold of a resting handle after a while: what the first forces of a delayed device find is
+/// the object at rest.
+template <SimulatedHand H>
+struct Later {
+    H hand;
+    double from = 0.0;  ///< [s]
+
+    [[nodiscard]] Grip grip(double time, const Motion& handle) noexcept {
+        return time < from ? Grip{1e9, 1e6, handle.position, 0.0, 0.0} : hand.grip(time, handle);
+    }
+};
+
+struct Scene {
+    ForceModel model;
+    Scheme scheme;
+    DeviceProfile device;
+    double start = 0.0;
+    double steepest = 0.0;  ///< where f' is largest
+
+    /// What the object holds at the start above its least, and the largest |V|.
+    double held = 0.0;
+    double largest = 0.0;
+};
+
+inline ForceModel random_model(Random& random, bool hysteresis) {
+    NetworkParameters network = random_network(random, random() % 7);
+    if (random() % 2 == 0) {  // rising everywhere
+        network.linear[0] -= slope_bounds(network, 0.0, 1.0).lower;
+    }
+    const auto side = [&] { return random() % 2 == 0 ? Continuation::Linear : Continuation::Free; };
+    const Domain domain = unit_domain(side(), side());
+    if (!hysteresis) {
+        return {network, domain};
+    }
+    LossParameters loss;
+    NetworkParameters h = network;
+    h.linear = {0.0};
+    h.bias = 0.0;
+    for (double& weight : h.weight) {
+        weight *= uniform(random, -0.3, 0.3);
+    }
+    loss.weight = h.weight;
+    loss.bias = 0.01 - value_bounds(h, 0.0, 1.0, 1e-4).lower + uniform(random, 0.0, 0.1);
+    return {network, loss, domain, uniform(random, 0.005, 0.05)};
+}
+
+inline double steepest_place(const ForceModel& model) {
+    double place = 0.0;
+    double most = -1e300;
+    for (int k = 0; k <= 400; ++k) {
+        const double x = k / 400.0;
+        const double slope = model.hysteresis() != nullptr ? model.hysteresis()->sliding(x, 0.0).slope
+                                                           : model.network()->at(x, {}).slope;
+        if (slope > most) {
+            most = slope;
+            place = x;
+        }
+    }
+    return place;
+}
+
+/// V of the object that a structure sees, at rest.
+inline double energy_at(const ForceModel& model, const Scheme& scheme, double x) {
+    if (scheme.compensated) {
+        return Compensated{*model.network(), scheme.coupling.stiffness}.at(x, {}).energy;
+    }
+    return model.hysteresis() != nullptr ? model.hysteresis()->force().at(x).integral
+                                         : model.network()->at(x, {}).energy;
+}
+
+/// A device with exactly the damping and friction that the certificate asks for, times `room`. Nothing where
+/// the scene cannot be certified by any.
+inline std::optional<DeviceProfile> just_enough(const ForceModel& model, const Scheme& scheme,
+                                                DeviceProfile device, double room) {
+    constexpr double any_damping = 12345.0;
+    constexpr double any_friction = 54321.0;
+    device.viscous_damping = any_damping;
+    device.coulomb_friction = any_friction;
+    const Certificate generous = certify(model, scheme, device);
+    if (!generous.certified()) {
+        return std::nullopt;
+    }
+    device.viscous_damping = device.coulomb_friction = 0.0;
+    for (const Inequality& line : generous.inequalities) {
+        if (line.left == any_damping) {
+            device.viscous_damping = std::max(device.viscous_damping, line.right * room);
+        } else if (line.left == any_friction) {
+            device.coulomb_friction = std::max(device.coulomb_friction, line.right * room);
+        }
+    }
+    return device;
+}
+
+/// A random scene that is certified, with a margin of `room` - 1 in damping and friction.
+inline Scene random_certified_scene(Random& random, double room) {
+    for (;;) {
+        constexpr std::array kinds{StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit,
+                                   StructureKind::EnergyConsistent};
+        const ForceModel model = random_model(random, random() % 3 == 0);
+        const double scale = std::max(1.0, model.slope_bounds().largest());
+        Scheme scheme;
+        scheme.structure = kinds[random() % kinds.size()];
+        scheme.coupling = {scale * std::exp(uniform(random, -1.5, 1.5)), 0.0};
+        if (random() % 3 != 0) {
+            scheme.coupling.damping = scheme.coupling.stiffness * 1e-3 * uniform(random, 0.0, 2.0);
+        }
+        scheme.inertia = {std::exp(uniform(random, -10.0, -5.0)), uniform(random, 0.0, 0.1)};
+        scheme.compensated = scheme.structure == StructureKind::Massless && model.hysteresis() == nullptr &&
+                             model.slope_bounds().upper <= 0.9 * scheme.coupling.stiffness &&
+                             random() % 2 == 0;
+        DeviceProfile device;
+        device.period_s = uniform(random, 3e-4, 2e-3);
+        device.inertia = std::exp(uniform(random, -10.0, -5.0));
+        device.delay_samples = static_cast<int>(random() % 3);
+        device.force_limit = 1e9;
+        const bool steps = random() % 2 == 0 && !has_mass(scheme.structure);
+        device.encoder_step = steps ? std::exp(uniform(random, -11.0, -5.0)) : 0.0;
+        device.force_step = random() % 3 == 0 ? uniform(random, 0.0, 0.02) : 0.0;
+        const std::optional<DeviceProfile> enough = just_enough(model, scheme, device, room);
+        if (!enough) {
+            continue;
+        }
+        double start = uniform(random, -0.1, 1.1);
+        if (steps) {
+            start = device.encoder_step * std::floor(start / device.encoder_step);
+        }
+        const EnergyRange range = energy_range(model);
+        return {model,
+                scheme,
+                *enough,
+                start,
+                steepest_place(model),
+                energy_at(model, scheme, start) - range.least,
+                std::max(std::abs(range.least), std::abs(range.largest))};
+    }
+}
+
+template <SimulatedHand H, class Watch>
+ClosedLoopEnd run(const Scene& scene, H hand, std::size_t ticks, int substeps, Watch watch) {
+    const double from = (scene.device.delay_samples + 2) * scene.device.period_s;
+    return with_structure(scene.model, scene.scheme, scene.device.period_s, [&](auto structure) {
+        const ClosedLoopSettings settings{substeps, scene.start, 0.0, Guards{.limit = {1e9}}};
+        return closed_loop(std::move(structure), scene.device, Later<H>{hand, from}, ticks, settings, watch);
+    });
+}
+
+inline std::ostream& operator<<(std::ostream& out, const Scene& scene) {
+    return out << name_of(scene.scheme.structure)
+               << (scene.model.hysteresis() != nullptr ? " hysteresis" : "")
+               << (scene.scheme.compensated ? " compensated" : "")
+               << ", K_c = " << scene.scheme.coupling.stiffness << ", B_c = " << scene.scheme.coupling.damping
+               << ", m = " << scene.scheme.inertia.mass << ", B_o = " << scene.scheme.inertia.damping
+               << ", T = " << scene.device.period_s << ", J = " << scene.device.inertia
+               << ", b = " << scene.device.viscous_damping << ", f_c = " << scene.device.coulomb_friction
+               << ", encoder step " << scene.device.encoder_step << ", force step " << scene.device.force_step
+               << ", delay " << scene.device.delay_samples << ", start " << scene.start;
+}
+
+}  // namespace palpate::test

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/stability/certificate.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+/// The bounds of a static force whose slope lies between two numbers.
+ForceBounds slopes(double lower, double upper) {
+    ForceBounds bounds;
+    bounds.slope = {lower, upper};
+    bounds.steepest = bounds.sliding = bounds.slope.largest();
+    return bounds;
+}
+
+/// A device whose encoder and command have no steps.
+DeviceProfile smooth(double viscous_damping, int delay_samples = 0) {
+    DeviceProfile device;
+    device.viscous_damping = viscous_damping;
+    device.encoder_step = 0.0;
+    device.delay_samples = delay_samples;
+    return device;
+}
+
+Scheme scheme_of(StructureKind structure, VirtualCoupling coupling = {}, Inertia inertia = {}) {
+    Scheme scheme;
+    scheme.structure = structure;
+    scheme.coupling = coupling;
+    scheme.inertia = inertia;
+    return scheme;
+}
+
+constexpr std::array<StructureKind, 3> coupled{StructureKind::Massless, StructureKind::Implicit,
+                                               StructureKind::EnergyConsistent};
+
+TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
+    // b >= T M / 2 + n_d T L: 62 N*m/rad at 1 ms needs 0.031, and 0.062 more for a sample of delay.
+    EXPECT_TRUE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.031)).certified());
+    EXPECT_FALSE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0309)).certified());
+    EXPECT_TRUE(
+        certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0931, 1)).certified());
+    EXPECT_FALSE(
+        certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0929, 1)).certified());
+}
+
+TEST(Certificate, AFallingForceNeedsDampingOnlyWithDelay) {
+    EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0)).certified());
+    EXPECT_FALSE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.05, 1)).certified());
+}
+
+TEST(Certificate, FrictionSwallowsHalfAStepOfEncoderAndForce) {
+    DeviceProfile device = smooth(1.0);
+    device.encoder_step = 1e-3;
+    device.force_step = 2e-3;
+    device.coulomb_friction = 62.0 * 0.5e-3 + 1e-3;
+    EXPECT_TRUE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), device).certified());
+    device.coulomb_friction *= 0.999;
+    EXPECT_FALSE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), device).certified());
+}
+
+TEST(Certificate, BehindACouplingItIsTheCouplingThatCounts) {
+    for (const StructureKind structure : coupled) {
+        const Scheme scheme = scheme_of(structure, {100.0, 0.02}, {0.001, 0.0});
+        for (const double steepest : {1.0, 1e6}) {
+            EXPECT_TRUE(certify(slopes(0.0, steepest), scheme, smooth(0.0701)).certified());
+            EXPECT_FALSE(certify(slopes(0.0, steepest), scheme, smooth(0.07)).certified()) << "b > , not >=";
+        }
+    }
+}
+
+TEST(Certificate, MasslessWithoutDampingIsAStaticForceOfTheFeltSlope) {
+    // K_c f' / (K_c + f') = 100 * 300 / 400 = 75.
+    const Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
+    EXPECT_TRUE(certify(slopes(0.0, 300.0), scheme, smooth(0.0376)).certified());
+    EXPECT_FALSE(certify(slopes(0.0, 300.0), scheme, smooth(0.0374)).certified());
+    // Falling parts become steeper: -50 is felt as -100, which counts with delay.
+    EXPECT_TRUE(certify(slopes(-50.0, 0.0), scheme, smooth(0.1001, 1)).certified());
+    EXPECT_FALSE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0999, 1)).certified());
+    EXPECT_FALSE(certify(slopes(-100.0, 0.0), scheme, smooth(10.0)).certified());
+}
+
+TEST(Certificate, CompensationTakesTheCouplingOutAgain) {
+    // With B_c = 0 the compensated massless structure is direct rendering, in every inequality.
+    Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
+    scheme.compensated = true;
+    DeviceProfile device = smooth(0.06, 1);
+    device.encoder_step = 1e-4;
+    const Certificate compensated = certify(slopes(-15.0, 62.0), scheme, device);
+    const Certificate direct = certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), device);
+    ASSERT_EQ(compensated.inequalities.size(), direct.inequalities.size() + 1);
+    for (std::size_t k = 0; k < direct.inequalities.size(); ++k) {
+        EXPECT_NEAR(compensated.inequalities[k + 1].right, direct.inequalities[k].right, 1e-12);
+    }
+    EXPECT_EQ(certify(slopes(0.0, 100.0), scheme, smooth(10.0)).verdict, Verdict::Refused) << "f' = K_c";
+}
+
+TEST(Certificate, AForceMayFallAsSteeplyAsCouplingAndDampingAllow) {
+    // Massless: s_ <= K_c + B_c / T = 120. With mass: s_ <= K_c + (B_c + 2 B_o) / T = 520; the mass does not help.
+    const Scheme massless = scheme_of(StructureKind::Massless, {100.0, 0.02});
+    EXPECT_TRUE(certify(slopes(-119.9, 5.0), massless, smooth(1.0)).certified());
+    EXPECT_FALSE(certify(slopes(-120.1, 5.0), massless, smooth(1.0)).certified());
+    for (const double mass : {0.01, 1.0}) {
+        const Scheme implicit = scheme_of(StructureKind::Implicit, {100.0, 0.02}, {mass, 0.2});
+        EXPECT_TRUE(certify(slopes(-519.9, 5.0), implicit, smooth(1.0)).certified());
+        EXPECT_FALSE(certify(slopes(-520.1, 5.0), implicit, smooth(1.0)).certified());
+    }
+    const Scheme consistent = scheme_of(StructureKind::EnergyConsistent, {100.0, 0.02}, {0.01, 0.2});
+    EXPECT_TRUE(certify(slopes(-5000.0, 5.0), consistent, smooth(1.0)).certified());
+}
+
+TEST(Certificate, NoBoundIsKnownForSomeAndItSaysSo) {
+    DeviceProfile stepped = smooth(1.0);
+    stepped.encoder_step = 1e-5;
+    stepped.coulomb_friction = 1.0;
+    const auto unknown = [](const Certificate& certificate) {
+        EXPECT_EQ(certificate.verdict, Verdict::Refused);
+        EXPECT_EQ(certificate.why.rfind("no bound is known", 0), 0U) << certificate.why;
+    };
+    for (const StructureKind structure : {StructureKind::Implicit, StructureKind::EnergyConsistent}) {
+        unknown(certify(slopes(0.0, 10.0), scheme_of(structure), stepped));
+    }
+    const Scheme massless = scheme_of(StructureKind::Massless, {100.0, 0.02});
+    EXPECT_TRUE(certify(slopes(-99.0, 10.0), massless, stepped).certified());
+    unknown(certify(slopes(-100.0, 10.0), massless, stepped));
+    unknown(certify(slopes(-1.0, 10.0), massless, smooth(10.0, 1)));
+    EXPECT_TRUE(certify(slopes(0.0, 10.0), massless, smooth(10.0, 1)).certified());
+    ForceBounds play = slopes(0.0, 10.0);
+    play.hysteresis = true;
+    play.loss = {0.0, 1.0};
+    unknown(certify(play, massless, stepped));
+    EXPECT_TRUE(certify(play, massless, smooth(1.0)).certified());
+}
+
+TEST(Certificate, TheGainOfTheEncoderIsTheLargestOfBothEnds) {
+    // K_c = 100, B_c / T = 20: p = 120. kappa = 300: 300 (120 + 20) / 420 = 100; kappa = -80: e = 80 / 20 = 4,
+    // 80 (120 + 80) / 40 = 400.
+    EXPECT_NEAR(detail::massless_gain(slopes(0.0, 300.0), {100.0, 0.02}, 1e-3), 100.0, 1e-9);
+    EXPECT_NEAR(detail::massless_gain(slopes(-80.0, 300.0), {100.0, 0.02}, 1e-3), 400.0, 1e-9);
+}
+
+TEST(Certificate, TheDelayedNeedIsThatOfAFineScanAndNeverBelow) {
+    for (const VirtualCoupling coupling : {VirtualCoupling{100.0, 0.02}, {100.0, 0.0}, {1.0, 1.0}}) {
+        for (const int delay : {1, 2, 5, 16}) {
+            const double corner = 0.5 * coupling.stiffness + coupling.damping / 1e-3;
+            double largest = 0.0;
+            for (int k = 1; k <= 200'003; ++k) {
+                const double half = 0.5 * std::numbers::pi * k / 200'003;
+                const double sine = std::sin((delay + 1) * half);
+                const double tangent = std::tan(half);
+                largest =
+                    std::max(largest, sine * sine *
+                                          (corner * corner + 0.25 * coupling.stiffness * coupling.stiffness /
+                                                                 tangent / tangent) /
+                                          corner);
+            }
+            const double need = coupling_need(coupling, 1e-3, delay);
+            EXPECT_GE(need, largest);
+            EXPECT_LE(need, largest * (1.0 + 3e-6));
+        }
+    }
+}
+
+TEST(Certificate, WithoutDelayTheNeedIsTheHeldCoupling) {
+    EXPECT_DOUBLE_EQ(1e-3 * coupling_need({100.0, 0.02}, 1e-3, 0), 0.07);
+}
+
+TEST(Certificate, TheExplicitNeedIsThatOfTheOracle) {
+    const auto need = [](double slope) {
+        return explicit_need({slope, slope}, {0.001, 0.5}, {100.0, 0.02}, 1e-3, 0);
+    };
+    EXPECT_NEAR(need(2.0), 0.0734, 5e-5);
+    EXPECT_NEAR(need(1000.0), 0.0753, 5e-5);
+    EXPECT_NEAR(need(2800.0), 0.2333, 5e-5);
+    EXPECT_GE(explicit_need({2.0, 2800.0}, {0.001, 0.5}, {100.0, 0.02}, 1e-3, 0), need(2800.0));
+}
+
+TEST(Certificate, TheExplicitStructureIsAtMostStable) {
+    const Scheme scheme = scheme_of(StructureKind::Explicit, {100.0, 0.02}, {0.001, 0.5});
+    // (4 m - 2 (B_o + B_c) T) / T^2 = 2960, of which the coupling takes 100.
+    const Certificate below = certify(slopes(2.0, 2800.0), scheme, smooth(0.24));
+    EXPECT_EQ(below.verdict, Verdict::StableLocally) << below.why;
+    for (const Inequality& line : below.inequalities) {
+        EXPECT_EQ(line.rests_on, Basis::Linear);
+    }
+    EXPECT_EQ(certify(slopes(2.0, 2800.0), scheme, smooth(0.23)).verdict, Verdict::Refused);
+    EXPECT_EQ(certify(slopes(2.0, 2861.0), scheme, smooth(100.0)).verdict, Verdict::Refused);
+    EXPECT_EQ(certify(slopes(-101.0, 2.0), scheme, smooth(100.0)).verdict, Verdict::Refused);
+    EXPECT_EQ(certify(slopes(2.0, 3.0), scheme_of(StructureKind::Explicit, {100.0, 0.02}, {1e-4, 0.5}),
+                      smooth(100.0))
+                  .verdict,
+              Verdict::Refused)
+        << "B_o T > 2 m";
+}
+
+TEST(Certificate, TheComparisonSceneIsCertifiedForNoCoupledStructureAsItStands) {
+    // Slopes -15.2 to 62 on the default device: b = 0.06, f_c = 0, 65536 counts a turn.
+    const ForceBounds scene = slopes(-15.2, 62.0);
+    for (const StructureKind structure : {StructureKind::Massless, StructureKind::Implicit,
+                                          StructureKind::EnergyConsistent, StructureKind::Explicit}) {
+        EXPECT_EQ(certify(scene, scheme_of(structure, {100.0, 0.02}), {}).verdict, Verdict::Refused);
+        EXPECT_EQ(certify(scene, scheme_of(structure, {100.0, 0.02}), smooth(0.06)).verdict,
+                  Verdict::Refused);
+    }
+    Scheme compensated = scheme_of(StructureKind::Massless, {100.0, 0.005});
+    compensated.compensated = true;
+    EXPECT_EQ(certify(scene, compensated, {}).verdict, Verdict::Refused) << "f_c = 0";
+    EXPECT_TRUE(certify(scene, compensated, smooth(0.06)).certified());
+}
+
+TEST(Certificate, VelocityCountsInFull) {
+    const DeviceProfile device = smooth(0.05);
+    EXPECT_TRUE(velocity_inequalities({20.0, 30.0, 0.04, 30.0}, device)[0].holds());
+    EXPECT_FALSE(velocity_inequalities({20.0, 30.0, 0.0401, 30.0}, device)[0].holds());
+    DeviceProfile stepped = device;
+    stepped.encoder_step = 1e-4;
+    stepped.coulomb_friction = 30.0 * 0.5e-4 + 0.04 * 1e-4 / 1e-3;
+    EXPECT_TRUE(velocity_inequalities({20.0, 30.0, 0.04, 30.0}, stepped)[1].holds());
+    stepped.coulomb_friction *= 0.999;
+    EXPECT_FALSE(velocity_inequalities({20.0, 30.0, 0.04, 30.0}, stepped)[1].holds());
+}
+
+TEST(Certificate, HysteresisCountsTheStickAndTheSignOfTheLoss) {
+    ForceBounds bounds = slopes(-10.0, 60.0);
+    bounds.hysteresis = true;
+    bounds.sliding = 20.0;
+    bounds.loss = {0.0, 1.0};
+    bounds.loss_per_play = 40.0;
+    EXPECT_TRUE(certify(bounds, scheme_of(StructureKind::Direct), smooth(0.03)).certified());
+    EXPECT_FALSE(certify(bounds, scheme_of(StructureKind::Direct), smooth(0.0299)).certified());
+    DeviceProfile stepped = smooth(0.03);
+    stepped.encoder_step = 1e-3;
+    stepped.coulomb_friction = (20.0 + 2.0 * 40.0) * 0.5e-3;
+    EXPECT_TRUE(certify(bounds, scheme_of(StructureKind::Direct), stepped).certified());
+    stepped.coulomb_friction *= 0.999;
+    EXPECT_FALSE(certify(bounds, scheme_of(StructureKind::Direct), stepped).certified());
+    bounds.loss.lower = -1e-9;
+    for (const StructureKind structure :
+         {StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit}) {
+        const Certificate refused = certify(bounds, scheme_of(structure), smooth(10.0));
+        EXPECT_NE(refused.why.find("min h >= 0"), std::string::npos) << refused.why;
+    }
+}
+
+TEST(Certificate, NumbersThatAreNoneAreRefused) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const double infinite = std::numeric_limits<double>::infinity();
+    for (const double wrong : {nan, infinite}) {
+        for (const StructureKind structure :
+             {StructureKind::Direct, StructureKind::Massless, StructureKind::Explicit}) {
+            ForceBounds bounds = slopes(0.0, 10.0);
+            bounds.slope.upper = wrong;
+            bounds.steepest = wrong;
+            Scheme scheme = scheme_of(structure, {100.0, structure == StructureKind::Massless ? 0.0 : 0.02});
+            EXPECT_EQ(certify(bounds, scheme, smooth(10.0)).verdict, Verdict::Refused);
+        }
+    }
+}
+
+TEST(Certificate, TheLongestPeriodIsTheOneThatIsStillCertified) {
+    for (const Scheme& scheme :
+         {scheme_of(StructureKind::Direct), scheme_of(StructureKind::Massless, {20.0, 0.01}),
+          scheme_of(StructureKind::Implicit, {20.0, 0.01}, {0.001, 0.02})}) {
+        for (const int delay : {0, 2}) {
+            const double lowest = delay > 0 && scheme.structure != StructureKind::Direct ? 0.0 : -5.0;
+            DeviceProfile device = smooth(0.2, delay);
+            const Certificate certificate = certify(slopes(lowest, 30.0), scheme, device);
+            ASSERT_TRUE(certificate.certified()) << certificate.why;
+            device.jitter_s = 0.9999 * certificate.longest_period_s - device.period_s;
+            EXPECT_TRUE(certify(slopes(lowest, 30.0), scheme, device).certified());
+            device.jitter_s = 1.0001 * certificate.longest_period_s - device.period_s;
+            EXPECT_FALSE(certify(slopes(lowest, 30.0), scheme, device).certified());
+        }
+    }
+}
+
+TEST(ForceBounds, HoldEverySlopeOfEveryPathContinuationIncluded) {
+    test::Random random{7};
+    for (int draw = 0; draw < test::cases(20); ++draw) {
+        const NetworkParameters network = test::random_network(random, 1 + draw % 8);
+        const Domain domain = test::unit_domain(draw % 2 == 0 ? Continuation::Free : Continuation::Linear,
+                                                draw % 3 == 0 ? Continuation::Free : Continuation::Linear);
+        const ForceModel single{network, domain};
+        const ForceBounds bounds = force_bounds(single);
+        for (int k = 0; k < 2000; ++k) {
+            const double slope = single.network()->at(test::uniform(random, -1.0, 2.0), {}).slope;
+            ASSERT_GE(slope, bounds.slope.lower);
+            ASSERT_LE(slope, bounds.slope.upper);
+        }
+        NetworkParameters half = network;
+        LossParameters loss{half.weight, test::uniform(random, 0.0, 0.1), 3.0};
+        const double radius = test::uniform(random, 0.005, 0.05);
+        const ForceModel pair{network, loss, domain, radius};
+        const ForceBounds both = force_bounds(pair);
+        auto state = pair.hysteresis()->start(0.5);
+        for (int k = 0; k < 2000; ++k) {
+            const double x = test::uniform(random, -1.0, 2.0);
+            pair.hysteresis()->advance(x, state);
+            const double near = x + test::uniform(random, -1.0, 1.0) * radius;
+            const double slope = pair.hysteresis()->at(near, state).slope;
+            ASSERT_GE(slope, both.slope.lower);
+            ASSERT_LE(slope, both.slope.upper);
+            ASSERT_GE(pair.hysteresis()->loss().at(x).value, both.loss.lower);
+            ASSERT_LE(pair.hysteresis()->loss().at(x).value, both.loss.upper);
+        }
+    }
+}
+
+TEST(ForceBounds, AModelThatRepeatsOwesFrictionToItsMeanForce) {
+    Domain turn{{0.0}, {1.0}, Continuation::Linear, Continuation::Linear, 1.0};
+    NetworkParameters cogging;
+    cogging.alpha = {12.0, 12.0};
+    cogging.beta = {0.3, 0.7};
+    cogging.weight = {0.1, -0.1};
+    const ForceModel balanced{cogging, turn};
+    cogging.bias = 0.02;
+    const ForceModel motor{cogging, turn};
+    EXPECT_NEAR(force_bounds(balanced).mean_force, 0.0, 1e-9);
+    EXPECT_NEAR(force_bounds(motor).mean_force, 0.02, 1e-9);
+    DeviceProfile device = smooth(10.0);
+    device.coulomb_friction = 0.01;
+    EXPECT_FALSE(certify(motor, scheme_of(StructureKind::Direct), device).certified());
+    device.coulomb_friction = 0.0201;
+    EXPECT_TRUE(certify(motor, scheme_of(StructureKind::Direct), device).certified());
+}
+
+TEST(Fingerprint, ChangesWithEveryNumber) {
+    test::Random random{3};
+    const NetworkParameters network = test::random_network(random, 3);
+    const std::string before = fingerprint(ForceModel{network, test::unit_domain()});
+    EXPECT_EQ(fingerprint(ForceModel{network, test::unit_domain()}), before);
+    const auto changed = [&](auto change) {
+        NetworkParameters other = network;
+        Domain domain = test::unit_domain();
+        change(other, domain);
+        return fingerprint(ForceModel{other, domain});
+    };
+    const auto last_bit = [](double& number) {
+        number = std::nextafter(number, std::numeric_limits<double>::infinity());
+    };
+    EXPECT_NE(changed([&](auto& n, auto&) { last_bit(n.alpha[1]); }), before);
+    EXPECT_NE(changed([&](auto& n, auto&) { last_bit(n.beta[2]); }), before);
+    EXPECT_NE(changed([&](auto& n, auto&) { last_bit(n.weight[0]); }), before);
+    EXPECT_NE(changed([&](auto& n, auto&) { last_bit(n.linear[0]); }), before);
+    EXPECT_NE(changed([&](auto& n, auto&) { last_bit(n.bias); }), before);
+    EXPECT_NE(changed([&](auto&, auto& d) { last_bit(d.upper[0]); }), before);
+    EXPECT_NE(changed([&](auto&, auto& d) { d.below = Continuation::Free; }), before);
+    EXPECT_NE(changed([&](auto& n, auto&) {
+                  std::swap(n.alpha, n.beta);
+                  for (double& a : n.alpha) {
+                      a = std::abs(a) + 1;
+                  }
+              }),
+              before);
+}
+
+}  // namespace
+}  // namespace palpate

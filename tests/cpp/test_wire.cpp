@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/device/packet_stream.hpp"
+#include "palpate/device/wire.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// An IN packet written byte by byte, as the page of the protocol has it.
+struct Packet {
+    std::uint16_t sequence = 0;
+    std::uint32_t clock_us = 0;
+    std::int32_t count = 0;
+    std::int32_t velocity_cps = 0;
+    std::int32_t torque_uNm = 0;
+    std::uint16_t status = wire::enabled;
+    std::uint16_t out_sequence = 0;
+    std::uint16_t out_age_us = 0;
+    std::int32_t sensor_uNm = 0;
+
+    [[nodiscard]] Bytes bytes() const {
+        Bytes all{'H', 1};
+        const auto put = [&](auto value) {
+            for (std::size_t k = 0; k < sizeof value; ++k) {
+                all.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> (8 * k)));
+            }
+        };
+        put(sequence), put(clock_us), put(count), put(velocity_cps), put(torque_uNm), put(status);
+        put(out_sequence), put(out_age_us), put(std::uint16_t{253}), put(sensor_uNm);
+        return all;
+    }
+};
+
+wire::Info knob(std::uint32_t capabilities = 3) {
+    return {0x0100, 65536, 5'000'000, 1000, 20, capabilities, 7};
+}
+
+PacketStream stream_of(const wire::Info& info = knob()) {
+    return PacketStream{info, std::numeric_limits<Nanoseconds>::max()};
+}
+
+constexpr Nanoseconds ms = 1'000'000;
+
+TEST(Wire, InPacketsAreReadFieldByField) {
+    const Packet sent{0xFEDC, 0x89AB'CDEF, -2, 0x0102'0304, -70'000, 0x0041, 0x1234, 999, 5};
+    wire::InPacket read;
+    ASSERT_EQ(wire::decode(sent.bytes(), read), wire::Decoded::Ok);
+    EXPECT_EQ(read.sequence, 0xFEDC);
+    EXPECT_EQ(read.clock_us, 0x89AB'CDEFU);
+    EXPECT_EQ(read.count, -2);
+    EXPECT_EQ(read.velocity_cps, 0x0102'0304);
+    EXPECT_EQ(read.torque_uNm, -70'000);
+    EXPECT_EQ(read.status, 0x0041);
+    EXPECT_EQ(read.out_sequence, 0x1234);
+    EXPECT_EQ(read.out_age_us, 999);
+    EXPECT_EQ(read.temperature_dC, 253);
+    EXPECT_EQ(read.sensor_uNm, 5);
+}
+
+TEST(Wire, OutPacketsAreWrittenByteByByte) {
+    const auto bytes = wire::encode({0x1234, -1'000'000, 10, 0x89AB'CDEF});
+    const std::array<std::uint8_t, 16> expected{'T',  1, 0x34, 0x12, 0xC0, 0xBD, 0xF0, 0xFF,
+                                                0x00, 0, 10,   0,    0xEF, 0xCD, 0xAB, 0x89};
+    EXPECT_EQ(bytes, expected);
+}
+
+TEST(Wire, AnotherSizeMagicOrVersionIsAnErrorForBothPackets) {
+    const Bytes good = Packet{}.bytes();
+    for (std::size_t size = 0; size <= 64; ++size) {
+        Bytes other = good;
+        other.resize(size);
+        wire::InPacket packet;
+        EXPECT_EQ(wire::decode(other, packet), size == 32 ? wire::Decoded::Ok : wire::Decoded::WrongSize);
+        wire::Info info;
+        EXPECT_NE(wire::decode(other, info), wire::Decoded::Ok);
+    }
+    for (int byte = 0; byte < 256; ++byte) {
+        Bytes other = good;
+        wire::InPacket packet;
+        other[0] = static_cast<std::uint8_t>(byte);
+        EXPECT_EQ(wire::decode(other, packet) == wire::Decoded::Ok, byte == 'H');
+        other = good;
+        other[1] = static_cast<std::uint8_t>(byte);
+        EXPECT_EQ(wire::decode(other, packet), byte == 1 ? wire::Decoded::Ok : wire::Decoded::WrongVersion);
+    }
+}
+
+TEST(Wire, InfoIsReadAndImpossibleFieldsAreRefused) {
+    const Bytes good{'I', 1, 0x02, 0x01, 0,  0,  1, 0, 0x40, 0x4B, 0x4C, 0, 0xE8, 3, 20, 0,
+                     3,   0, 0,    0,    32, 16, 1, 0, 1,    2,    3,    4, 5,    6, 7,  8};
+    wire::Info info;
+    ASSERT_EQ(wire::decode(good, info), wire::Decoded::Ok);
+    EXPECT_EQ(info.firmware, 0x0102);
+    EXPECT_EQ(info.counts_per_rev, 65536U);
+    EXPECT_EQ(info.max_torque_uNm, 5'000'000);
+    EXPECT_EQ(info.rate_hz, 1000);
+    EXPECT_EQ(info.watchdog_ms, 20);
+    EXPECT_EQ(info.capabilities, 3U);
+    EXPECT_EQ(info.uid, 0x0807'0605'0403'0201U);
+    for (const auto& [at, value] : std::vector<std::pair<std::size_t, std::uint8_t>>{
+             {6, 0}, {11, 0xFF}, {16, 4}, {20, 31}, {21, 15}, {22, 2}, {23, 1}}) {
+        Bytes other = good;
+        other[at] = value;
+        EXPECT_EQ(wire::decode(other, info), wire::Decoded::WrongField) << at;
+    }
+}
+
+TEST(Wire, AForceOutOfTheObjectIsATorqueTowardsSmallerCounts) {
+    EXPECT_EQ(wire::torque_of(0.5, 5'000'000), -500'000);
+    EXPECT_EQ(wire::force_of(-500'000), 0.5);
+    EXPECT_FALSE(std::signbit(wire::force_of(0)));
+    EXPECT_NEAR(wire::position_of(16384, 65536), 0.5 * std::numbers::pi, 1e-15);
+}
+
+TEST(Wire, NoForceLeavesTheDevicesRangeAndOneThatIsNoNumberIsNone) {
+    for (const double force : {1e300, std::numeric_limits<double>::infinity(), 5.0001}) {
+        EXPECT_EQ(wire::torque_of(force, 5'000'000), -5'000'000);
+        EXPECT_EQ(wire::torque_of(-force, 5'000'000), 5'000'000);
+    }
+    EXPECT_EQ(wire::torque_of(std::numeric_limits<double>::quiet_NaN(), 5'000'000), 0);
+    test::Random random{1};
+    for (int k = 0; k < test::cases(10'000); ++k) {
+        const double force = test::uniform(random, -6.0, 6.0);
+        const double back = wire::force_of(wire::torque_of(force, 5'000'000));
+        EXPECT_NEAR(back, std::clamp(force, -5.0, 5.0), 0.5e-6);
+    }
+}
+
+TEST(Unwrapped, FollowsACounterThroughAllItsTurnsWithLossAndRepetition) {
+    test::Random random{2};
+    wire::Unwrapped<std::uint16_t> counter;
+    std::int64_t truth = 65'000;
+    counter.follow(static_cast<std::uint16_t>(truth));
+    for (int k = 0; k < test::cases(20'000); ++k) {
+        const auto step = static_cast<std::int64_t>(test::uniform(random, -20.0, 30'000.0));
+        truth += step;
+        EXPECT_EQ(counter.follow(static_cast<std::uint16_t>(truth)), step);
+        EXPECT_EQ(counter.value(), truth);
+    }
+}
+
+TEST(PacketStream, MakesReadingsInSiWithTheSignsOfThisLibrary) {
+    PacketStream stream = stream_of();
+    ASSERT_TRUE(stream.take(Packet{10, 5'000'000, 16384, -32768, -300'000, 1, 0, 0, -250'000}.bytes(), 0));
+    const Reading& reading = stream.reading();
+    EXPECT_NEAR(reading.position, 0.5 * std::numbers::pi, 1e-15);
+    EXPECT_NEAR(reading.velocity, -std::numbers::pi, 1e-15);
+    EXPECT_NEAR(reading.applied, 0.3, 1e-15);
+    EXPECT_NEAR(reading.measured, 0.25, 1e-15);
+    EXPECT_NEAR(reading.device_time, 5.0, 1e-12);
+    EXPECT_EQ(reading.sequence, 10U);
+    EXPECT_EQ(reading.status, Status::Ok);
+}
+
+TEST(PacketStream, HasNoMeasuredForceWithoutATransducerAndDifferencesWhatIsNotMeasured) {
+    PacketStream stream = stream_of(knob(0));
+    ASSERT_TRUE(stream.take(Packet{1, 1000, 100, 77, 0, 1, 0, 0, 9}.bytes(), 0));
+    EXPECT_TRUE(std::isnan(stream.reading().measured));
+    EXPECT_EQ(stream.reading().velocity, 0.0);
+    ASSERT_TRUE(stream.take(Packet{3, 3000, 110, 77, 0, 1, 0, 0, 9}.bytes(), 0));  // one was lost
+    EXPECT_NEAR(stream.reading().velocity, wire::position_of(10, 65536) / 2e-3, 1e-9);
+}
+
+TEST(PacketStream, ClockAndSequenceGoOnWhereTheirCountersWrap) {
+    PacketStream stream = stream_of();
+    std::uint16_t sequence = 65'530;
+    std::uint32_t clock = 4'294'960'000U;
+    double last = -1.0;
+    for (int k = 0; k < 20; ++k) {
+        ASSERT_TRUE(stream.take(Packet{sequence++, clock, 0, 0, 0, 1, 0, 0, 0}.bytes(), 0));
+        clock += 1000;
+        if (k > 0) {
+            EXPECT_NEAR(stream.reading().device_time - last, 1e-3, 1e-9);
+        }
+        last = stream.reading().device_time;
+        EXPECT_EQ(stream.reading().sequence, 65'530U + static_cast<std::uint64_t>(k));
+    }
+    EXPECT_EQ(stream.health().lost, 0U);
+}
+
+TEST(PacketStream, CountsLostRepeatedAndMalformedPackets) {
+    PacketStream stream = stream_of();
+    for (const std::uint16_t sequence : {1, 2, 5, 5, 4, 6, 10}) {
+        EXPECT_TRUE(stream.take(Packet{sequence, 0, 0, 0, 0, 1, 0, 0, 0}.bytes(), 0));
+    }
+    Bytes wrong = Packet{}.bytes();
+    wrong.pop_back();
+    EXPECT_FALSE(stream.take(wrong, 0));
+    EXPECT_EQ(stream.health().packets, 7U);
+    EXPECT_EQ(stream.health().repeated, 2U);
+    EXPECT_EQ(stream.health().malformed, 1U);
+    EXPECT_EQ(stream.health().lost, 2U + 1U + 3U);  // after 2, after the one from before, after 6
+}
+
+TEST(PacketStream, MeasuresRoundTripAndDelayFromTheEcho) {
+    PacketStream stream = stream_of();
+    // Another session left its echo, close to where the counter wraps.
+    ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 1, 65'535, 100, 0}.bytes(), 0));
+    for (int k = 0; k < 100; ++k) {
+        const wire::OutPacket command = stream.next_command(0.1, 10, k * ms);
+        EXPECT_EQ(command.sequence, static_cast<std::uint16_t>(k));
+        stream.sent(command, k * ms);
+        // Accepted 300 us before the latch of the next sample, told 1.25 ms after it was sent.
+        ASSERT_TRUE(
+            stream.take(Packet{static_cast<std::uint16_t>(k + 1), static_cast<std::uint32_t>(k + 1) * 1000, 0,
+                               0, 0, 1, command.sequence, 300, 0}
+                            .bytes(),
+                        k * ms + 1'250'000));
+    }
+    EXPECT_EQ(stream.health().round_trip.count(), 100U);
+    EXPECT_NEAR(stream.health().round_trip.quantile(0.5), 1.25e6, 5e3);
+    EXPECT_NEAR(stream.health().delay.quantile(1.0), 0.7e6, 3e3);
+    EXPECT_EQ(stream.health().late_echoes, 0U);
+}
+
+TEST(PacketStream, AnEchoFromBeforeIsCountedAndMeasuresNothing) {
+    PacketStream stream = stream_of();
+    ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 1, 7, 0, 0}.bytes(), 0));
+    for (int k = 0; k < 3; ++k) {
+        stream.sent(stream.next_command(0.0, 10, 0), 0);
+    }
+    for (const std::uint16_t echo : {10, 9, 20'000, 10}) {
+        ASSERT_TRUE(stream.take(Packet{1, 0, 0, 0, 0, 1, echo, 0, 0}.bytes(), 0));
+    }
+    EXPECT_EQ(stream.health().late_echoes, 2U);
+    EXPECT_EQ(stream.health().round_trip.count(), 1U);
+}
+
+TEST(PacketStream, ACommandThatIsTooLateForItsCertificateIsATimeout) {
+    PacketStream stream{knob(), ms + ms / 4};
+    for (const std::uint32_t clock : {0U, 1000U, 2000U, 4000U}) {
+        const std::uint16_t echo =
+            clock == 0 ? 0 : static_cast<std::uint16_t>(clock == 4000 ? 3 : clock / 1000);
+        ASSERT_TRUE(stream.take(Packet{0, clock, 0, 0, 0, 1, echo, 0, 0}.bytes(), 0));
+        EXPECT_EQ(stream.reading().status, clock == 4000 ? Status::Timeout : Status::Ok) << clock;
+        stream.sent(stream.next_command(0.0, 10, 0), 0);
+    }
+    EXPECT_EQ(stream.health().late_commands, 1U);
+}
+
+TEST(PacketStream, StatusBitsAreOneStatusAndTheWorstOne) {
+    const auto status = [](std::uint16_t bits) {
+        PacketStream stream = stream_of();
+        EXPECT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, wire::enabled, 0, 0, 0}.bytes(), 0));
+        stream.sent(stream.next_command(0.0, 10, 0), 0);
+        EXPECT_TRUE(stream.take(Packet{1, 0, 0, 0, 0, bits, 1, 0, 0}.bytes(), 0));
+        return stream.reading().status;
+    };
+    EXPECT_EQ(status(1), Status::Ok);
+    EXPECT_EQ(status(1 | 4), Status::Limited);
+    EXPECT_EQ(status(1 | 2 | 4), Status::Timeout);
+    EXPECT_EQ(status(1 | 8), Status::Lost);
+    EXPECT_EQ(status(1 | 16), Status::Fault);
+    EXPECT_EQ(status(1 | 32), Status::Fault);
+    EXPECT_EQ(status(1 | 64), Status::Fault);
+    EXPECT_EQ(status(0), Status::Fault);  // it was enabled, and is no more
+}
+
+TEST(PacketStream, AWatchdogThatTrippedBeforeThisSessionIsPast) {
+    PacketStream stream = stream_of();
+    ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 3, 500, 0, 0}.bytes(), 0));
+    EXPECT_EQ(stream.reading().status, Status::Ok);
+    stream.sent(stream.next_command(0.0, 10, 0), 0);
+    ASSERT_TRUE(stream.take(Packet{1, 0, 0, 0, 0, 1, 501, 0, 0}.bytes(), 0));
+    ASSERT_TRUE(stream.take(Packet{2, 0, 0, 0, 0, 3, 501, 0, 0}.bytes(), 0));
+    EXPECT_EQ(stream.reading().status, Status::Timeout);
+    EXPECT_EQ(stream.health().watchdog_trips, 1U);
+}
+
+TEST(PacketStream, TakesAnyBytesAndSaysNothingImpossible) {
+    test::Random random{4};
+    PacketStream stream = stream_of();
+    for (int k = 0; k < test::cases(20'000); ++k) {
+        Bytes bytes = Packet{}.bytes();
+        for (std::size_t at = 2; at < bytes.size(); ++at) {
+            bytes[at] = static_cast<std::uint8_t>(random());
+        }
+        EXPECT_TRUE(stream.take(bytes, static_cast<Nanoseconds>(random() % 1'000'000'000)));
+        stream.sent(stream.next_command(0.0, 10, 0), 0);
+        EXPECT_TRUE(std::isfinite(stream.reading().position));
+        EXPECT_TRUE(std::isfinite(stream.reading().velocity));
+    }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate chart: figures of what the benchmarks printed, and of nothing else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from palpate.cli.main import main
+
+PNG = b"\x89PNG"
+
+
+def _step(name: str, period_s: float, nanoseconds: float, error: float) -> dict[str, Any]:
+    diverges = error == 0.0
+    return {
+        "name": f"{name}/period_ns:{round(1e9 * period_s)}",
+        "cpu_time": nanoseconds,
+        "period_s": period_s,
+        "motion_error_rad": error,
+        "diverges": float(diverges),
+    }
+
+
+def _force(name: str, nanoseconds: float, end: float, instant: float) -> dict[str, Any]:
+    return {
+        "name": name,
+        "cpu_time": nanoseconds,
+        "evaluations": 1.0,
+        "force_rms_Nm": 0.5,
+        "force_error_end_Nm": end,
+        "force_error_instant_Nm": instant,
+    }
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """What two benchmarks leave, with a time step that diverges."""
+    context = {"num_cpus": 2, "mhz_per_cpu": 2000, "date": "2026-01-02T03:04:05", "commit": "abc"}
+    benchmarks = {
+        "bench_work_precision": [
+            _step("explicit_euler", 4e-3, 20.0, 0.0),
+            _step("explicit_euler", 2e-3, 20.0, 4e-5),
+            _step("implicit_table", 4e-3, 20.0, 8e-5),
+            _step("implicit_table", 2e-3, 20.0, 4e-5),
+        ],
+        "bench_rendered_force": [
+            _force("direct_table", 8.0, 4e-3, 4e-4),
+            _force("massless_table", 20.0, 0.12, 0.12),
+        ],
+    }
+    for name, rows in benchmarks.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps({"context": context, "benchmarks": rows}))
+    return tmp_path
+
+
+def test_draws_both_figures_and_writes_their_numbers_with_machine_and_date(results: Path) -> None:
+    to = results / "figures"
+    assert main(["chart", "speed", str(results), "--to", str(to)]) == 0
+    for name in ("work-precision.png", "rendered-force.png"):
+        assert (to / name).read_bytes().startswith(PNG)
+    text = (to / "speed.md").read_text(encoding="utf-8")
+    assert "| explicit euler | 4 | 20 | 5 | diverges |" in text
+    assert "| massless table | 20 | 1 | 0.12 | 0.12 |" in text
+    assert "2 cores at 2000 MHz" in text
+    assert "2026-01-02" in text
+    assert "commit abc" in text
+
+
+def test_refuses_a_folder_without_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["chart", "speed", str(tmp_path), "--to", str(tmp_path / "figures")]) == 2
+    assert "bench_work_precision.json does not exist; make bench writes it" in capsys.readouterr().err
+    assert not (tmp_path / "figures").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        pytest.param({"error_occurred": True, "error_message": "0.7 N*m"}, "wrong answer", id="wrong-answer"),
+        pytest.param({"force_error_end_Nm": None}, "has no number force_error_end_Nm", id="no-number"),
+    ],
+)
+def test_draws_no_benchmark_that_is_wrong(
+    results: Path, capsys: pytest.CaptureFixture[str], change: dict[str, Any], says: str
+) -> None:
+    path = results / "bench_rendered_force.json"
+    content = json.loads(path.read_text())
+    content["benchmarks"][1] |= change
+    path.write_text(json.dumps(content))
+    assert main(["chart", "speed", str(results), "--to", str(results / "figures")]) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert "massless_table" in said
+
+
+def test_refuses_what_is_no_benchmark_output(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (results / "bench_work_precision.json").write_text("[1, 2")
+    assert main(["chart", "speed", str(results), "--to", str(results / "figures")]) == 2
+    assert "is no output of Google Benchmark" in capsys.readouterr().err

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "port.hpp"
+
+namespace emulator {
+
+/// What stands on the command line of either emulator.
+struct Settings {
+    std::vector<Identity> devices{Identity{}};
+    Plant plant;
+    std::vector<Fault> script;
+    bool lock_step = false;
+    double rate_hz = 1000.0;
+    std::chrono::milliseconds patience{250};  ///< how long lock-step waits for a host that stopped writing
+    std::string trace;                        ///< CSV, one row a frame
+    std::string preload_first;                ///< a sanitizer's library
+    bool denied = false;                      ///< the node can be opened by nobody
+    std::vector<std::string> command;
+};
+
+inline constexpr const char* options_text =
+    "  --lock-step            the host's transfers are the clock; else frames begin every 1/rate\n"
+    "  --rate-hz RATE         frames a second [1000]\n"
+    "  --patience-ms MS       lock-step waits so long for a host that stopped writing [250]\n"
+    "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
+    "  --no-device            nothing is plugged in\n"
+    "  --says-rate-hz RATE    what GET_INFO says [1000]\n"
+    "  --no-transducer        capabilities without bit 0\n"
+    "  --no-velocity          capabilities without bit 1\n"
+    "  --somebody-elses       another magic in GET_INFO\n"
+    "  --flipped              a torque that points the wrong way\n"
+    "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
+    "  --spring STIFFNESS     a real spring on the handle, N*m/rad [0]\n"
+    "  --no-hand              nobody holds the handle\n"
+    "  --fault KIND@FRAME[xCOUNT]   repeatable; frames are counted from the first OUT packet\n"
+    "  --trace FILE.csv       what really happened, one row a frame\n"
+    "  --denied               the device can be opened by nobody\n"
+    "  --preload-first FILE   a sanitizer's library, which has to stand before umockdev's\n";
+
+/// Throws std::invalid_argument with what is wrong.
+[[nodiscard]] inline Settings read_settings(int count, char** words) {
+    Settings settings;
+    Identity common;
+    std::vector<std::string> serials;
+    bool none = false;
+    for (int k = 1; k < count; ++k) {
+        const std::string word = words[k];
+        const auto value = [&]() -> std::string {
+            if (k + 1 >= count) {
+                throw std::invalid_argument(word + " needs a value");
+            }
+            return words[++k];
+        };
+        if (word == "--") {
+            settings.command.assign(words + k + 1, words + count);
+            break;
+        }
+        if (word == "--lock-step") {
+            settings.lock_step = true;
+        } else if (word == "--rate-hz") {
+            settings.rate_hz = std::stod(value());
+        } else if (word == "--patience-ms") {
+            settings.patience = std::chrono::milliseconds{std::stoi(value())};
+        } else if (word == "--serial") {
+            serials.push_back(value());
+        } else if (word == "--says-rate-hz") {
+            common.rate_hz = static_cast<std::uint16_t>(std::stoi(value()));
+        } else if (word == "--no-transducer") {
+            common.capabilities &= ~1U;
+        } else if (word == "--no-velocity") {
+            common.capabilities &= ~2U;
+        } else if (word == "--no-device") {
+            none = true;
+        } else if (word == "--somebody-elses") {
+            common.magic = 'X';
+        } else if (word == "--flipped") {
+            common.flipped = true;
+        } else if (word == "--takes-out-first") {
+            common.takes_out_first = true;
+        } else if (word == "--spring") {
+            settings.plant.spring = std::stod(value());
+        } else if (word == "--no-hand") {
+            settings.plant.hand_stiffness = 0.0;
+        } else if (word == "--fault") {
+            settings.script.push_back(parse_fault(value()));
+        } else if (word == "--trace") {
+            settings.trace = value();
+        } else if (word == "--denied") {
+            settings.denied = true;
+        } else if (word == "--preload-first") {
+            settings.preload_first = value();
+        } else {
+            throw std::invalid_argument("no option is called '" + word + "'");
+        }
+    }
+    settings.devices.assign(none ? 0 : 1, common);
+    if (!serials.empty()) {
+        settings.devices.clear();
+        for (const std::string& serial : serials) {
+            settings.devices.push_back(common);
+            settings.devices.back().serial = serial;
+        }
+    }
+    return settings;
+}
+
+/// A word from a test to the device, and its answer: fault KIND COUNT, state.
+[[nodiscard]] inline std::string obey(Port& port, const std::string& order) {
+    const std::size_t space = order.find(' ');
+    const std::string verb = order.substr(0, space);
+    if (verb == "fault") {
+        const std::string rest = order.substr(space + 1);
+        const std::size_t second = rest.find(' ');
+        const auto times = second == std::string::npos ? 1 : std::stoul(rest.substr(second + 1));
+        port.device().inject(fault_named(rest.substr(0, second)), static_cast<std::uint32_t>(times));
+        return "ok";
+    }
+    if (verb == "state") {
+        const EmulatedDevice& device = port.device();
+        const auto field = [](const char* name, const std::string& value) {
+            return std::string("\"") + name + "\": " + value;
+        };
+        return "{" + field("frames", std::to_string(device.frames())) + ", " +
+               field("sequence", std::to_string(device.sequence())) + ", " +
+               field("outs", std::to_string(device.outs())) + ", " +
+               field("bad_outs", std::to_string(device.bad_outs())) + ", " +
+               field("enabled", device.is_enabled() ? "true" : "false") + ", " +
+               field("torque_uNm", std::to_string(device.applied_uNm())) + ", " +
+               field("position_rad", std::to_string(device.plant().position)) + ", " +
+               field("waiting", std::to_string(port.waiting())) + "}";
+    }
+    throw std::invalid_argument("no order is called '" + verb + "'");
+}
+
+}  // namespace emulator

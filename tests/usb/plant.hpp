@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+namespace emulator {
+
+/// The mechanics behind the emulated encoder: a handle with a motor, a hand that sweeps it, and, where one is
+/// asked for, a real spring on the same shaft.
+///
+///     J dv/dt = torque - b v - k x + K_h (target(t) - x) - B_h v
+///
+/// Positive torques accelerate towards growing positions, as on the wire.
+struct Plant {
+    double inertia = 2e-4;         ///< J, handle and motor [kg*m^2]
+    double damping = 0.06;         ///< b [N*m*s/rad]
+    double spring = 0.0;           ///< k, of the real object; 0 = none [N*m/rad]
+    double hand_stiffness = 15.0;  ///< K_h; 0 = nobody holds the handle [N*m/rad]
+    double hand_damping = 0.05;    ///< B_h [N*m*s/rad]
+    double hand_lower = 0.02;      ///< least target [rad]
+    double hand_upper = 0.47;      ///< largest target [rad]
+    double hand_hz = 0.5;          ///< sweeps a second
+
+    double position = 0.0;  ///< [rad]
+    double velocity = 0.0;  ///< [rad/s]
+    double time = 0.0;      ///< [s]
+
+    /// Goes on by `seconds` under a constant motor torque [N*m].
+    void advance(double torque, double seconds) {
+        constexpr int substeps = 20;
+        const double step = seconds / substeps;
+        for (int k = 0; k < substeps; ++k) {
+            const double phase = 2.0 * std::numbers::pi * hand_hz * time;
+            const double target = hand_lower + 0.5 * (hand_upper - hand_lower) * (1.0 - std::cos(phase));
+            const double hand =
+                hand_stiffness > 0.0 ? hand_stiffness * (target - position) - hand_damping * velocity : 0.0;
+            velocity += step / inertia * (torque + object_torque() + hand - damping * velocity);
+            position += step * velocity;
+            time += step;
+        }
+    }
+
+    /// Of the real object on the handle [N*m].
+    [[nodiscard]] double object_torque() const { return -spring * position; }
+};
+
+}  // namespace emulator

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <utility>
+
+#include "emulated_device.hpp"
+
+namespace emulator {
+
+/// One transfer of the host, in the words of the kernel.
+struct Transfer {
+    std::uint64_t id = 0;  ///< the transport's own name for it
+    const void* owner = nullptr;
+    bool is_control = false;
+    std::uint8_t endpoint = 0;
+    Bytes setup;
+    Bytes data;              ///< on its way out, or what came in
+    std::size_t length = 0;  ///< room for what comes in
+    std::size_t actual = 0;  ///< bytes moved
+    int status = 0;          ///< 0 or a negative errno
+};
+
+/// Where the device is plugged in: transfers wait here until a frame serves them. Knows no transport.
+class Port {
+  public:
+    explicit Port(EmulatedDevice device) : device_{std::move(device)} {}
+
+    [[nodiscard]] EmulatedDevice& device() { return device_; }
+    [[nodiscard]] const EmulatedDevice& device() const { return device_; }
+
+    /// 0, or a negative errno. Control transfers are done at once.
+    int submit(Transfer transfer) {
+        if (device_.is_unplugged()) {
+            return -ENODEV;
+        }
+        if (transfer.is_control) {
+            EmulatedDevice::Answer answer = device_.control(transfer.setup, transfer.data);
+            transfer.status = answer.status;
+            const bool in = (transfer.setup.at(0) & 0x80U) != 0;
+            transfer.actual = answer.status != 0 ? 0 : in ? answer.data.size() : transfer.data.size();
+            if (in) {
+                transfer.data = std::move(answer.data);
+            }
+            done_.push_back(std::move(transfer));
+            return 0;
+        }
+        if (transfer.endpoint != 0x81 && transfer.endpoint != 0x01) {
+            return -ENOENT;
+        }
+        (transfer.endpoint == 0x81 ? in_ : out_).push_back(std::move(transfer));
+        reads_ahead_ = reads_ahead_ || in_.size() >= 2;
+        return 0;
+    }
+
+    /// Takes a waiting transfer back; false: it is not waiting. It still ends, with `status`.
+    bool cancel(std::uint64_t id, const void* owner, int status) {
+        for (std::deque<Transfer>* queue : {&in_, &out_}) {
+            const auto found = std::find_if(queue->begin(), queue->end(), [&](const Transfer& transfer) {
+                return transfer.id == id && transfer.owner == owner;
+            });
+            if (found != queue->end()) {
+                found->status = status;
+                done_.push_back(std::move(*found));
+                queue->erase(found);
+                return true;
+            }
+        }
+        return false;
+    }
+
+    /// Whoever held the device let it go.
+    void forget(const void* owner) {
+        reads_ahead_ = false;
+        for (std::deque<Transfer>* queue : {&in_, &out_, &done_}) {
+            std::erase_if(*queue, [&](const Transfer& transfer) { return transfer.owner == owner; });
+        }
+    }
+
+    void clear_halt(std::uint8_t endpoint) {
+        device_.clear_halt(endpoint);
+        (endpoint == 0x81 ? in_held_ : out_held_) = false;
+    }
+
+    /// One frame of the bus.
+    void frame() {
+        if (device_.is_unplugged()) {
+            return;
+        }
+        if (device_.identity().takes_out_first) {
+            serve_out();
+        }
+        device_.frame();
+        if (device_.is_unplugged()) {
+            for (std::deque<Transfer>* queue : {&in_, &out_}) {
+                for (Transfer& transfer : *queue) {
+                    transfer.status = -ESHUTDOWN;
+                    done_.push_back(std::move(transfer));
+                }
+                queue->clear();
+            }
+            return;
+        }
+        // The answer to an OUT packet is told before the IN packet, as a host that sends at once would see it.
+        if (!device_.identity().takes_out_first) {
+            Bytes packet;
+            const Handshake answer = polled(packet);
+            serve_out();
+            serve_in(answer, packet);
+        } else {
+            Bytes packet;
+            const Handshake answer = polled(packet);
+            serve_in(answer, packet);
+        }
+    }
+
+    /// Whether the host has done its part of a frame.
+    [[nodiscard]] bool host_is_ready() const {
+        return !in_.empty() && !out_.empty() && !in_held_ && !out_held_;
+    }
+    /// Whether the host keeps reads queued, or does one thing after the other.
+    [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
+    [[nodiscard]] std::deque<Transfer>& done() { return done_; }
+    [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
+
+  private:
+    Handshake polled(Bytes& packet) { return in_.empty() || in_held_ ? Handshake::Nak : device_.in(packet); }
+
+    void serve_in(Handshake answer, Bytes& packet) {
+        if (answer == Handshake::Nak) {
+            return;
+        }
+        Transfer transfer = std::move(in_.front());
+        in_.pop_front();
+        if (answer == Handshake::Stall) {
+            transfer.status = -EPIPE;
+            in_held_ = true;
+        } else {
+            transfer.status = packet.size() > transfer.length ? -EOVERFLOW : 0;
+            packet.resize(std::min(packet.size(), transfer.length));
+            transfer.actual = packet.size();
+            transfer.data = std::move(packet);
+        }
+        done_.push_back(std::move(transfer));
+    }
+
+    void serve_out() {
+        if (out_.empty() || out_held_) {
+            return;
+        }
+        const Handshake answer = device_.out(out_.front().data);
+        if (answer == Handshake::Nak) {
+            return;
+        }
+        Transfer transfer = std::move(out_.front());
+        out_.pop_front();
+        transfer.status = answer == Handshake::Stall ? -EPIPE : 0;
+        transfer.actual = answer == Handshake::Stall ? 0 : transfer.data.size();
+        out_held_ = answer == Handshake::Stall;
+        done_.push_back(std::move(transfer));
+    }
+
+    EmulatedDevice device_;
+    std::deque<Transfer> in_;
+    std::deque<Transfer> out_;
+    std::deque<Transfer> done_;
+    bool in_held_ = false;  ///< a halted endpoint serves nothing until it is cleared
+    bool out_held_ = false;
+    bool reads_ahead_ = false;
+};
+
+/// When frames begin.
+///
+/// Paced: every millisecond; up to three late ones are made up for. Lock-step: as soon as the host has both read and
+/// written, so that nothing depends on how fast the machine is. A host that stops writing is waited for once, then
+/// the frames go on by the clock until it writes again. One that does not keep two reads queued does one thing after
+/// the other, and is waited for a few milliseconds only.
+class FrameClock {
+  public:
+    using Clock = std::chrono::steady_clock;
+
+    FrameClock(bool lock_step, double rate_hz, std::chrono::milliseconds patience)
+        : lock_step_{lock_step},
+          period_{std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz))},
+          patience_{patience} {}
+
+    void host_wrote() { in_conversation_ = true; }
+    void host_left() { in_conversation_ = false; }
+
+    /// Whether a frame begins now; else `until` is when to look again at the latest.
+    [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
+        const bool by_clock = !lock_step_ || port.device().takes_its_time() || port.device().is_slow();
+        if (!by_clock && port.host_is_ready()) {
+            last_ = now;
+            return true;
+        }
+        const bool waits = lock_step_ && in_conversation_ && !by_clock;
+        const bool waits_long = waits && port.host_reads_ahead();
+        until = last_ + (waits_long ? patience_ : (waits ? 5 : port.device().is_slow() ? 3 : 1) * period_);
+        if (now < until) {
+            return false;
+        }
+        in_conversation_ = in_conversation_ && !waits_long;
+        last_ = lock_step_ || now - until > 3 * period_ ? now : until;
+        return true;
+    }
+
+  private:
+    bool lock_step_;
+    Clock::duration period_;
+    Clock::duration patience_;
+    Clock::time_point last_ = Clock::now();
+    bool in_conversation_ = false;
+};
+
+}  // namespace emulator

@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Run a command as if the emulated USB device were plugged in.
+
+    tests/usb/run_emulated.py [OPTIONS] -- COMMAND...
+
+The emulator is built by CMake with the C++ tests (preset dev), or on demand by this script. Without options
+its frames are paced by the clock; `--lock-step` makes the transfers of the host the clock. All options:
+`--help`. Exit code: that of the command; 77 where something is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+MISSING = 77
+BUILDS = ("dev", "release", "asan", "tsan", "control")
+SOURCES = ROOT / "tests" / "usb"
+
+
+def emulator() -> Path | str:
+    """The program, built where it has to be; a sentence where it cannot be."""
+    given = os.environ.get("PALPATE_USB_EMULATOR")
+    if given:
+        return Path(given)
+    newest = max(path.stat().st_mtime for path in SOURCES.glob("*.?pp"))
+    programs = [ROOT / "build" / build / "tests" / "usb" / "umockdev_emulator" for build in BUILDS]
+    programs.append(ROOT / "build" / "umockdev_emulator")
+    for program in programs:
+        if program.exists() and program.stat().st_mtime >= newest:
+            return program
+    if shutil.which("pkg-config") is None:
+        return "needs pkg-config"
+    asked = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "umockdev-1.0"], capture_output=True, text=True, check=False
+    )
+    if asked.returncode:
+        return "needs umockdev (Debian: umockdev libumockdev-dev)"
+    program = programs[-1]
+    program.parent.mkdir(exist_ok=True)
+    made = program.with_suffix(f".{os.getpid()}")
+    compiler = os.environ.get("CXX", "g++")
+    compile_it = [compiler, "-std=c++20", "-O1", str(SOURCES / "umockdev_emulator.cpp"), "-o", str(made)]
+    subprocess.run([*compile_it, *asked.stdout.split(), "-lpthread"], check=True)
+    made.rename(program)
+    return program
+
+
+if __name__ == "__main__":
+    found = emulator()
+    if isinstance(found, str):
+        print(f"skipped: {found}", file=sys.stderr)
+        sys.exit(MISSING)
+    os.execv(found, [str(found), *sys.argv[1:]])  # so that a signal reaches the emulator, which passes it on

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs a command on a machine that has the emulated device at its USB, by umockdev:
+//
+//   umockdev_emulator [OPTIONS] -- COMMAND...
+//
+// The command finds a socket in PALPATE_EMULATOR that takes orders as datagrams: fault KIND COUNT, plug, state.
+// The exit code is that of the command.
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "command.hpp"
+#include "emulation.hpp"
+#include "usbfs_node.hpp"
+
+namespace emulator {
+namespace {
+
+constexpr const char* preload = "libumockdev-preload.so.0";
+
+class Emulation {
+  public:
+    explicit Emulation(Settings settings) : settings_{std::move(settings)}, testbed_{umockdev_testbed_new()} {
+        if (!settings_.trace.empty()) {
+            trace_.open(settings_.trace);
+            trace_ << EmulatedDevice::trace_header();
+        }
+        for (const Identity& identity : settings_.devices) {
+            plug(identity, settings_.script);
+        }
+    }
+    ~Emulation() {
+        places_.clear();
+        g_object_unref(testbed_);
+    }
+    Emulation(const Emulation&) = delete;
+    Emulation& operator=(const Emulation&) = delete;
+
+    int run() {
+        const Orders orders{[this](const std::string& order) { return obeyed(order); }};
+        Command command{settings_.command, [this] { prepare(); }};
+        std::thread frames{[this] { run_frames(); }};
+        const int code = command.wait();
+        {
+            const std::lock_guard locked{mutex_};
+            over_ = true;
+        }
+        changed_.notify_all();
+        frames.join();
+        if (trace_.is_open() && !places_.empty()) {
+            trace_ << places_.back()->node->port().device().trace_row();  // how the command left it
+        }
+        return code;
+    }
+
+  private:
+    struct Place {
+        FrameClock clock;
+        std::unique_ptr<UsbfsNode> node;
+        bool told_removal = false;
+    };
+
+    void plug(const Identity& identity, const std::vector<Fault>& script) {
+        auto place = std::make_unique<Place>(
+            Place{FrameClock{settings_.lock_step, settings_.rate_hz, settings_.patience}, nullptr});
+        place->node = std::make_unique<UsbfsNode>(testbed_, EmulatedDevice{identity, settings_.plant, script},
+                                                  next_address_++, mutex_, [this] {
+                                                      if (begin_frames() < wakes_at_) {
+                                                          changed_.notify_all();
+                                                      }
+                                                  });
+        place->node->set_clock(place->clock);
+        if (settings_.denied) {
+            deny(place->node->node_file());
+        }
+        const std::lock_guard locked{mutex_};
+        places_.push_back(std::move(place));
+    }
+
+    /// Everything is everybody's, the node nobody's.
+    void deny(const std::string& node) {
+        namespace fs = std::filesystem;
+        gchar* root = umockdev_testbed_get_root_dir(testbed_);
+        fs::permissions(root, fs::perms::all);
+        for (const auto& entry : fs::recursive_directory_iterator(root)) {
+            if (!entry.is_symlink()) {
+                fs::permissions(entry.path(), fs::perms::all);
+            }
+        }
+        g_free(root);
+        fs::permissions(node, fs::perms::none);
+    }
+
+    /// In the child: what stands before the command's own libraries, and who runs it.
+    void prepare() {
+        const std::string first = settings_.preload_first;
+        ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
+        if (settings_.denied && ::getuid() == 0) {
+            constexpr uid_t nobody = 65'534;
+            if (::setgid(nobody) != 0 || ::setuid(nobody) != 0) {
+                ::_exit(126);
+            }
+        }
+    }
+
+    /// Every frame that is due; when to look again. Under the mutex.
+    FrameClock::Clock::time_point begin_frames() {
+        auto next = FrameClock::Clock::now() + std::chrono::milliseconds{50};
+        for (const std::unique_ptr<Place>& place : places_) {
+            Port& port = place->node->port();
+            auto until = next;
+            while (!port.device().is_unplugged() &&
+                   place->clock.is_due(port, FrameClock::Clock::now(), until)) {
+                place->node->frame();
+                if (trace_.is_open()) {
+                    trace_ << port.device().trace_row();
+                }
+                if (port.device().is_unplugged()) {
+                    changed_.notify_all();
+                }
+            }
+            next = std::min(next, until);
+        }
+        return next;
+    }
+
+    void run_frames() {
+        ::prctl(PR_SET_TIMERSLACK, 1000);
+        std::unique_lock locked{mutex_};
+        while (!over_) {
+            const FrameClock::Clock::time_point next = begin_frames();
+            for (const std::unique_ptr<Place>& place : places_) {
+                if (place->node->port().device().is_unplugged() &&
+                    !std::exchange(place->told_removal, true)) {
+                    locked.unlock();
+                    place->node->tell_removal();
+                    locked.lock();
+                    break;
+                }
+            }
+            wakes_at_ = next;
+            changed_.wait_until(locked, next);
+            wakes_at_ = {};
+        }
+    }
+
+    std::string obeyed(const std::string& order) {
+        if (order == "plug") {
+            plug(settings_.devices.front(), {});
+            places_.back()->node->tell_arrival();
+            return "ok";
+        }
+        const std::lock_guard locked{mutex_};
+        return obey(places_.back()->node->port(), order);
+    }
+
+    Settings settings_;
+    UMockdevTestbed* testbed_;
+    std::ofstream trace_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::vector<std::unique_ptr<Place>> places_;
+    FrameClock::Clock::time_point wakes_at_{};  ///< of the frames' own thread
+    int next_address_ = 2;
+    bool over_ = false;
+};
+
+}  // namespace
+}  // namespace emulator
+
+int main(int count, char** words) {
+    // The emulator speaks to the testbed through the same library as the command.
+    const char* preloaded = std::getenv("LD_PRELOAD");
+    if (preloaded == nullptr || std::string(preloaded).find(emulator::preload) == std::string::npos) {
+        ::setenv("LD_PRELOAD", emulator::preload, 1);
+        ::execv("/proc/self/exe", words);
+    }
+    try {
+        const bool asks = count == 2 && std::string(words[1]) == "--help";
+        emulator::Settings settings = asks ? emulator::Settings{} : emulator::read_settings(count, words);
+        if (settings.command.empty()) {
+            std::cerr << "Usage: umockdev_emulator [OPTIONS] -- COMMAND...\n\n" << emulator::options_text;
+            return asks ? 0 : 2;
+        }
+        emulator::Emulation emulation{std::move(settings)};
+        return emulation.run();
+    } catch (const std::exception& error) {
+        std::cerr << "umockdev_emulator: " << error.what() << "\n";
+        return 2;
+    }
+}
