@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmarks of one run say about each claim: python bench/ratios.py build/bench
+"""What the benchmarks of one run say about each claim: python bench/ratios.py build/bench; also in ratios.json
 
 Times are medians over the interleaved repetitions of one run, so that what the machine did meanwhile happened
 to both sides of a ratio.
@@ -106,7 +106,9 @@ CLAIMS = [
 
 
 def main() -> None:
-    run = runs(Path(sys.argv[1]))
+    folder = Path(sys.argv[1])
+    run = runs(folder)
+    found = []
     print(f"{'':66} {'measured':>10} {'asked':>10}")
     for claim in CLAIMS:
         try:
@@ -116,6 +118,10 @@ def main() -> None:
             continue
         verdict = "" if measured <= claim.most else "  <- missed"
         print(f"{claim.text:66} {measured:10.4g} {claim.most:10.4g}{verdict}")
+        found.append({"name": claim.text, "measured": measured, "most": claim.most})
+    (folder / "ratios.json").write_text(
+        json.dumps({"context": {}, "benchmarks": found}, indent=1), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
@@ -14,59 +12,13 @@ import numpy as np
 from ..errors import InputError
 from ..recording.files import replacing
 from .arguments import PATH
+from .benchmark_results import BenchmarkResults, arguments
 from .figures import figure_file
 from .output import number, talk
 from .verb import Verb
 
-_STEPS = "bench_work_precision"
-_FORCES = "bench_rendered_force"
 _PERIOD_S = 1e-3
 """The computing time of different periods is compared over this much motion."""
-
-
-class _Results:
-    """One file of Google Benchmark."""
-
-    def __init__(self, folder: Path, name: str) -> None:
-        self.path = folder / f"{name}.json"
-        try:
-            content = json.loads(self.path.read_text(encoding="utf-8"))
-            self.context: Mapping[str, Any] = content["context"]
-            self.rows: list[Mapping[str, Any]] = content["benchmarks"]
-        except FileNotFoundError:
-            raise InputError(f"{self.path} does not exist; make bench writes it") from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(
-                f"{self.path} is no output of Google Benchmark in JSON ({error}); make bench writes it"
-            ) from None
-        for row in self.rows:
-            if row.get("error_occurred"):
-                raise InputError(
-                    f"{self.path}: {row['name']} gave a wrong answer ({row.get('error_message')}); "
-                    "only right ones are drawn"
-                )
-
-    def number(self, row: Mapping[str, Any], key: str) -> float:
-        value = row.get(key)
-        if not isinstance(value, (int, float)):
-            raise InputError(f"{self.path}: {row.get('name')} has no number {key}; run make bench again")
-        return float(value)
-
-    def where(self) -> str:
-        """Machine, date, compiler and commit."""
-        context = self.context
-        cache = ", ".join(
-            f"L{each['level']} {each['size'] // 1024} KiB"
-            for each in context.get("caches", ())
-            if each.get("type") != "Instruction"
-        )
-        said = [
-            f"{context.get('num_cpus')} cores at {context.get('mhz_per_cpu')} MHz ({cache})",
-            str(context.get("date", ""))[:10],
-            *(f"{key} {context[key]}".replace("_", " ") for key in ("compiler", "flags") if key in context),
-            f"commit {context.get('commit', 'unknown')}",
-        ]
-        return "; ".join(said)
 
 
 def _spoken(name: str) -> str:
@@ -78,17 +30,15 @@ def _mark_down(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def _work_precision(results: _Results, path: Path) -> str:
+def _work_precision(results: BenchmarkResults, path: Path) -> str:
     from ..plotting import WorkPrecision, draw_work_precision
 
     families: dict[str, list[tuple[float, float, float, bool]]] = {}
     for row in results.rows:
-        period_s = results.number(row, "period_s")
-        nanoseconds = results.number(row, "cpu_time")
         families.setdefault(str(row["name"]).split("/")[0], []).append(
             (
-                period_s,
-                nanoseconds,
+                results.number(row, "period_s"),
+                results.nanoseconds(row),
                 results.number(row, "motion_error_rad"),
                 results.number(row, "diverges") > 0.0,
             )
@@ -120,7 +70,7 @@ def _work_precision(results: _Results, path: Path) -> str:
     )
 
 
-def _rendered_force(results: _Results, path: Path) -> str:
+def _rendered_force(results: BenchmarkResults, path: Path) -> str:
     from ..plotting import RenderedForce, draw_rendered_force
     from ..verification.perception import FORCE_JND
 
@@ -128,7 +78,7 @@ def _rendered_force(results: _Results, path: Path) -> str:
         (
             RenderedForce(
                 _spoken(str(row["name"])),
-                results.number(row, "cpu_time"),
+                results.nanoseconds(row),
                 results.number(row, "force_error_end_Nm"),
             ),
             results.number(row, "force_error_instant_Nm"),
@@ -163,6 +113,122 @@ def _rendered_force(results: _Results, path: Path) -> str:
     )
 
 
+def _model_error(results: BenchmarkResults, by_size: Path, by_time: Path) -> str:
+    from ..plotting import ModelError, draw_model_error
+
+    problems: dict[str, dict[str, list[tuple[float, float, float, int]]]] = {}
+    for row in results.rows:
+        problem, method, _ = str(row["name"]).split("/")
+        problems.setdefault(problem, {}).setdefault(method, []).append(
+            (
+                results.number(row, "n_parameters"),
+                results.nanoseconds(row),
+                results.number(row, "nrmse"),
+                int(results.number(row, "n_wavelets")),
+            )
+        )
+    for path, column, name in (
+        (by_size, 0, "fitted parameters"),
+        (by_time, 1, "time of an evaluation in an array [ns]"),
+    ):
+        with figure_file(path, height_inches=4.6, rows=(1.0,) * len(problems)) as panels:
+            for axes, (problem, methods) in zip(panels, problems.items(), strict=True):
+                curves = [
+                    ModelError(
+                        method,
+                        np.array([point[column] for point in points], dtype=np.float64),
+                        np.array([point[2] for point in points]),
+                        [point[3] for point in points],
+                    )
+                    for method, points in methods.items()
+                ]
+                draw_model_error(axes, curves, name)
+                axes.set_title(problem, loc="right")
+            panels[0].figure.legend(
+                *panels[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2
+            )
+    rows = [
+        (
+            f"{problem}, {method}",
+            str(wavelets) if wavelets else "",
+            f"{parameters:g}",
+            number(time),
+            number(error),
+        )
+        for problem, methods in problems.items()
+        for method, points in methods.items()
+        for parameters, time, error, wavelets in points
+    ]
+    return _mark_down(("problem and method", "wavelets", "parameters", "evaluation [ns]", "NRMSE"), rows)
+
+
+_EVALUATIONS = {
+    "latency<ExpLoop>": "loop over std::exp",
+    "latency<Network>": "network",
+    "latency<Compiled>": "compiled network",
+    "latency<Table>": "lookup table, linear",
+    "latency<CubicSpline>": "cubic spline",
+}
+
+_BOUNDS = {
+    "slope_bound": "one input",
+    "slope_bound_cancelling": "weights of 10⁶ that cancel",
+    "gradient_bound_two_inputs": "two inputs",
+}
+
+
+def _over_wavelets(
+    results: BenchmarkResults, names: dict[str, str], path: Path, counter: str | None, quantities: Sequence[str]
+) -> str:
+    """Time, and perhaps a counter in per cent, over the number of wavelets."""
+    from ..plotting import OverWavelets, draw_over_wavelets
+
+    found = {said: results.of(name) for name, said in names.items()}
+
+    def curves(value: str | None) -> list[OverWavelets]:
+        return [
+            OverWavelets(
+                said,
+                np.array([arguments(row)["wavelets"] for row in rows]),
+                np.array(
+                    [results.nanoseconds(row) if value is None else 100.0 * results.number(row, value) for row in rows]
+                ),
+            )
+            for said, rows in found.items()
+        ]
+
+    wanted = [None, counter] if counter else [None]
+    with figure_file(path, height_inches=2.6 + 1.4 * (len(wanted) - 1), rows=(1.0,) * len(wanted)) as panels:
+        for axes, value, quantity in zip(panels, wanted, quantities, strict=True):
+            draw_over_wavelets(axes, curves(value), quantity)
+        panels[0].figure.legend(
+            *panels[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2
+        )
+    rows = [
+        (
+            said,
+            f"{arguments(row)['wavelets']:g}",
+            number(results.nanoseconds(row)),
+            *([number(100.0 * results.number(row, counter))] if counter else []),
+        )
+        for said, rows_ in found.items()
+        for row in rows_
+    ]
+    return _mark_down(("", "wavelets", *quantities), rows)
+
+
+def _claims(results: BenchmarkResults) -> str:
+    rows = [
+        (
+            str(row["name"]),
+            number(results.number(row, "measured")),
+            number(results.number(row, "most")),
+        )
+        for row in results.rows
+    ]
+    return _mark_down(("ratio or number", "measured", "asked for, at most"), rows)
+
+
 @click.command(
     cls=Verb, no_args_is_help=True, epilog="Example: palpate chart speed build/bench --to docs/figures"
 )
@@ -173,14 +239,28 @@ def _rendered_force(results: _Results, path: Path) -> str:
 def chart_speed(folder: Path, to: Path) -> None:
     """Error against computing time, from the JSON files that `make bench` leaves in a folder.
 
-    Draws work-precision.png and rendered-force.png, and writes their numbers, machine and date to speed.md.
+    Draws each comparison and writes its numbers, machine, compiler, commit and date to speed.md.
     """
-    steps, forces = _Results(folder, _STEPS), _Results(folder, _FORCES)
+    steps, forces, models, evaluations, bounds, claims = (
+        BenchmarkResults(folder, name)
+        for name in (
+            "bench_work_precision",
+            "bench_rendered_force",
+            "bench_model_error",
+            "bench_evaluation",
+            "bench_bounds",
+            "ratios",
+        )
+    )
     to.mkdir(parents=True, exist_ok=True)
     text = "\n".join(
         [
             "# Speed against accuracy\n",
-            "Drawn by `palpate chart speed`; the numbers are those of `make bench`.\n",
+            "Drawn by `palpate chart speed`; the numbers are those of `make bench`, medians over interleaved "
+            "repetitions of one run.\n",
+            "## What was asked for\n",
+            _claims(claims),
+            f"{steps.where()}\n",
             "## Time steps: work against precision\n",
             "A mass of 0.001 kg·m² with 0.5 N·m·s/rad behind a coupling of 100 N·m/rad and 0.02 N·m·s/rad, "
             "in a spring that meets a wall; a hand's motion of 2 s. The truth is the exact solution.\n",
@@ -193,8 +273,31 @@ def chart_speed(folder: Path, to: Path) -> None:
             "![Force error over the time of a tick](rendered-force.png)\n",
             _rendered_force(forces, to / "rendered-force.png"),
             f"{forces.where()}\n",
+            "## Models: error against size and time\n",
+            "P1: a spring and a wall, P2: a tactile switch, each from 10⁴ noisy rows; NRMSE against the truth. "
+            "Wavelet networks stop growing by themselves (BIC). An evaluation is one of 10⁴ positions in a "
+            "NumPy array.\n",
+            "![Model error over fitted parameters](model-error-size.png)\n",
+            "![Model error over the time of an evaluation](model-error-time.png)\n",
+            _model_error(models, to / "model-error-size.png", to / "model-error-time.png"),
+            f"{models.where()}\n",
+            "## Evaluation: value and slope on a dependent chain\n",
+            "Spring and wall. The compiled network is right to 10⁻¹² of the largest force; table and spline have "
+            "4096 cells.\n",
+            "![Time of an evaluation over the number of wavelets](evaluation.png)\n",
+            _over_wavelets(
+                evaluations, _EVALUATIONS, to / "evaluation.png", None, ("value and slope [ns]",)
+            ),
+            f"{evaluations.where()}\n",
+            "## Proved bounds of the slope\n",
+            "How much wider than what a dense search finds, of the steepest slope; random networks.\n",
+            "![Time and excess of proved bounds over the number of wavelets](bounds.png)\n",
+            _over_wavelets(
+                bounds, _BOUNDS, to / "bounds.png", "excess", ("time of a bound [ns]", "excess [%]")
+            ),
+            f"{bounds.where()}\n",
         ]
     )
     with replacing(to / "speed.md") as temporary:
         temporary.write_text(text, encoding="utf-8")
-    talk(f"wrote {to / 'work-precision.png'}, {to / 'rendered-force.png'} and {to / 'speed.md'}")
+    talk(f"wrote {to / 'speed.md'} and its figures")

@@ -4,16 +4,29 @@
 from .failure_maps import MeasuredLimit, draw_failure_map
 from .measured_and_modelled import draw_measured_and_modelled
 from .real_against_rendered import draw_real_against_rendered
-from .speed import RenderedForce, WorkPrecision, draw_rendered_force, draw_work_precision
+from .speed import (
+    ModelError,
+    OverWavelets,
+    RenderedForce,
+    WorkPrecision,
+    draw_model_error,
+    draw_over_wavelets,
+    draw_rendered_force,
+    draw_work_precision,
+)
 from .structures import draw_structures
 from .two_models import draw_two_models
 
 __all__ = [
     "MeasuredLimit",
+    "ModelError",
+    "OverWavelets",
     "RenderedForce",
     "WorkPrecision",
     "draw_failure_map",
     "draw_measured_and_modelled",
+    "draw_model_error",
+    "draw_over_wavelets",
     "draw_real_against_rendered",
     "draw_rendered_force",
     "draw_structures",

@@ -60,32 +60,52 @@ struct BoundedCell {
     }
 };
 
-/// Encloses g = f^(n) over [from, to] by bisection: a cell is done when it cannot raise the largest or lower the
-/// smallest value seen by more than `relative` times the largest |g| seen. Cells that are still too coarse when
-/// the budget ends only make the result wider, never wrong.
-template <std::size_t n>
-[[nodiscard]] Interval enclose(const NetworkParameters& network, double from, double to, double relative) {
-    static_assert(n + 8 <= highest_derivative);
+/// The derivative of that order of a network, as one term of what is enclosed.
+struct Term {
+    const NetworkParameters& network;
+    std::size_t order;  ///< 0 or 1
+};
+
+/// Encloses g, the sum of the terms, over [from, to] by bisection: a cell is done when it cannot raise the largest
+/// or lower the smallest value seen by more than `relative` times the largest |g| seen. Cells that are still too
+/// coarse when the budget ends only make the result wider, never wrong.
+template <std::size_t terms>
+[[nodiscard]] Interval enclose(const std::array<Term, terms>& sum, double from, double to, double relative) {
     constexpr int first_cells = 16;
     constexpr int budget = 20'000;
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    const Derivatives rounding = derivatives_rounding(network, std::max(std::abs(from), std::abs(to)));
+    const auto add = [](Jet& all, const Derivatives& one, std::size_t order) {
+        for (std::size_t d = 0; d < all.size(); ++d) {
+            all[d] += one[order + d];
+        }
+    };
+    const double reach = std::max(std::abs(from), std::abs(to));
+    Jet rounding{};
+    for (const auto& [network, order] : sum) {
+        add(rounding, derivatives_rounding(network, reach), order);
+    }
     Interval seen{infinity, -infinity};
     const auto look = [&](double x) {
-        const Derivatives f = derivatives(network, x);
-        seen = seen.with({f[n], f[n]});
-        return Jet{f[n], f[n + 1], f[n + 2], f[n + 3]};
+        Jet here{};
+        for (const auto& [network, order] : sum) {
+            add(here, derivatives(network, x), order);
+        }
+        seen = seen.with({here[0], here[0]});
+        return here;
     };
     const auto cell = [&](double left, double right, const Jet& at_left, const Jet& at_right) {
         const double h = right - left;
-        double remainder =
-            derivative_bounds(network, left, right)[n + 8] * std::pow(h, 8) / (256.0 * 40320.0);
+        double eighth = 0.0;
+        for (const auto& [network, order] : sum) {
+            eighth += derivative_bounds(network, left, right)[order + 8];
+        }
+        double remainder = eighth * std::pow(h, 8) / (256.0 * 40320.0);
         // The factors of `coefficients`, and some units more for its sums.
         const Jet factors{1.0, 3.0 / 7.0 * h, 3.0 / 42.0 * h * h, h * h * h / 210.0};
         for (std::size_t d = 0; d < factors.size(); ++d) {
             const double size = std::max(std::abs(at_left[d]), std::abs(at_right[d]));
-            remainder += factors[d] * (rounding[n + d] + 8.0 * epsilon * size);
+            remainder += factors[d] * (rounding[d] + 8.0 * epsilon * size);
         }
         return BoundedCell{left, right, at_left, at_right, remainder};
     };
@@ -99,12 +119,12 @@ template <std::size_t n>
         left = right;
         at_left = at_right;
     }
-    Interval enclosed{seen.lower - rounding[n], seen.upper + rounding[n]};
+    Interval enclosed{seen.lower - rounding[0], seen.upper + rounding[0]};
     for (int cells = first_cells; !open.empty(); ++cells) {
         const BoundedCell one = open.top();
         open.pop();
         const Interval possible = one.range;
-        const double slack = relative * seen.largest() + 4.0 * rounding[n];
+        const double slack = relative * seen.largest() + 4.0 * rounding[0];
         const double middle = 0.5 * (one.from + one.to);
         if ((possible.upper <= seen.upper + slack && possible.lower >= seen.lower - slack) ||
             cells >= budget || middle <= one.from || middle >= one.to) {
@@ -124,13 +144,13 @@ template <std::size_t n>
 /// max|f| wider than the true range.
 [[nodiscard]] inline Interval value_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
-    return detail::enclose<0>(network, from, to, relative);
+    return detail::enclose(std::array{detail::Term{network, 0}}, from, to, relative);
 }
 
 /// Proved bounds of f' over [from, to], at most `relative` times max|f'| wider than the true range.
 [[nodiscard]] inline Interval slope_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
-    return detail::enclose<1>(network, from, to, relative);
+    return detail::enclose(std::array{detail::Term{network, 1}}, from, to, relative);
 }
 
 }  // namespace palpate

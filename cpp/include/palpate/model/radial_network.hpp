@@ -2,12 +2,14 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "palpate/model/hat_sum.hpp"
 #include "palpate/model/parameters.hpp"
 #include "palpate/model/radial_bounds.hpp"
 #include "palpate/model/wavelet.hpp"
@@ -54,17 +56,33 @@ class RadialNetwork {
                 sum += clamped_partial(x, j) * (x[j] - inside);
             }
         }
-        for (std::size_t i = 0; i < size(); ++i) {
-            sum += network_.weight[i] * radial(i, x).value;
-        }
+        hats(x, [&](std::size_t i, const RadialMexicanHat& psi) { sum += network_.weight[i] * psi.value; });
         return sum;
     }
 
-    /// Gradient at x, written to `gradient` (d values each), continuation included.
-    void gradient(std::span<const double> x, std::span<double> gradient) const noexcept {
+    /// Value at x and the gradient there, written to `gradient` (d values each), in one pass, continuation
+    /// included.
+    double at(std::span<const double> x, std::span<double> gradient) const noexcept {
+        double sum = network_.bias;
         for (std::size_t j = 0; j < dimension(); ++j) {
-            gradient[j] = x[j] == projected(x, j) ? partial(x, j) : clamped_partial(x, j);
+            sum += network_.linear[j] * projected(x, j);
+            gradient[j] = network_.linear[j];
         }
+        hats(x, [&](std::size_t i, const RadialMexicanHat& psi) {
+            sum += network_.weight[i] * psi.value;
+            const double factor = network_.weight[i] * psi.gradient_over_u;
+            for (std::size_t j = 0; j < dimension(); ++j) {
+                gradient[j] += factor * network_.alpha[i * dimension() + j] * scaled(i, x, j);
+            }
+        });
+        for (std::size_t j = 0; j < dimension(); ++j) {
+            const double beyond = x[j] - projected(x, j);
+            if (beyond != 0.0) {
+                gradient[j] = std::clamp(gradient[j], 0.0, gradient_cap_[j]);
+                sum += gradient[j] * beyond;
+            }
+        }
+        return sum;
     }
 
     /// Proved bounds of the value inside the domain and of the gradient anywhere: outside, its components are
@@ -87,22 +105,40 @@ class RadialNetwork {
         return network_.alpha[k] * (projected(x, j) - network_.beta[k]);
     }
 
-    [[nodiscard]] RadialMexicanHat radial(std::size_t i, std::span<const double> x) const noexcept {
-        double square = 0.0;
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            const double u = scaled(i, x, j);
-            square += u * u;
+    /// Calls visit(i, psi) with every wavelet's hat at the projection of x, the exponentials in the vectors of
+    /// this machine.
+    template <class Visit>
+    void hats(std::span<const double> x, Visit visit) const noexcept {
+        constexpr std::size_t block = 32;
+        constexpr double farthest = detail::hat_reach * detail::hat_reach;
+        std::array<double, block> square{};
+        std::array<double, block> gaussian{};
+        const auto d = static_cast<double>(dimension());
+        for (std::size_t first = 0; first < size(); first += block) {
+            const std::size_t count = std::min(block, size() - first);
+            for (std::size_t k = 0; k < count; ++k) {
+                double sum = 0.0;
+                for (std::size_t j = 0; j < dimension(); ++j) {
+                    const double u = scaled(first + k, x, j);
+                    sum += u * u;
+                }
+                square[k] = std::min(sum, farthest);
+            }
+            kernel_.gaussians(square.data(), count, gaussian.data());
+            for (std::size_t k = 0; k < count; ++k) {
+                visit(first + k,
+                      RadialMexicanHat{(square[k] - d) * gaussian[k], (d + 2.0 - square[k]) * gaussian[k]});
+            }
         }
-        return radial_mexican_hat(square, static_cast<double>(dimension()));
     }
 
     /// df/dx_j at the projection of x.
     [[nodiscard]] double partial(std::span<const double> x, std::size_t j) const noexcept {
         double sum = network_.linear[j];
-        for (std::size_t i = 0; i < size(); ++i) {
+        hats(x, [&](std::size_t i, const RadialMexicanHat& psi) {
             sum += network_.weight[i] * network_.alpha[i * dimension() + j] * scaled(i, x, j) *
-                   radial(i, x).gradient_over_u;
-        }
+                   psi.gradient_over_u;
+        });
         return sum;
     }
 
@@ -144,6 +180,7 @@ class RadialNetwork {
     NetworkParameters network_;
     Domain domain_;
     std::vector<double> gradient_cap_;
+    detail::HatKernel kernel_ = detail::hat_kernel();
 };
 
 }  // namespace palpate
