@@ -207,7 +207,8 @@ struct RadialExpLoop {
             sum += (square - inputs) * gaussian;
             for (std::size_t j = 0; j < d; ++j) {
                 const double alpha = p.alpha[i * d + j];
-                gradient[j] += (inputs + 2.0 - square) * gaussian * alpha * alpha * (x[j] - p.beta[i * d + j]);
+                gradient[j] +=
+                    (inputs + 2.0 - square) * gaussian * alpha * alpha * (x[j] - p.beta[i * d + j]);
             }
         }
         return sum;

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model error against size and against the time of an evaluation: python bench/model_error.py FILE.json
 
-Wavelet networks grown to N wavelets, and the baselines over their settings, on two problems with known truth. An
-evaluation is one of 10^4 positions in an array, one thread.
+Wavelet networks grown to N wavelets, and the baselines over their settings, on two problems with known truth.
+An evaluation is one of 10^4 positions in an array, one thread.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -68,7 +69,7 @@ def main() -> None:
     for name in PROBLEMS:
         given = problem(name)
         found = list(models(given.X, given.y))
-        calls = {str(k): (lambda predict=each[3]: predict(given.X_test)) for k, each in enumerate(found)}
+        calls = {str(k): partial(each[3], given.X_test) for k, each in enumerate(found)}
         times = timed(calls, scaled(0.02))
         print(f"{name}: {TITLES[name]}")
         for k, (method, wavelets, parameters, predict) in enumerate(found):
@@ -83,7 +84,9 @@ def main() -> None:
                     n_wavelets=wavelets,
                 )
             )
-            print(f"  {method:20} {wavelets:4d} wavelets {parameters:5d} parameters {error:10.2e} {ns:8.1f} ns")
+            print(
+                f"  {method:20} {wavelets:4d} wavelets {parameters:5d} parameters {error:10.2e} {ns:8.1f} ns"
+            )
     write_results(Path(sys.argv[1]), rows)
     print(f"{time.perf_counter() - start:.0f} s")
 

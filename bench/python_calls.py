@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a prediction costs from Python, beside what NumPy and SciPy offer: python bench/python_calls.py FILE.json
+"""What a prediction costs from Python, beside NumPy and SciPy: python bench/python_calls.py FILE.json
 
-One position as a number, and 10^6 in an array. Yardsticks: a lookup table of 64 entries, and a cubic spline through
-them. The model's answer is compared with eq. 4 in NumPy.
+One position as a number, and 10^6 in an array. Yardsticks: a lookup table of 64 entries, and a cubic spline
+through them. The model's answer is compared with eq. 4 in NumPy.
 """
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 from blocks import row, scaled, timed, write_results
@@ -49,7 +50,7 @@ def main() -> None:
     for calls in (one, batch):
         for name, times in timed(calls, scaled(0.2)).items():
             rows += [row(name, each, max_error=worst) for each in times]
-            print(f"{name:20} {min(times):14.1f} ns at best, {sorted(times)[len(times) // 2]:14.1f} ns median")
+            print(f"{name:20} {median(times):14.1f} ns")
     write_results(Path(sys.argv[1]), rows)
 
 

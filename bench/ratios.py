@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmarks of one run say about each claim: python bench/ratios.py build/bench; also in ratios.json
+"""What the benchmarks of one run say about each claim: python bench/ratios.py build/bench
+
+Printed, and written to ratios.json beside them.
 
 Times are medians over the interleaved repetitions of one run, so that what the machine did meanwhile happened
 to both sides of a ratio.

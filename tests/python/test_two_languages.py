@@ -80,7 +80,9 @@ def cases() -> Iterator[Case]:
             lower,
             lower + travel,
             *(int(k) for k in random.integers(0, 2, 2)),
-            x=np.concatenate([x, random.choice(DIFFICULT, 4), bits, lower + travel * random.uniform(0, 1, 2)]),
+            x=np.concatenate(
+                [x, random.choice(DIFFICULT, 4), bits, lower + travel * random.uniform(0, 1, 2)]
+            ),
         )
 
 

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -178,43 +179,36 @@ _BOUNDS = {
 
 
 def _over_wavelets(
-    results: BenchmarkResults, names: dict[str, str], path: Path, counter: str | None, quantities: Sequence[str]
+    results: BenchmarkResults,
+    names: dict[str, str],
+    path: Path,
+    quantities: Sequence[tuple[str, Callable[[Mapping[str, Any]], float]]],
 ) -> str:
-    """Time, and perhaps a counter in per cent, over the number of wavelets."""
+    """Quantities of benchmarks over the number of wavelets, one panel each."""
     from ..plotting import OverWavelets, draw_over_wavelets
 
     found = {said: results.of(name) for name, said in names.items()}
-
-    def curves(value: str | None) -> list[OverWavelets]:
-        return [
-            OverWavelets(
-                said,
-                np.array([arguments(row)["wavelets"] for row in rows]),
-                np.array(
-                    [results.nanoseconds(row) if value is None else 100.0 * results.number(row, value) for row in rows]
-                ),
-            )
-            for said, rows in found.items()
-        ]
-
-    wanted = [None, counter] if counter else [None]
-    with figure_file(path, height_inches=2.6 + 1.4 * (len(wanted) - 1), rows=(1.0,) * len(wanted)) as panels:
-        for axes, value, quantity in zip(panels, wanted, quantities, strict=True):
-            draw_over_wavelets(axes, curves(value), quantity)
+    height = 2.6 + 1.4 * (len(quantities) - 1)
+    with figure_file(path, height_inches=height, rows=(1.0,) * len(quantities)) as panels:
+        for axes, (quantity, value) in zip(panels, quantities, strict=True):
+            curves = [
+                OverWavelets(
+                    said,
+                    np.array([arguments(row)["wavelets"] for row in rows]),
+                    np.array([value(row) for row in rows]),
+                )
+                for said, rows in found.items()
+            ]
+            draw_over_wavelets(axes, curves, quantity)
         panels[0].figure.legend(
             *panels[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2
         )
-    rows = [
-        (
-            said,
-            f"{arguments(row)['wavelets']:g}",
-            number(results.nanoseconds(row)),
-            *([number(100.0 * results.number(row, counter))] if counter else []),
-        )
-        for said, rows_ in found.items()
-        for row in rows_
+    table = [
+        (said, f"{arguments(row)['wavelets']:g}", *(number(value(row)) for _, value in quantities))
+        for said, rows in found.items()
+        for row in rows
     ]
-    return _mark_down(("", "wavelets", *quantities), rows)
+    return _mark_down(("", "wavelets", *(quantity for quantity, _ in quantities)), table)
 
 
 def _claims(results: BenchmarkResults) -> str:
@@ -274,26 +268,35 @@ def chart_speed(folder: Path, to: Path) -> None:
             _rendered_force(forces, to / "rendered-force.png"),
             f"{forces.where()}\n",
             "## Models: error against size and time\n",
-            "P1: a spring and a wall, P2: a tactile switch, each from 10⁴ noisy rows; NRMSE against the truth. "
-            "Wavelet networks stop growing by themselves (BIC). An evaluation is one of 10⁴ positions in a "
-            "NumPy array.\n",
+            "P1: a spring and a wall, P2: a tactile switch, each from 10⁴ noisy rows; NRMSE against the "
+            "truth. Wavelet networks stop growing by themselves (BIC). An evaluation is one of 10⁴ positions "
+            "in a NumPy array.\n",
             "![Model error over fitted parameters](model-error-size.png)\n",
             "![Model error over the time of an evaluation](model-error-time.png)\n",
             _model_error(models, to / "model-error-size.png", to / "model-error-time.png"),
             f"{models.where()}\n",
             "## Evaluation: value and slope on a dependent chain\n",
-            "Spring and wall. The compiled network is right to 10⁻¹² of the largest force; table and spline have "
-            "4096 cells.\n",
+            "Spring and wall. The compiled network is right to 10⁻¹² of the largest force; table and spline "
+            "have 4096 cells.\n",
             "![Time of an evaluation over the number of wavelets](evaluation.png)\n",
             _over_wavelets(
-                evaluations, _EVALUATIONS, to / "evaluation.png", None, ("value and slope [ns]",)
+                evaluations,
+                _EVALUATIONS,
+                to / "evaluation.png",
+                [("value and slope [ns]", evaluations.nanoseconds)],
             ),
             f"{evaluations.where()}\n",
             "## Proved bounds of the slope\n",
             "How much wider than what a dense search finds, of the steepest slope; random networks.\n",
             "![Time and excess of proved bounds over the number of wavelets](bounds.png)\n",
             _over_wavelets(
-                bounds, _BOUNDS, to / "bounds.png", "excess", ("time of a bound [ns]", "excess [%]")
+                bounds,
+                _BOUNDS,
+                to / "bounds.png",
+                [
+                    ("time of a bound [ns]", bounds.nanoseconds),
+                    ("excess [%]", lambda row: 100.0 * bounds.number(row, "excess")),
+                ],
             ),
             f"{bounds.where()}\n",
         ]

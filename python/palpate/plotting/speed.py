@@ -188,7 +188,12 @@ def draw_model_error(axes: Axes, methods: Sequence[ModelError], cost: str) -> No
         for count, x, y in zip(method.wavelets, method.cost, method.error, strict=True):
             if count:
                 axes.annotate(
-                    str(count), (x, y), xytext=(-3, -3), textcoords="offset points", ha="right", va="top",
+                    str(count),
+                    (x, y),
+                    xytext=(-3, -3),
+                    textcoords="offset points",
+                    ha="right",
+                    va="top",
                     fontsize=6.0,
                 )
     axes.set_xscale("log")
