@@ -44,7 +44,9 @@ class BenchmarkResults:
                 )
             if row.get("run_type", "iteration") == "iteration":
                 repetitions.setdefault(str(row.get("run_name", row["name"])), []).append(row)
-        self.rows = [{**rows[0], **_medians(rows), "name": name} for name, rows in repetitions.items()]
+        self.rows: list[Mapping[str, Any]] = [
+            {**rows[0], **_medians(rows), "name": name} for name, rows in repetitions.items()
+        ]
 
     def number(self, row: Mapping[str, Any], key: str) -> float:
         """A counter of one benchmark."""
