@@ -101,6 +101,12 @@ void gradient_bound_two_inputs(benchmark::State& state) {
 
 BENCHMARK(slope_bound)->ArgName("wavelets")->RangeMultiplier(2)->Range(8, 128)->Unit(benchmark::kMicrosecond);
 BENCHMARK(slope_bound_cancelling)->ArgName("wavelets")->Arg(16)->Arg(64)->Unit(benchmark::kMicrosecond);
-BENCHMARK(gradient_bound_two_inputs)->ArgName("wavelets")->Arg(8)->Arg(32)->Unit(benchmark::kMicrosecond);
+BENCHMARK(gradient_bound_two_inputs)
+    ->ArgName("wavelets")
+    ->Arg(8)
+    ->Arg(16)
+    ->Arg(32)
+    ->Arg(64)
+    ->Unit(benchmark::kMicrosecond);
 
 BENCHMARK_MAIN();

@@ -19,7 +19,6 @@ namespace palpate {
 struct RadialBounds {
     Interval value;
     std::vector<Interval> gradient;  ///< by component
-    double steepest = 0.0;           ///< of the gradient's norm
 };
 
 namespace detail {
@@ -102,7 +101,6 @@ class RadialBox {
             }
             value_rest += by_component * radius_[j];
             ranges.gradient.push_back({gradient[j] - rest, gradient[j] + rest});
-            ranges.steepest = std::hypot(ranges.steepest, ranges.gradient.back().largest());
         }
         ranges.value = {value - value_rest, value + value_rest};
     }
@@ -145,8 +143,7 @@ struct Seen {
 }  // namespace detail
 
 /// Proved bounds over the box [lower, upper] of a network of any number of inputs without continuation, at most
-/// `relative` times the largest |f|, |df/dx_j| and norm of the gradient wider than their true ranges, by
-/// bisection of the box. Boxes that are still too coarse when the budget ends only make the result wider.
+/// `relative` times the largest |f| and |df/dx_j| wider than their true ranges, by bisection of the box. Boxes that are still too coarse when the budget ends only make the result wider.
 [[nodiscard]] inline RadialBounds radial_bounds(const NetworkParameters& network,
                                                 std::span<const double> lower, std::span<const double> upper,
                                                 double relative = 0.01, int budget = 50'000) {
@@ -159,7 +156,6 @@ struct Seen {
         64.0 * static_cast<double>(network.weight.size() + 8) * std::numeric_limits<double>::epsilon();
     double value_margin = std::abs(network.bias);
     std::vector<double> margin(d);
-    double norm_margin = 0.0;
     for (std::size_t j = 0; j < d; ++j) {
         middle[j] = 0.5 * (lower[j] + upper[j]);
         radius[j] = std::max(upper[j] - middle[j], middle[j] - lower[j]);
@@ -171,7 +167,6 @@ struct Seen {
             finest[j] = std::max(finest[j], alpha);
         }
         margin[j] *= units;
-        norm_margin += margin[j];
     }
     for (const double weight : network.weight) {
         value_margin += std::abs(weight) * static_cast<double>(d);
@@ -180,19 +175,14 @@ struct Seen {
 
     detail::Seen value;
     std::vector<detail::Seen> gradient(d);
-    detail::Seen norm;
     const auto look = [&](const detail::RadialBox& box) {
         value.add(box.value);
-        double square = 0.0;
         for (std::size_t j = 0; j < d; ++j) {
             gradient[j].add(box.gradient[j]);
-            square += box.gradient[j] * box.gradient[j];
         }
-        norm.add(std::sqrt(square));
     };
     const auto done = [&](const RadialBounds& box) {
-        bool all = value.settles(box.value, relative * value.range.largest() + value_margin) &&
-                   box.steepest <= (1.0 + relative) * norm.range.upper + norm_margin;
+        bool all = value.settles(box.value, relative * value.range.largest() + value_margin);
         for (std::size_t j = 0; j < d && all; ++j) {
             all = gradient[j].settles(box.gradient[j], relative * gradient[j].range.largest() + margin[j]);
         }
@@ -216,7 +206,7 @@ struct Seen {
     }
     std::vector<detail::RadialBox> open{detail::RadialBox{network, middle, radius}};
     look(open.front());
-    RadialBounds bounds{value.range, {}, norm.range.upper};
+    RadialBounds bounds{value.range, {}};
     for (const detail::Seen& seen : gradient) {
         bounds.gradient.push_back(seen.range);
     }
@@ -225,7 +215,6 @@ struct Seen {
         open.pop_back();
         if (done(box.ranges) || boxes >= budget) {
             bounds.value = bounds.value.with(box.ranges.value);
-            bounds.steepest = std::max(bounds.steepest, box.ranges.steepest);
             for (std::size_t j = 0; j < d; ++j) {
                 bounds.gradient[j] = bounds.gradient[j].with(box.ranges.gradient[j]);
             }
@@ -241,7 +230,6 @@ struct Seen {
     for (std::size_t j = 0; j < d; ++j) {
         bounds.gradient[j] = {bounds.gradient[j].lower - margin[j], bounds.gradient[j].upper + margin[j]};
     }
-    bounds.steepest += norm_margin;
     return bounds;
 }
 
