@@ -143,7 +143,8 @@ struct Seen {
 }  // namespace detail
 
 /// Proved bounds over the box [lower, upper] of a network of any number of inputs without continuation, at most
-/// `relative` times the largest |f| and |df/dx_j| wider than their true ranges, by bisection of the box. Boxes that are still too coarse when the budget ends only make the result wider.
+/// `relative` times the largest |f| and |df/dx_j| wider than their true ranges, by bisection of the box. Boxes
+/// that are still too coarse when the budget ends only make the result wider.
 [[nodiscard]] inline RadialBounds radial_bounds(const NetworkParameters& network,
                                                 std::span<const double> lower, std::span<const double> upper,
                                                 double relative = 0.01, int budget = 50'000) {
