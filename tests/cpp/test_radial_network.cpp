@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -90,28 +91,34 @@ double plain(const NetworkParameters& network, std::span<const double> x, std::s
     return sum;
 }
 
+// Every instruction set that this machine has.
 TEST(RadialNetwork, ValueAndGradientInOnePassAreEquation4) {
-    Random random{8};
-    for (int k = 0; k < cases(200); ++k) {
-        const std::size_t d = 1 + static_cast<std::size_t>(k % 4);
-        const NetworkParameters parameters = random_network(random, static_cast<std::size_t>(k % 71), d);
-        const std::vector<double> lower(d, 0.0);
-        const std::vector<double> upper(d, 1.0);
-        const RadialNetwork network{parameters, {lower, upper, {}, {}, std::nullopt}};
-        std::vector<double> x(d);
-        std::vector<double> gradient(d);
-        std::vector<double> expected(d);
-        for (double& one : x) {
-            one = uniform(random, 0.0, 1.0);
+    for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
+        Random random{8};
+        for (int k = 0; k < cases(200); ++k) {
+            const std::size_t d = 1 + static_cast<std::size_t>(k % 4);
+            const NetworkParameters parameters = random_network(random, static_cast<std::size_t>(k % 71), d);
+            const RadialNetwork network{
+                parameters,
+                {std::vector<double>(d, 0.0), std::vector<double>(d, 1.0), {}, {}, std::nullopt},
+                kernel};
+            std::vector<double> x(d);
+            std::vector<double> gradient(d);
+            std::vector<double> expected(d);
+            for (double& one : x) {
+                one = uniform(random, 0.0, 1.0);
+            }
+            const double value = plain(parameters, x, expected);
+            EXPECT_NEAR(network.at(x, gradient), value, 1e-12);
+            EXPECT_NEAR(network.value(x), value, 1e-12);
+            for (std::size_t j = 0; j < d; ++j) {
+                EXPECT_NEAR(gradient[j], expected[j], 1e-10);
+            }
+            x[0] = 1.5;  // beyond the box
+            EXPECT_NEAR(network.at(x, gradient), network.value(x), 1e-10);
+            x[d - 1] = std::numeric_limits<double>::quiet_NaN();
+            EXPECT_TRUE(std::isnan(network.value(x)));
         }
-        const double value = plain(parameters, x, expected);
-        EXPECT_NEAR(network.at(x, gradient), value, 1e-12);
-        EXPECT_NEAR(network.value(x), value, 1e-12);
-        for (std::size_t j = 0; j < d; ++j) {
-            EXPECT_NEAR(gradient[j], expected[j], 1e-10);
-        }
-        x[0] = 1.5;  // beyond the box
-        EXPECT_NEAR(network.at(x, gradient), network.value(x), 1e-12);
     }
 }
 

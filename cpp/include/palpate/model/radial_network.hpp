@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -25,9 +24,11 @@ namespace palpate {
 /// seen inside].
 class RadialNetwork {
   public:
-    RadialNetwork(NetworkParameters network, Domain domain)
-        : network_{std::move(network)}, domain_{std::move(domain)} {
+    RadialNetwork(NetworkParameters network, Domain domain,
+                  const detail::HatKernel& kernel = detail::hat_kernel())
+        : network_{std::move(network)}, domain_{std::move(domain)}, kernel_{kernel} {
         validate(network_, domain_);
+        fill_columns();
         gradient_cap_ = largest_gradient();
     }
 
@@ -56,7 +57,7 @@ class RadialNetwork {
                 sum += clamped_partial(x, j) * (x[j] - inside);
             }
         }
-        hats(x, [&](std::size_t i, const RadialMexicanHat& psi) { sum += network_.weight[i] * psi.value; });
+        kernel_.radial(columns(), x.data(), sum, nullptr);
         return sum;
     }
 
@@ -68,13 +69,7 @@ class RadialNetwork {
             sum += network_.linear[j] * projected(x, j);
             gradient[j] = network_.linear[j];
         }
-        hats(x, [&](std::size_t i, const RadialMexicanHat& psi) {
-            sum += network_.weight[i] * psi.value;
-            const double factor = network_.weight[i] * psi.gradient_over_u;
-            for (std::size_t j = 0; j < dimension(); ++j) {
-                gradient[j] += factor * network_.alpha[i * dimension() + j] * scaled(i, x, j);
-            }
-        });
+        kernel_.radial(columns(), x.data(), sum, gradient.data());
         for (std::size_t j = 0; j < dimension(); ++j) {
             const double beyond = x[j] - projected(x, j);
             if (beyond != 0.0) {
@@ -105,40 +100,18 @@ class RadialNetwork {
         return network_.alpha[k] * (projected(x, j) - network_.beta[k]);
     }
 
-    /// Calls visit(i, psi) with every wavelet's hat at the projection of x, the exponentials in the vectors of
-    /// this machine.
-    template <class Visit>
-    void hats(std::span<const double> x, Visit visit) const noexcept {
-        constexpr std::size_t block = 32;
-        constexpr double farthest = detail::hat_reach * detail::hat_reach;
-        std::array<double, block> square{};
-        std::array<double, block> gaussian{};
-        const auto d = static_cast<double>(dimension());
-        for (std::size_t first = 0; first < size(); first += block) {
-            const std::size_t count = std::min(block, size() - first);
-            for (std::size_t k = 0; k < count; ++k) {
-                double sum = 0.0;
-                for (std::size_t j = 0; j < dimension(); ++j) {
-                    const double u = scaled(first + k, x, j);
-                    sum += u * u;
-                }
-                square[k] = std::min(sum, farthest);
-            }
-            kernel_.gaussians(square.data(), count, gaussian.data());
-            for (std::size_t k = 0; k < count; ++k) {
-                visit(first + k,
-                      RadialMexicanHat{(square[k] - d) * gaussian[k], (d + 2.0 - square[k]) * gaussian[k]});
-            }
-        }
-    }
-
     /// df/dx_j at the projection of x.
     [[nodiscard]] double partial(std::span<const double> x, std::size_t j) const noexcept {
         double sum = network_.linear[j];
-        hats(x, [&](std::size_t i, const RadialMexicanHat& psi) {
+        for (std::size_t i = 0; i < size(); ++i) {
+            double square = 0.0;
+            for (std::size_t l = 0; l < dimension(); ++l) {
+                square += scaled(i, x, l) * scaled(i, x, l);
+            }
+            const RadialMexicanHat psi = radial_mexican_hat(square, static_cast<double>(dimension()));
             sum += network_.weight[i] * network_.alpha[i * dimension() + j] * scaled(i, x, j) *
                    psi.gradient_over_u;
-        });
+        }
         return sum;
     }
 
@@ -146,14 +119,45 @@ class RadialNetwork {
         return std::clamp(partial(x, j), 0.0, gradient_cap_[j]);
     }
 
+    void fill_columns() {
+        const std::size_t d = dimension();
+        columns_.assign((2 * d + 1) * padded(), 0.0);
+        std::fill_n(columns_.begin(), d * padded(), 1.0);
+        for (std::size_t i = 0; i < size(); ++i) {
+            for (std::size_t j = 0; j < d; ++j) {
+                columns_[j * padded() + i] = network_.alpha[i * d + j];
+                columns_[(d + j) * padded() + i] = network_.beta[i * d + j];
+            }
+            columns_[2 * d * padded() + i] = network_.weight[i];
+        }
+    }
+
+    [[nodiscard]] std::size_t padded() const noexcept { return (size() + 7) / 8 * 8; }
+
+    [[nodiscard]] detail::RadialColumns columns() const noexcept {
+        const double* first = columns_.data();
+        const std::size_t d = dimension();
+        return {d,
+                padded(),
+                first,
+                first + d * padded(),
+                first + 2 * d * padded(),
+                domain_.lower.data(),
+                domain_.upper.data()};
+    }
+
     /// Largest partial derivatives, at least 0, over the wavelets' centres and 1024 points of an additive
     /// recurrence: multiples of the powers of 1/g, g^(d+1) = g + 1, spread evenly over the box.
     [[nodiscard]] std::vector<double> largest_gradient() const {
         const std::size_t d = dimension();
         std::vector<double> cap(d, 0.0);
+        std::vector<double> gradient;
         const auto visit = [&](std::span<const double> x) {
+            double value = 0.0;
+            gradient = network_.linear;
+            kernel_.radial(columns(), x.data(), value, gradient.data());
             for (std::size_t j = 0; j < d; ++j) {
-                cap[j] = std::max(cap[j], partial(x, j));
+                cap[j] = std::max(cap[j], gradient[j]);
             }
         };
         for (std::size_t i = 0; i < size(); ++i) {
@@ -179,8 +183,9 @@ class RadialNetwork {
 
     NetworkParameters network_;
     Domain domain_;
+    detail::HatKernel kernel_;
     std::vector<double> gradient_cap_;
-    detail::HatKernel kernel_ = detail::hat_kernel();
+    std::vector<double> columns_;
 };
 
 }  // namespace palpate
