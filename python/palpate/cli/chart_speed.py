@@ -11,11 +11,11 @@ import click
 import numpy as np
 
 from ..errors import InputError
-from ..recording.files import replacing
 from .arguments import PATH
 from .benchmark_results import BenchmarkResults, arguments
 from .figures import figure_file
 from .output import number, talk
+from .pages import markdown_table, write_text
 from .verb import Verb
 
 _PERIOD_S = 1e-3
@@ -24,11 +24,6 @@ _PERIOD_S = 1e-3
 
 def _spoken(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _mark_down(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def _work_precision(results: BenchmarkResults, path: Path) -> str:
@@ -66,7 +61,7 @@ def _work_precision(results: BenchmarkResults, path: Path) -> str:
         for name, points in families.items()
         for period, time, error, diverges in points
     ]
-    return _mark_down(
+    return markdown_table(
         ("time step", "period [ms]", "a step [ns]", "1 ms of motion [ns]", "error, RMS [rad]"), rows
     )
 
@@ -102,7 +97,7 @@ def _rendered_force(results: BenchmarkResults, path: Path) -> str:
         (each.name, number(each.nanoseconds), f"{evaluations:.3g}", number(each.error), number(instant))
         for each, instant, evaluations, _ in shown
     ]
-    return _mark_down(
+    return markdown_table(
         (
             "structure and solver",
             "a tick [ns]",
@@ -160,7 +155,7 @@ def _model_error(results: BenchmarkResults, by_size: Path, by_time: Path) -> str
         for method, points in methods.items()
         for parameters, time, error, wavelets in points
     ]
-    return _mark_down(("problem and method", "wavelets", "parameters", "evaluation [ns]", "NRMSE"), rows)
+    return markdown_table(("problem and method", "wavelets", "parameters", "evaluation [ns]", "NRMSE"), rows)
 
 
 _EVALUATIONS = {
@@ -208,7 +203,7 @@ def _over_wavelets(
         for said, rows in found.items()
         for row in rows
     ]
-    return _mark_down(("", "wavelets", *(quantity for quantity, _ in quantities)), table)
+    return markdown_table(("", "wavelets", *(quantity for quantity, _ in quantities)), table)
 
 
 def _claims(results: BenchmarkResults) -> str:
@@ -220,7 +215,7 @@ def _claims(results: BenchmarkResults) -> str:
         )
         for row in results.rows
     ]
-    return _mark_down(("ratio or number", "measured", "asked for, at most"), rows)
+    return markdown_table(("ratio or number", "measured", "asked for, at most"), rows)
 
 
 @click.command(
@@ -301,6 +296,5 @@ def chart_speed(folder: Path, to: Path) -> None:
             f"{bounds.where()}\n",
         ]
     )
-    with replacing(to / "speed.md") as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(to / "speed.md", text)
     talk(f"wrote {to / 'speed.md'} and its figures")
