@@ -140,6 +140,12 @@ void compensated_newton(benchmark::State& state) {
     const palpate::Compensated object{compiled(), softer_damper.stiffness};
     tick(state, palpate::Massless{object, softer_damper, period}, of_the_hold);
 }
+void compensated_table(benchmark::State& state) {
+    const palpate::Compensated object{compiled(), softer_damper.stiffness};
+    const double p = palpate::Massless<CompiledNetwork>::load_line_slope(softer_damper, period);
+    const palpate::CompensatedResolvent solver{palpate::piecewise(sum().curve()), softer_damper.stiffness, p};
+    tick(state, palpate::Massless{object, softer_damper, period, solver}, of_the_hold);
+}
 
 void massless_newton(benchmark::State& state) {
     tick(state, palpate::Massless{compiled(), coupling, period}, of_the_coupling);
@@ -200,6 +206,7 @@ void explicit_substepped(benchmark::State& state) {
 BENCHMARK(direct_sum);
 BENCHMARK(direct_table);
 BENCHMARK(compensated_newton);
+BENCHMARK(compensated_table);
 BENCHMARK(massless_newton);
 BENCHMARK(massless_certified_newton);
 BENCHMARK(massless_table);

@@ -70,14 +70,14 @@ def main() -> None:
         given = problem(name)
         found = list(models(given.X, given.y))
         calls = {str(k): partial(each[3], given.X_test) for k, each in enumerate(found)}
-        times = timed(calls, scaled(0.02))
+        times = timed(calls, scaled(0.02), time.process_time_ns)
         print(f"{name}: {TITLES[name]}")
         for k, (method, wavelets, parameters, predict) in enumerate(found):
             ns = median(times[str(k)]) / len(given.truth)
             error = given.nrmse(predict(given.X_test))
             rows.append(
                 row(
-                    f"{name}/{method}/{k}",
+                    f"{TITLES[name].split(',')[0]}/{method}/{k}",
                     ns,
                     nrmse=error,
                     n_parameters=parameters,

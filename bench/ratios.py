@@ -69,7 +69,10 @@ def spread(names: list[str]) -> Callable[[dict[str, Run]], float]:
 
 
 def worst(prefix: str, key: str) -> Callable[[dict[str, Run]], float]:
-    return lambda run: max(run[name].counters[key] for name in run if name.startswith(prefix))
+    """The largest of a counter, over the benchmarks of that name that have it."""
+    return lambda run: max(
+        one.counters[key] for name, one in run.items() if name.startswith(prefix) and key in one.counters
+    )
 
 
 _WALL = "step<SpringWall>/wavelets:16"

@@ -47,6 +47,8 @@ class BenchmarkResults:
         self.rows: list[Mapping[str, Any]] = [
             {**rows[0], **_medians(rows), "name": name} for name, rows in repetitions.items()
         ]
+        # as they stand in the source: interleaved repetitions come in any order
+        self.rows.sort(key=lambda row: (row.get("family_index", 0), row.get("per_family_instance_index", 0)))
 
     def number(self, row: Mapping[str, Any], key: str) -> float:
         """A counter of one benchmark."""

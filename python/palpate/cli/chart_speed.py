@@ -263,9 +263,9 @@ def chart_speed(folder: Path, to: Path) -> None:
             _rendered_force(forces, to / "rendered-force.png"),
             f"{forces.where()}\n",
             "## Models: error against size and time\n",
-            "P1: a spring and a wall, P2: a tactile switch, each from 10⁴ noisy rows; NRMSE against the "
-            "truth. Wavelet networks stop growing by themselves (BIC). An evaluation is one of 10⁴ positions "
-            "in a NumPy array.\n",
+            "A spring and a wall, and a tactile switch, each from 10⁴ noisy rows; NRMSE against the truth. "
+            "The number of wavelets stands beside its network. Networks stop growing by themselves (BIC). An "
+            "evaluation is one of 10⁴ positions in a NumPy array.\n",
             "![Model error over fitted parameters](model-error-size.png)\n",
             "![Model error over the time of an evaluation](model-error-time.png)\n",
             _model_error(models, to / "model-error-size.png", to / "model-error-time.png"),

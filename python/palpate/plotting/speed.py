@@ -177,11 +177,12 @@ def draw_model_error(axes: Axes, methods: Sequence[ModelError], cost: str) -> No
         axes.plot(
             method.cost,
             method.error,
-            color="black",
+            color="black" if filled else "0.55",
             linewidth=1.0 if filled else 0.5,
             marker=marker,
             markersize=4.0,
             markerfacecolor="black" if filled else "white",
+            markeredgecolor="black",
             markeredgewidth=0.7,
             label=method.name,
         )
@@ -198,6 +199,7 @@ def draw_model_error(axes: Axes, methods: Sequence[ModelError], cost: str) -> No
                 )
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.margins(x=0.08, y=0.12)
     axes.grid(color="0.88", linewidth=0.5)
     axes.set_axisbelow(True)
     axes.set_xlabel(cost)
