@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "palpate/model/bounds.hpp"
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/parameters.hpp"
 #include "palpate/model/wavelet.hpp"
 
@@ -23,18 +25,18 @@ struct RadialBounds {
 
 namespace detail {
 
-/// Bounds of |D^3 psi(a, b, c)| for unit vectors, of the radial hat of d inputs: psi is the Laplacian of a
-/// Gaussian, so along a direction it is a sum of Hermite functions of order 5 and 3; the largest value of a
+/// Bounds of |D^4 psi(a, b, c, e)| for unit vectors, of the radial hat of d inputs: psi is the Laplacian of a
+/// Gaussian, so along a direction it is a sum of Hermite functions of order 6 and 4; the largest value of a
 /// symmetric form is taken on equal vectors. Cramer's inequality gives what is left at a distance r from the
 /// centre, times e^{-r^2/4}.
-struct ThirdDerivative {
+struct FourthDerivative {
     double supremum;
     double tail;
 
-    explicit ThirdDerivative(std::size_t dimension) noexcept {
+    explicit FourthDerivative(std::size_t dimension) noexcept {
         const double others = static_cast<double>(dimension) - 1.0;
-        supremum = wavelet_jerk_bound + std::max(others, 0.7358) * wavelet_slope_bound;
-        tail = 11.9021 + std::max(others, 1.4716) * 2.6614;
+        supremum = hat_suprema[4] + std::max(others, 0.7358) * hat_suprema[2];
+        tail = hat_tails[4] + std::max(others, 1.4716) * hat_tails[2];
     }
 
     [[nodiscard]] double beyond(double square) const noexcept {
@@ -43,16 +45,17 @@ struct ThirdDerivative {
 };
 
 /// A box in the search, with the ranges of value and gradient over it: Taylor's formula about its middle, with
-/// the third derivative bounded wavelet by wavelet at the least distance.
+/// the fourth derivative bounded wavelet by wavelet at the least distance.
 class RadialBox {
   public:
     RadialBox(const NetworkParameters& network, std::vector<double> middle, std::vector<double> radius)
         : middle_{std::move(middle)}, radius_{std::move(radius)} {
         const std::size_t d = network.dimension;
         const auto inputs = static_cast<double>(d);
-        const ThirdDerivative third{d};
+        const FourthDerivative fourth{d};
         std::vector<double> u(d);
-        std::vector<double> hessian(d * d, 0.0);
+        std::vector<double> bend(d * d, 0.0);       // D^2 f at the middle
+        std::vector<double> twist(d * d * d, 0.0);  // D^3 f
         std::vector<double> gradient_rest(d, 0.0);
         gradient = network.linear;
         value = network.bias;
@@ -62,7 +65,6 @@ class RadialBox {
         double value_rest = 0.0;
         for (std::size_t i = 0; i < network.weight.size(); ++i) {
             const double* alpha = &network.alpha[i * d];
-            const double weight = network.weight[i];
             double square = 0.0;
             double least_square = 0.0;
             double spread = 0.0;
@@ -74,30 +76,48 @@ class RadialBox {
                 least_square += least * least;
                 spread += alpha[j] * radius_[j] * (alpha[j] * radius_[j]);
             }
-            const RadialMexicanHat psi = radial_mexican_hat(square, inputs);
-            value += weight * psi.value;
-            // grad psi = (d + 2 - r^2) E u and D^2 psi = (d + 2 - r^2) E I - (d + 4 - r^2) E u u'.
-            const double outer = psi.gradient_over_u + 2.0 * std::exp(-0.5 * std::min(square, 1600.0));
+            // With A_n = w (d + n - r^2) E: psi = -A_0, D psi = A_2 u, D^2 psi = A_2 I - A_4 u u', and D^3 psi =
+            // A_6 u u u less A_4 u_j wherever the other two indices are equal.
+            const double factor = network.weight[i] * std::exp(-0.5 * std::min(square, 1600.0));
+            const double first = (inputs + 2.0 - square) * factor;
+            const double second = (inputs + 4.0 - square) * factor;
+            const double third = (inputs + 6.0 - square) * factor;
+            value += (square - inputs) * factor;
             for (std::size_t j = 0; j < d; ++j) {
-                gradient[j] += weight * alpha[j] * u[j] * psi.gradient_over_u;
+                gradient[j] += first * alpha[j] * u[j];
                 for (std::size_t k = 0; k <= j; ++k) {
-                    hessian[j * d + k] += weight * alpha[j] * alpha[k] *
-                                          ((j == k ? psi.gradient_over_u : 0.0) - outer * u[j] * u[k]);
+                    const double by_two = alpha[j] * alpha[k];
+                    bend[j * d + k] += by_two * ((j == k ? first : 0.0) - second * u[j] * u[k]);
+                    for (std::size_t l = 0; l <= k; ++l) {
+                        twist[(j * d + k) * d + l] +=
+                            by_two * alpha[l] *
+                            (third * u[j] * u[k] * u[l] -
+                             second *
+                                 ((j == k ? u[l] : 0.0) + (j == l ? u[k] : 0.0) + (k == l ? u[j] : 0.0)));
+                    }
                 }
             }
-            const double rest = std::abs(weight) * third.beyond(least_square) * spread;
-            value_rest += rest * std::sqrt(spread) / 6.0;
+            const double rest = std::abs(network.weight[i]) * fourth.beyond(least_square) * spread;
+            value_rest += rest * spread / 24.0;
             for (std::size_t j = 0; j < d; ++j) {
-                gradient_rest[j] += 0.5 * rest * alpha[j];
+                gradient_rest[j] += rest * std::sqrt(spread) / 6.0 * alpha[j];
             }
         }
         for (std::size_t j = 0; j < d; ++j) {
             double by_component = std::abs(gradient[j]);
             double rest = gradient_rest[j];
             for (std::size_t k = 0; k < d; ++k) {
-                const double bend = std::abs(hessian[std::max(j, k) * d + std::min(j, k)]) * radius_[k];
-                by_component += 0.5 * bend;
-                rest += bend;
+                const double once = std::abs(bend[std::max(j, k) * d + std::min(j, k)]) * radius_[k];
+                by_component += once / 2.0;
+                rest += once;
+                for (std::size_t l = 0; l < d; ++l) {
+                    std::array<std::size_t, 3> at{j, k, l};
+                    std::sort(at.begin(), at.end());
+                    const double twice =
+                        std::abs(twist[(at[2] * d + at[1]) * d + at[0]]) * radius_[k] * radius_[l];
+                    by_component += twice / 6.0;
+                    rest += twice / 2.0;
+                }
             }
             value_rest += by_component * radius_[j];
             ranges.gradient.push_back({gradient[j] - rest, gradient[j] + rest});

@@ -58,7 +58,7 @@ namespace detail {
 
 /// How much wider than the true range the bounds of a slope may be [of the steepest]: what they are wider by is
 /// stiffness that is not rendered.
-inline constexpr double slope_slack = 0.002;
+inline constexpr double slope_slack = 1e-4;
 
 /// Proved bounds over [from, to] of a g' + b h' + c h, where h shares the wavelets of g.
 struct SlopeReading {
@@ -94,7 +94,7 @@ struct SlopeReading {
 /// is small beside its largest value.
 [[nodiscard]] inline Interval loss_bounds(const NetworkParameters& loss, double from, double to) {
     Interval bounds;
-    for (const double relative : {1e-2, 1e-4, 1e-6}) {
+    for (const double relative : {1e-4, 1e-6}) {
         bounds = value_bounds(loss, from, to, relative);
         if (bounds.lower >= 0.0) {
             break;
