@@ -6,12 +6,14 @@ only if the criterion falls by `rung_evidence` or more and if the error falls on
 weight was fitted. What a rung gains, or would have gained, stands in the notes, its networks in the path.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
-from .. import _core
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
@@ -19,10 +21,11 @@ from .constraints import domain_bounds, impose, moved_to_bounds
 from .frame import truncated_frame
 from .fresh import FreshRows, gain, kept_back
 from .growth import Grown, PathPoint, grow, judge, prune
+from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
 from .rung import Rung
 from .selection import Library
-from .separable import Basis, SeparableProblem, Solution, problem_of
+from .separable import TINY, Basis, SeparableProblem, Solution, problem_of
 from .stopping import ON_FRESH_ROWS, enough, standard_error
 
 COARSEST_CANDIDATE = 1.0
@@ -36,6 +39,19 @@ WORTH_REGROWING = 1.01
 
 GAINS_ENERGY = 2.0
 """Ratio of the RMS errors with and without h >= 0 above which the loop is run through the wrong way."""
+
+LEAST_KNOWN = 0.5
+"""Share of the rows whose hysteresis input must be known, for a play radius to be considered."""
+
+MEASURING_WAVELETS = 8
+MEASURING_ROUNDS = 2
+"""Wavelets with which, and times that, the play radius is measured before the network is grown."""
+
+PLAY_FACTOR = 2.0
+"""How far from a tried play radius a better one is looked for."""
+
+PLAY_TOLERANCE = 1e-4
+"""Of the play radius, relative."""
 
 LEAST_FRESH = 20
 """Fresh rows below which they are too few to refuse a rung."""
@@ -114,22 +130,33 @@ class Ladder:
         if not (self._options.inputs == "auto" or "hysteresis" in self._options.inputs):
             return best
         if self._side is not None:
-            return self._hysteresis(best, self._side, None)
+            return self._hysteresis(best, HysteresisInput.of_strokes(self._side))
         if self._starts is not None:
-            return self._hysteresis(best, *self._best_play(best.solution.basis))
+            return self._with_first_states(self._hysteresis(best, self._best_play(best.solution.basis)))
         return best
 
-    def _rows(self, side: Float1D | None) -> Compressed:
-        """Compressed rows: all of them, or those that are not kept back for the criterion."""
-        only = ~self._fresh if self._options.criterion in ON_FRESH_ROWS else None
-        return self._compressor.rows(side, only)
+    def _rows(self, strokes: HysteresisInput | None) -> Compressed:
+        """Compressed rows: all of them, or those that are not kept back for the criterion.
 
-    def _problem(self, rows: Compressed, side: Float1D | None) -> SeparableProblem:
-        fresh = self._fresh_rows(side) if self._options.criterion in ON_FRESH_ROWS else None
+        Rows whose hysteresis input is unknown are stood for by the others, so that all rungs are judged on
+        as many.
+        """
+        only = ~self._fresh if self._options.criterion in ON_FRESH_ROWS else None
+        if strokes is None:
+            return self._compressor.rows(only=only)
+        rows = self._compressor.rows(strokes.side, strokes.known if only is None else only & strokes.known)
+        return rows if strokes.known.all() else rows.standing_for(self._compressor.samples(only))
+
+    def _problem(self, rows: Compressed, strokes: HysteresisInput | None) -> SeparableProblem:
+        fresh = self._fresh_rows(strokes) if self._options.criterion in ON_FRESH_ROWS else None
         return problem_of(rows, resolved_by=self._options.resolved_by, fresh=fresh)
 
-    def _fresh_rows(self, side: Float1D | None) -> FreshRows:
-        return FreshRows.of(self._box, self._force, side, self._fresh)
+    def _fresh_rows(
+        self, strokes: HysteresisInput | None, known: NDArray[np.bool_] | None = None
+    ) -> FreshRows:
+        known = strokes.known if strokes is not None else known
+        rows = self._fresh if known is None else self._fresh & known
+        return FreshRows.of(self._box, self._force, None if strokes is None else strokes.side, rows)
 
     def _constant(self, rows: Compressed) -> Rung:
         straight = self._straight_solution(rows)
@@ -154,41 +181,47 @@ class Ladder:
         return self._constrained(Rung(name, rows, problem, grown.solution, n_parameters, grown.stop_reason))
 
     def _grown(
-        self, rows: Compressed, side: Float1D | None, name: str, start: Basis
+        self, rows: Compressed, strokes: HysteresisInput | None, name: str, start: Basis
     ) -> tuple[SeparableProblem, Grown]:
-        problem = self._problem(rows, side)
+        problem, grown = self._grow(rows, strokes, name, start, self._options)
+        self.path.extend(grown.path)
+        return problem, grown
+
+    def _grow(
+        self,
+        rows: Compressed,
+        strokes: HysteresisInput | None,
+        name: str,
+        start: Basis,
+        options: IdentifyOptions,
+    ) -> tuple[SeparableProblem, Grown]:
+        problem = self._problem(rows, strokes)
         frame = truncated_frame(
             rows.positions,
             coarsest=COARSEST_CANDIDATE,
             finest=float(problem.finest(rows.positions).max()),
-            frame_scale=self._options.frame_scale,
-            frame_step=self._options.frame_step,
-            max_candidates=min(self._options.max_candidates, LIBRARY_ENTRIES // len(rows.force)),
+            frame_scale=options.frame_scale,
+            frame_step=options.frame_step,
+            max_candidates=min(options.max_candidates, LIBRARY_ENTRIES // len(rows.force)),
         )
-        grown = grow(problem, Library(problem, frame), start, name, self._options)
-        self.path.extend(grown.path)
-        return problem, grown
+        return problem, grow(problem, Library(problem, frame), start, name, options)
 
-    def _hysteresis(self, below: Rung, side: Float1D, radius: float | None) -> Rung:
+    def _hysteresis(self, below: Rung, strokes: HysteresisInput) -> Rung:
         """g + s h on top of the wavelets of the rung below, if it earns its place or is named.
 
         h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
         not fall at all with these, growing a network would be in vain.
         """
         options, named = self._options, self._options.inputs != "auto"
-        extra = 0 if radius is None else 1
-        rows = self._rows(side)
-        problem = self._problem(rows, side)
+        rows = self._rows(strokes)
+        problem = self._problem(rows, strokes)
         first = problem.solve(below.solution.basis)
-
-        def rung(of: SeparableProblem, solution: Solution, stop_reason: str) -> Rung:
-            n_parameters = of.n_parameters(len(solution.basis)) + extra
-            return Rung("hysteresis", rows, of, solution, n_parameters, stop_reason, side, radius)
-
-        free = rung(problem, first, options.criterion)
+        free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
         if named or free.criterion(options) < below.criterion(options):
-            problem, grown = self._grown(rows, side, "hysteresis", first.basis)
-            free = rung(problem, grown.solution, grown.stop_reason)
+            strokes = self._with_measured_play(strokes, first.basis)
+            rows = self._rows(strokes)
+            problem, grown = self._grown(rows, strokes, "hysteresis", first.basis)
+            free = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
         if not named and self._better(below, free) is below:
             return below
         kept = self._constrained(free)
@@ -220,18 +253,53 @@ class Ladder:
             self._constrained(Rung(name, rows, problem, solution, n_parameters, hysteresis.stop_reason))
         )
 
-    def _best_play(self, basis: Basis) -> tuple[Float1D, float]:
-        """The hysteresis input (n,) of that play radius [box] which helps most on given wavelets."""
+    def _best_play(self, basis: Basis) -> HysteresisInput:
+        """The hysteresis input of that play radius which helps most on given wavelets."""
+        tried = [self._of_play(radius) for radius in self._options.play_radius]
+        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN] or tried
+        return min(judged, key=lambda strokes: self._left_by(strokes, basis))
+
+    def _with_measured_play(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
+        """The play radius between those that were tried, on a network of a few wavelets more."""
+        few = replace(self._options, max_wavelets=len(basis) + MEASURING_WAVELETS)
+        for _ in range(MEASURING_ROUNDS if strokes.play_radius is not None else 0):
+            _, grown = self._grow(self._rows(strokes), strokes, "hysteresis", basis, few)
+            strokes = self._closest_play(strokes, grown.solution.basis)
+        return strokes
+
+    def _closest_play(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
+        """The hysteresis input of the play radius around the given one that leaves least on a basis."""
+        assert strokes.play_radius is not None
+
+        def left(log_radius: float) -> float:
+            return math.log(self._left_by(self._of_play(math.exp(log_radius)), basis) + TINY)
+
+        middle, around = math.log(strokes.play_radius), math.log(PLAY_FACTOR)
+        found = minimize_scalar(
+            left,
+            bounds=(middle - around, middle + around),
+            method="bounded",
+            options={"xatol": PLAY_TOLERANCE},
+        )
+        return self._of_play(math.exp(found.x))
+
+    def _with_first_states(self, rung: Rung) -> Rung:
+        """The rung with each motion's play begun where its first force says."""
+        if rung.play_radius is None:
+            return rung
+        starts = list(self._starts or [0])
+        g, h = rung.parts_at(self._box[starts])
+        first = np.clip((self._force[starts] - g) / np.where(h == 0.0, np.inf, h), -1.0, 1.0)
+        return replace(rung, strokes=self._of_play(rung.play_radius, first.tolist()))
+
+    def _of_play(self, radius: float, first: Sequence[float] | None = None) -> HysteresisInput:
         assert self._starts is not None
-        motions = np.split(self._box[:, 0], list(self._starts)[1:])
-        tried = []
-        for radius in self._options.play_radius:
-            play = np.concatenate([_core.play(motion, radius) for motion in motions])
-            side = np.clip((self._box[:, 0] - play) / radius, -1.0, 1.0)
-            problem = self._problem(self._rows(side), side)
-            tried.append((problem.total(problem.solve(basis).rss), radius, side))
-        _, radius, side = min(tried, key=lambda candidate: candidate[0])
-        return side, radius
+        return HysteresisInput.of_play(np.split(self._box[:, 0], list(self._starts)[1:]), radius, first)
+
+    def _left_by(self, strokes: HysteresisInput, basis: Basis) -> float:
+        """Sum of squares that the best weights on given wavelets leave."""
+        problem = self._problem(self._rows(strokes), strokes)
+        return problem.total(problem.solve(basis).rss)
 
     def _better(self, below: Rung, above: Rung) -> Rung:
         """The upper rung if it earns its place, else the lower one; and a note on what it gains."""
@@ -241,7 +309,7 @@ class Ladder:
             return below
         falls = below.criterion(options) - above.criterion(options)
         changes = f"falls by {falls:.4g}" if falls > 0 else f"rises by {-falls:.4g}"
-        fresh = self._fresh_rows(above.side)
+        fresh = self._fresh_rows(above.strokes)
         evidence = options.rung_evidence
         if name in ON_FRESH_ROWS:
             evidence = max(evidence, standard_error(len(fresh.force)))
@@ -266,10 +334,11 @@ class Ladder:
     def _fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
         """Fall of the squared error on fresh rows as a share, and its standard error."""
         errors = []
+        known = None if above.strokes is None else above.strokes.known
         for rung in (below, above):
-            kept = self._compressor.rows(rung.side, ~self._fresh)
+            kept = self._compressor.rows(rung.side, ~self._fresh if known is None else ~self._fresh & known)
             problem = problem_of(kept, resolved_by=self._options.resolved_by)
-            errors.append(rung.fresh_errors(problem, self._fresh_rows(rung.side)))
+            errors.append(rung.fresh_errors(problem, self._fresh_rows(rung.strokes, known)))
         return gain(*errors)
 
     def _constrained(self, rung: Rung) -> Rung:
@@ -290,7 +359,7 @@ class Ladder:
             return rung
         if options.refine and problem.rmse(kept) > WORTH_REGROWING * rung.rmse and len(kept.basis):
             moved = moved_to_bounds(problem, rung.rows, rung.solution, bounds)
-            compatible, regrown = self._grown(moved, rung.side, rung.name, rung.solution.basis)
+            compatible, regrown = self._grown(moved, rung.strokes, rung.name, rung.solution.basis)
             trial = impose(problem, problem.solve(regrown.solution.basis), bounds)
             if _judged_on(compatible, trial, options) < _judged_on(compatible, kept, options):
                 kept = trial
@@ -309,3 +378,14 @@ class Ladder:
 def _judged_on(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
     """Criterion of a solution on the rows of another problem of the same form."""
     return judge(problem, problem.solution_of(solution), options)
+
+
+def _hysteresis_rung(
+    strokes: HysteresisInput,
+    rows: Compressed,
+    problem: SeparableProblem,
+    solution: Solution,
+    stop_reason: str,
+) -> Rung:
+    n_parameters = problem.n_parameters(len(solution.basis)) + (strokes.play_radius is not None)
+    return Rung("hysteresis", rows, problem, solution, n_parameters, stop_reason, strokes)
