@@ -6,7 +6,7 @@ it sees what is still missing. Pruning removes what refinement made superfluous,
 all, since of two that coincide one costs nothing to remove. N is thus decided again on the refined network.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,9 @@ PRUNE_CANDIDATES = 3
 PRUNE_HOPE = 6.0
 """A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
 
+
+REGROWTHS = 3
+"""Times that a refined and pruned network is grown again at most."""
 
 GROWING_TOLERANCE = 1e-3
 """While the size is open, refinement ends at steps that gain less than this share of the squared error."""
@@ -72,6 +75,26 @@ def fresh_deviance(criterion: str, fresh: FreshRows, errors: Float1D) -> float:
 
 
 def grow(
+    problem: SeparableProblem, library: Library, start: Basis, rung: str, options: IdentifyOptions
+) -> Grown:
+    """Grow from the wavelets of start; then again from what is left of it, while the criterion falls.
+
+    What was added one by one stands where it was best among fewer; once refined and pruned it leaves other
+    gaps. Not for wavelets that stay on the frame, nor where fresh rows judge.
+    """
+    found = _grown(problem, library, start, rung, options)
+    if not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS:
+        return found
+    for _ in range(REGROWTHS if len(found.solution.basis) else 0):
+        again = _grown(problem, library, found.solution.basis, rung, options)
+        if again.criterion >= found.criterion:
+            problem.set_prior(found.solution.rss)
+            break
+        found = replace(again, path=(*found.path[:-1], again.path[-1]))
+    return found
+
+
+def _grown(
     problem: SeparableProblem, library: Library, start: Basis, rung: str, options: IdentifyOptions
 ) -> Grown:
     """Grow from the wavelets of start until the criterion stops it, prune, refine to the end.
