@@ -16,7 +16,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
 from .constraints import domain_bounds, impose, moved_to_bounds
-from .frame import truncated_frame
+from .frame import resolved_frame
 from .fresh import FreshRows, gain, kept_back
 from .growth import Grown, PathPoint, grow, judge, prune
 from .options import IdentifyOptions
@@ -24,12 +24,6 @@ from .rung import Rung
 from .selection import Library
 from .separable import Basis, SeparableProblem, Solution, problem_of
 from .stopping import ON_FRESH_ROWS, enough, standard_error
-
-COARSEST_CANDIDATE = 1.0
-"""Dilation of the frame's coarsest level [1/box]."""
-
-LIBRARY_ENTRIES = 2**23
-"""Numbers that a library may hold: with many rows it has fewer candidates."""
 
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
@@ -157,15 +151,8 @@ class Ladder:
         self, rows: Compressed, side: Float1D | None, name: str, start: Basis
     ) -> tuple[SeparableProblem, Grown]:
         problem = self._problem(rows, side)
-        frame = truncated_frame(
-            rows.positions,
-            coarsest=COARSEST_CANDIDATE,
-            finest=float(problem.finest(rows.positions).max()),
-            frame_scale=self._options.frame_scale,
-            frame_step=self._options.frame_step,
-            max_candidates=min(self._options.max_candidates, LIBRARY_ENTRIES // len(rows.force)),
-        )
-        grown = grow(problem, Library(problem, frame), start, name, self._options)
+        library = Library(problem, resolved_frame(problem, self._options))
+        grown = grow(problem, library, start, name, self._options)
         self.path.extend(grown.path)
         return problem, grown
 

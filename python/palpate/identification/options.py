@@ -62,7 +62,7 @@ class IdentifyOptions:
     """b0, the translation step of the frame in units of 1/dilation [-]"""
     max_candidates: int = 4096
     """Members of the truncated frame at most [-]"""
-    resolved_by: int = 5
+    resolved_by: int = 7
     """Distinct positions, on every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]"""
     max_positions: int = 1024
     """Distinct positions that are kept apart, twice as many for each further input; more are gathered in as
