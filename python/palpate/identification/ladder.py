@@ -6,52 +6,30 @@ only if the criterion falls by `rung_evidence` or more and if the error falls on
 weight was fitted. What a rung gains, or would have gained, stands in the notes, its networks in the path.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
 from .constraints import domain_bounds, impose, moved_to_bounds
-from .frame import truncated_frame
-from .fresh import FreshRows, gain, kept_back
-from .growth import Grown, PathPoint, grow, judge, prune
+from .evidence import Evidence
+from .fresh import kept_back
+from .growth import Grown, PathPoint, judge, prune
 from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
+from .play import PlaySearch
 from .rung import Rung
-from .selection import Library
-from .separable import TINY, Basis, SeparableProblem, Solution, problem_of
+from .separable import Basis, SeparableProblem, Solution
 from .stopping import ON_FRESH_ROWS, enough, standard_error
-
-COARSEST_CANDIDATE = 1.0
-"""Dilation of the frame's coarsest level [1/box]."""
-
-LIBRARY_ENTRIES = 2**23
-"""Numbers that a library may hold: with many rows it has fewer candidates."""
 
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
 
 GAINS_ENERGY = 2.0
 """Ratio of the RMS errors with and without h >= 0 above which the loop is run through the wrong way."""
-
-LEAST_KNOWN = 0.5
-"""Share of the rows whose hysteresis input must be known, for a play radius to be considered."""
-
-MEASURING_WAVELETS = 8
-MEASURING_ROUNDS = 2
-"""Wavelets with which, and times that, the play radius is measured before the network is grown."""
-
-PLAY_FACTOR = 2.0
-"""How far from a tried play radius a better one is looked for."""
-
-PLAY_TOLERANCE = 1e-4
-"""Of the play radius, relative."""
 
 LEAST_FRESH = 20
 """Fresh rows below which they are too few to refuse a rung."""
@@ -106,24 +84,27 @@ class Ladder:
                     f"fixed_force is at {place:g}, outside the positions from {lower:g} to {lower + reach:g}"
                 )
             self._fixed_force = (place - lower) / reach, fixed
-        self._box, self._force, self._side = box, force, side
-        self._starts = starts if side is None and box.shape[1] == 1 else None
-        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
-        self._fresh = kept_back(len(force), starts)
+        fresh = kept_back(len(force), starts)
         if weight is not None:
-            self._fresh &= weight > 0.0
-        if side is None and self._starts is None and "hysteresis" in options.inputs:
+            fresh &= weight > 0.0
+        compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
+        self._evidence = Evidence(box, force, fresh, compressor, options)
+        self._side = side
+        self._play = None
+        if side is None and starts is not None and box.shape[1] == 1:
+            self._play = PlaySearch(self._evidence, starts, options)
+        if side is None and self._play is None and "hysteresis" in options.inputs:
             raise InputError(
                 "inputs names hysteresis, but the recording has neither both directions nor time; "
                 "name a direction column or leave hysteresis out"
             )
         given = len(force) if weight is None else int(np.count_nonzero(weight))
-        if (used := self._compressor.rows_used) < given:
+        if (used := compressor.rows_used) < given:
             self.notes.append(f"{used} of {given} rows, evenly spread, stand for all of them")
 
     def climb(self) -> Rung:
         """The highest rung that earned its place, or the one that the inputs name."""
-        rows = self._rows(None)
+        rows = self._evidence.rows()
         best = self._better(self._constant(rows), self._straight(rows))
         if self._options.max_wavelets > 0:
             best = self._better(best, self._network(rows, self._name, Basis.empty(rows.positions.shape[1])))
@@ -131,32 +112,11 @@ class Ladder:
             return best
         if self._side is not None:
             return self._hysteresis(best, HysteresisInput.of_strokes(self._side))
-        if self._starts is not None:
-            return self._with_first_states(self._hysteresis(best, self._best_play(best.solution.basis)))
+        if self._play is not None:
+            return self._play.with_first_states(
+                self._hysteresis(best, self._play.best_tried(best.solution.basis))
+            )
         return best
-
-    def _rows(self, strokes: HysteresisInput | None) -> Compressed:
-        """Compressed rows: all of them, or those that are not kept back for the criterion.
-
-        Rows whose hysteresis input is unknown are stood for by the others, so that all rungs are judged on
-        as many.
-        """
-        only = ~self._fresh if self._options.criterion in ON_FRESH_ROWS else None
-        if strokes is None:
-            return self._compressor.rows(only=only)
-        rows = self._compressor.rows(strokes.side, strokes.known if only is None else only & strokes.known)
-        return rows if strokes.known.all() else rows.standing_for(self._compressor.samples(only))
-
-    def _problem(self, rows: Compressed, strokes: HysteresisInput | None) -> SeparableProblem:
-        fresh = self._fresh_rows(strokes) if self._options.criterion in ON_FRESH_ROWS else None
-        return problem_of(rows, resolved_by=self._options.resolved_by, fresh=fresh)
-
-    def _fresh_rows(
-        self, strokes: HysteresisInput | None, known: NDArray[np.bool_] | None = None
-    ) -> FreshRows:
-        known = strokes.known if strokes is not None else known
-        rows = self._fresh if known is None else self._fresh & known
-        return FreshRows.of(self._box, self._force, None if strokes is None else strokes.side, rows)
 
     def _constant(self, rows: Compressed) -> Rung:
         straight = self._straight_solution(rows)
@@ -170,7 +130,7 @@ class Ladder:
         return self._recorded(self._constrained(self._straight_solution(rows)))
 
     def _straight_solution(self, rows: Compressed) -> Rung:
-        problem = self._problem(rows, None)
+        problem = self._evidence.problem(rows)
         solution = problem.solve(Basis.empty(problem.dimension))
         return Rung("linear", rows, problem, solution, problem.n_parameters(0), self._options.criterion)
 
@@ -183,28 +143,9 @@ class Ladder:
     def _grown(
         self, rows: Compressed, strokes: HysteresisInput | None, name: str, start: Basis
     ) -> tuple[SeparableProblem, Grown]:
-        problem, grown = self._grow(rows, strokes, name, start, self._options)
+        problem, grown = self._evidence.grown(rows, strokes, name, start, self._options)
         self.path.extend(grown.path)
         return problem, grown
-
-    def _grow(
-        self,
-        rows: Compressed,
-        strokes: HysteresisInput | None,
-        name: str,
-        start: Basis,
-        options: IdentifyOptions,
-    ) -> tuple[SeparableProblem, Grown]:
-        problem = self._problem(rows, strokes)
-        frame = truncated_frame(
-            rows.positions,
-            coarsest=COARSEST_CANDIDATE,
-            finest=float(problem.finest(rows.positions).max()),
-            frame_scale=options.frame_scale,
-            frame_step=options.frame_step,
-            max_candidates=min(options.max_candidates, LIBRARY_ENTRIES // len(rows.force)),
-        )
-        return problem, grow(problem, Library(problem, frame), start, name, options)
 
     def _hysteresis(self, below: Rung, strokes: HysteresisInput) -> Rung:
         """g + s h on top of the wavelets of the rung below, if it earns its place or is named.
@@ -213,13 +154,14 @@ class Ladder:
         not fall at all with these, growing a network would be in vain.
         """
         options, named = self._options, self._options.inputs != "auto"
-        rows = self._rows(strokes)
-        problem = self._problem(rows, strokes)
+        rows = self._evidence.rows(strokes)
+        problem = self._evidence.problem(rows, strokes)
         first = problem.solve(below.solution.basis)
         free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
         if named or free.criterion(options) < below.criterion(options):
-            strokes = self._with_measured_play(strokes, first.basis)
-            rows = self._rows(strokes)
+            if self._play is not None:
+                strokes = self._play.measured(strokes, first.basis)
+            rows = self._evidence.rows(strokes)
             problem, grown = self._grown(rows, strokes, "hysteresis", first.basis)
             free = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
         if not named and self._better(below, free) is below:
@@ -242,8 +184,8 @@ class Ladder:
         alone will not do: strokes that a periodic motion samples at different places look like one rapidly
         changing force.
         """
-        rows = self._rows(None)
-        problem = self._problem(rows, None)
+        rows = self._evidence.rows()
+        problem = self._evidence.problem(rows)
         start = problem.solve(hysteresis.solution.basis)
         problem.set_prior(start.rss)
         solution = prune(problem, problem.solve(start.basis), self._options)
@@ -253,54 +195,6 @@ class Ladder:
             self._constrained(Rung(name, rows, problem, solution, n_parameters, hysteresis.stop_reason))
         )
 
-    def _best_play(self, basis: Basis) -> HysteresisInput:
-        """The hysteresis input of that play radius which helps most on given wavelets."""
-        tried = [self._of_play(radius) for radius in self._options.play_radius]
-        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN] or tried
-        return min(judged, key=lambda strokes: self._left_by(strokes, basis))
-
-    def _with_measured_play(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
-        """The play radius between those that were tried, on a network of a few wavelets more."""
-        few = replace(self._options, max_wavelets=len(basis) + MEASURING_WAVELETS)
-        for _ in range(MEASURING_ROUNDS if strokes.play_radius is not None else 0):
-            _, grown = self._grow(self._rows(strokes), strokes, "hysteresis", basis, few)
-            strokes = self._closest_play(strokes, grown.solution.basis)
-        return strokes
-
-    def _closest_play(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
-        """The hysteresis input of the play radius around the given one that leaves least on a basis."""
-        assert strokes.play_radius is not None
-
-        def left(log_radius: float) -> float:
-            return math.log(self._left_by(self._of_play(math.exp(log_radius)), basis) + TINY)
-
-        middle, around = math.log(strokes.play_radius), math.log(PLAY_FACTOR)
-        found = minimize_scalar(
-            left,
-            bounds=(middle - around, middle + around),
-            method="bounded",
-            options={"xatol": PLAY_TOLERANCE},
-        )
-        return self._of_play(math.exp(found.x))
-
-    def _with_first_states(self, rung: Rung) -> Rung:
-        """The rung with each motion's play begun where its first force says."""
-        if rung.play_radius is None:
-            return rung
-        starts = list(self._starts or [0])
-        g, h = rung.parts_at(self._box[starts])
-        first = np.clip((self._force[starts] - g) / np.where(h == 0.0, np.inf, h), -1.0, 1.0)
-        return replace(rung, strokes=self._of_play(rung.play_radius, first.tolist()))
-
-    def _of_play(self, radius: float, first: Sequence[float] | None = None) -> HysteresisInput:
-        assert self._starts is not None
-        return HysteresisInput.of_play(np.split(self._box[:, 0], list(self._starts)[1:]), radius, first)
-
-    def _left_by(self, strokes: HysteresisInput, basis: Basis) -> float:
-        """Sum of squares that the best weights on given wavelets leave."""
-        problem = self._problem(self._rows(strokes), strokes)
-        return problem.total(problem.solve(basis).rss)
-
     def _better(self, below: Rung, above: Rung) -> Rung:
         """The upper rung if it earns its place, else the lower one; and a note on what it gains."""
         options, name = self._options, self._options.criterion
@@ -309,7 +203,7 @@ class Ladder:
             return below
         falls = below.criterion(options) - above.criterion(options)
         changes = f"falls by {falls:.4g}" if falls > 0 else f"rises by {-falls:.4g}"
-        fresh = self._fresh_rows(above.strokes)
+        fresh = self._evidence.fresh_rows(above.strokes)
         evidence = options.rung_evidence
         if name in ON_FRESH_ROWS:
             evidence = max(evidence, standard_error(len(fresh.force)))
@@ -318,7 +212,7 @@ class Ladder:
                 f"{above.name} refused: {name} {changes}, it has to fall by {evidence:.4g} or more"
             )
             return below
-        share, error = self._fresh_gain(below, above)
+        share, error = self._evidence.fresh_gain(below, above)
         if share <= 0.0 and len(fresh.force) >= LEAST_FRESH:
             self.notes.append(
                 f"{above.name} refused: {name} {changes}, but the squared error on fresh rows rises by "
@@ -330,16 +224,6 @@ class Ladder:
             f"{100 * share:.4g} +- {100 * error:.2g} %"
         )
         return above
-
-    def _fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
-        """Fall of the squared error on fresh rows as a share, and its standard error."""
-        errors = []
-        known = None if above.strokes is None else above.strokes.known
-        for rung in (below, above):
-            kept = self._compressor.rows(rung.side, ~self._fresh if known is None else ~self._fresh & known)
-            problem = problem_of(kept, resolved_by=self._options.resolved_by)
-            errors.append(rung.fresh_errors(problem, self._fresh_rows(rung.strokes, known)))
-        return gain(*errors)
 
     def _constrained(self, rung: Rung) -> Rung:
         """The rung with its constraints, their price in the notes.
