@@ -73,6 +73,7 @@ def results(tmp_path: Path) -> Path:
             _force("direct_table", 8.0, 4e-3, 4e-4),
             _force("massless_table", 20.0, 0.12, 0.12),
         ],
+        "bench_controller": [{"name": "tick/direct", "cpu_time": 30.0, "p50_ns": 29.0, "p999_ns": 120.0}],
         "bench_model_error": [
             _model("P1/wavelet network/0", 2, 1e-2),
             _model("P1/wavelet network/1", 6, 3e-4),
@@ -112,6 +113,7 @@ def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(results
     assert "| massless table | 20 | 1 | 0.12 | 0.12 |" in text
     assert "| P1, wavelet network | 6 | 20 | 9 | 0.0003 |" in text
     assert "| table / explicit step | 0.93 | 1 |" in text
+    assert "| direct | 30 | 29 | 120 |" in text
     assert "2 cores at 2000 MHz" in text
     assert "2026-01-02" in text
     assert "commit abc" in text

@@ -3,19 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 
 from ..errors import InputError
 from .arguments import PATH
-from .benchmark_results import BenchmarkResults, arguments
+from .benchmark_results import BenchmarkResults
 from .figures import figure_file
 from .output import number, talk
 from .pages import markdown_table, write_text
+from .speed_over_size import BOUNDS, EVALUATIONS, model_error, over_wavelets
 from .verb import Verb
 
 _PERIOD_S = 1e-3
@@ -109,101 +108,17 @@ def _rendered_force(results: BenchmarkResults, path: Path) -> str:
     )
 
 
-def _model_error(results: BenchmarkResults, by_size: Path, by_time: Path) -> str:
-    from ..plotting import ModelError, draw_model_error
-
-    problems: dict[str, dict[str, list[tuple[float, float, float, int]]]] = {}
-    for row in results.rows:
-        problem, method, _ = str(row["name"]).split("/")
-        problems.setdefault(problem, {}).setdefault(method, []).append(
-            (
-                results.number(row, "n_parameters"),
-                results.nanoseconds(row),
-                results.number(row, "nrmse"),
-                int(results.number(row, "n_wavelets")),
-            )
-        )
-    for path, column, name in (
-        (by_size, 0, "fitted parameters"),
-        (by_time, 1, "time of an evaluation in an array [ns]"),
-    ):
-        with figure_file(path, height_inches=4.6, rows=(1.0,) * len(problems)) as panels:
-            for axes, (problem, methods) in zip(panels, problems.items(), strict=True):
-                curves = [
-                    ModelError(
-                        method,
-                        np.array([point[column] for point in points], dtype=np.float64),
-                        np.array([point[2] for point in points]),
-                        [point[3] for point in points],
-                    )
-                    for method, points in methods.items()
-                ]
-                draw_model_error(axes, curves, name)
-                axes.set_title(problem, loc="right")
-            panels[0].figure.legend(
-                *panels[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2
-            )
+def _ticks(results: BenchmarkResults) -> str:
     rows = [
         (
-            f"{problem}, {method}",
-            str(wavelets) if wavelets else "",
-            f"{parameters:g}",
-            number(time),
-            number(error),
+            _spoken(str(row["name"]).removeprefix("tick/")),
+            number(results.nanoseconds(row)),
+            number(results.number(row, "p50_ns")),
+            number(results.number(row, "p999_ns")),
         )
-        for problem, methods in problems.items()
-        for method, points in methods.items()
-        for parameters, time, error, wavelets in points
+        for row in results.of("tick")
     ]
-    return markdown_table(("problem and method", "wavelets", "parameters", "evaluation [ns]", "NRMSE"), rows)
-
-
-_EVALUATIONS = {
-    "latency<ExpLoop>": "loop over std::exp",
-    "latency<Network>": "network",
-    "latency<Compiled>": "compiled network",
-    "latency<Table>": "lookup table, linear",
-    "latency<CubicSpline>": "cubic spline",
-}
-
-_BOUNDS = {
-    "slope_bound": "one input",
-    "slope_bound_cancelling": "weights of 10⁶ that cancel",
-    "gradient_bound_two_inputs": "two inputs",
-}
-
-
-def _over_wavelets(
-    results: BenchmarkResults,
-    names: dict[str, str],
-    path: Path,
-    quantities: Sequence[tuple[str, Callable[[Mapping[str, Any]], float]]],
-) -> str:
-    """Quantities of benchmarks over the number of wavelets, one panel each."""
-    from ..plotting import OverWavelets, draw_over_wavelets
-
-    found = {said: results.of(name) for name, said in names.items()}
-    height = 2.6 + 1.4 * (len(quantities) - 1)
-    with figure_file(path, height_inches=height, rows=(1.0,) * len(quantities)) as panels:
-        for axes, (quantity, value) in zip(panels, quantities, strict=True):
-            curves = [
-                OverWavelets(
-                    said,
-                    np.array([arguments(row)["wavelets"] for row in rows]),
-                    np.array([value(row) for row in rows]),
-                )
-                for said, rows in found.items()
-            ]
-            draw_over_wavelets(axes, curves, quantity)
-        panels[0].figure.legend(
-            *panels[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2
-        )
-    table = [
-        (said, f"{arguments(row)['wavelets']:g}", *(number(value(row)) for _, value in quantities))
-        for said, rows in found.items()
-        for row in rows
-    ]
-    return markdown_table(("", "wavelets", *(quantity for quantity, _ in quantities)), table)
+    return markdown_table(("structure", "mean [ns]", "median [ns]", "99.9th percentile [ns]"), rows)
 
 
 def _claims(results: BenchmarkResults) -> str:
@@ -230,11 +145,12 @@ def chart_speed(folder: Path, to: Path) -> None:
 
     Draws each comparison and writes its numbers, machine, compiler, commit and date to speed.md.
     """
-    steps, forces, models, evaluations, bounds, claims = (
+    steps, forces, ticks, models, evaluations, bounds, claims = (
         BenchmarkResults(folder, name)
         for name in (
             "bench_work_precision",
             "bench_rendered_force",
+            "bench_controller",
             "bench_model_error",
             "bench_evaluation",
             "bench_bounds",
@@ -262,21 +178,26 @@ def chart_speed(folder: Path, to: Path) -> None:
             "![Force error over the time of a tick](rendered-force.png)\n",
             _rendered_force(forces, to / "rendered-force.png"),
             f"{forces.where()}\n",
+            "## A whole tick without its device\n",
+            "Reading judged, force rendered as the loop does by default, limited and slewed; single ticks "
+            "are timed for the percentiles.\n",
+            _ticks(ticks),
+            f"{ticks.where()}\n",
             "## Models: error against size and time\n",
             "A spring and a wall, and a tactile switch, each from 10⁴ noisy rows; NRMSE against the truth. "
             "The number of wavelets stands beside its network. Networks stop growing by themselves (BIC). An "
             "evaluation is one of 10⁴ positions in a NumPy array.\n",
             "![Model error over fitted parameters](model-error-size.png)\n",
             "![Model error over the time of an evaluation](model-error-time.png)\n",
-            _model_error(models, to / "model-error-size.png", to / "model-error-time.png"),
+            model_error(models, to / "model-error-size.png", to / "model-error-time.png"),
             f"{models.where()}\n",
             "## Evaluation: value and slope on a dependent chain\n",
             "Spring and wall. The compiled network is right to 10⁻¹² of the largest force; table and spline "
             "have 4096 cells.\n",
             "![Time of an evaluation over the number of wavelets](evaluation.png)\n",
-            _over_wavelets(
+            over_wavelets(
                 evaluations,
-                _EVALUATIONS,
+                EVALUATIONS,
                 to / "evaluation.png",
                 [("value and slope [ns]", evaluations.nanoseconds)],
             ),
@@ -284,9 +205,9 @@ def chart_speed(folder: Path, to: Path) -> None:
             "## Proved bounds of the slope\n",
             "How much wider than what a dense search finds, of the steepest slope; random networks.\n",
             "![Time and excess of proved bounds over the number of wavelets](bounds.png)\n",
-            _over_wavelets(
+            over_wavelets(
                 bounds,
-                _BOUNDS,
+                BOUNDS,
                 to / "bounds.png",
                 [
                     ("time of a bound [ns]", bounds.nanoseconds),
