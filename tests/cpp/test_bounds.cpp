@@ -134,7 +134,7 @@ TEST(RadialBounds, HoldAtEveryPointInsideAndOutside) {
             for (double& one : x) {
                 one = outside ? uniform(random, -1.0, 2.0) : uniform(random, 0.0, 1.0);
             }
-            network.at(x, gradient);
+            (void)network.at(x, gradient);
             for (std::size_t i = 0; i < d; ++i) {
                 ASSERT_GE(gradient[i], bounds.gradient[i].lower) << k;
                 ASSERT_LE(gradient[i], bounds.gradient[i].upper) << k;
@@ -164,7 +164,7 @@ TEST(RadialBounds, AreWithinOnePercentOfWhatADenseSearchFinds) {
                 const std::vector<double> x{i / 200.0, j / 200.0};
                 const double here = network.value(x);
                 value = value.with({here, here});
-                network.at(x, gradient);
+                (void)network.at(x, gradient);
                 for (std::size_t l = 0; l < 2; ++l) {
                     slopes[l] = slopes[l].with({gradient[l], gradient[l]});
                 }

@@ -28,7 +28,7 @@ TEST(RadialNetwork, GradientAgreesWithDifferences) {
         std::array<double, 3> x{uniform(random, 0.01, 0.99), uniform(random, 0.01, 0.99),
                                 uniform(random, 0.01, 0.99)};
         std::array<double, 3> gradient{};
-        network.at(x, gradient);
+        (void)network.at(x, gradient);
         for (std::size_t j = 0; j < 3; ++j) {
             constexpr double h = 1e-6;
             auto up = x;
@@ -48,7 +48,7 @@ TEST(RadialNetwork, GoesOnFromTheBoxWithAClampedGradient) {
         const std::array<double, 2> edge{1.0, 0.4};
         const std::array<double, 2> outside{1.5, 0.4};
         std::array<double, 2> gradient{};
-        network.at(outside, gradient);
+        (void)network.at(outside, gradient);
         EXPECT_GE(gradient[0], 0.0);
         EXPECT_NEAR(network.value(outside), network.value(edge) + 0.5 * gradient[0], 1e-12);
         EXPECT_TRUE(network.extrapolated(outside));

@@ -31,7 +31,7 @@ using Derivatives = std::array<double, 5>;
         sum[1] += (factor *= alpha) * (3.0 - square) * u;
         sum[2] += (factor *= alpha) * ((square - 6.0) * square + 3.0);
         sum[3] += (factor *= alpha) * ((10.0 - square) * square - 15.0) * u;
-        sum[4] += (factor *= alpha) * (((square - 15.0) * square + 45.0) * square - 15.0);
+        sum[4] += factor * alpha * (((square - 15.0) * square + 45.0) * square - 15.0);
     }
     return sum;
 }

@@ -63,7 +63,7 @@ class RadialNetwork {
 
     /// Value at x and the gradient there, written to `gradient` (d values each), in one pass, continuation
     /// included.
-    double at(std::span<const double> x, std::span<double> gradient) const noexcept {
+    [[nodiscard]] double at(std::span<const double> x, std::span<double> gradient) const noexcept {
         double sum = network_.bias;
         for (std::size_t j = 0; j < dimension(); ++j) {
             sum += network_.linear[j] * projected(x, j);
