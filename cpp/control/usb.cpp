@@ -98,13 +98,14 @@ int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
         }
     }
     const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
-    const GuardSettings guards = guards_of(options, bench);
-    Job job{std::move(file), std::move(units), scheme, guards, {}};
-    job.settings.loop = options.loop;
-    job.settings.real_time = options.real_time;
+    GuardSettings guards = guards_of(options, bench);
+    LoopSettings loop = options.loop;
     if (!options.uncertified) {
-        job.settings.loop.lowest_rate_share = std::max(options.loop.lowest_rate_share, certified_rate_share);
+        keep_to(*file.certificate, guards, loop);
     }
+    Job job{std::move(file), std::move(units), scheme, guards, {}};
+    job.settings.loop = loop;
+    job.settings.real_time = options.real_time;
     validate(job.settings.loop);
     const Metadata about{{"device", device.name().text()},
                          {"certified", options.uncertified ? "no: --uncertified was given" : "yes"}};

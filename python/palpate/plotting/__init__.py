@@ -4,6 +4,7 @@
 from .failure_maps import MeasuredLimit, draw_failure_map
 from .measured_and_modelled import draw_measured_and_modelled
 from .real_against_rendered import draw_real_against_rendered
+from .root_locus import draw_root_locus
 from .speed import RenderedForce, WorkPrecision, draw_rendered_force, draw_work_precision
 from .structures import draw_structures
 from .two_models import draw_two_models
@@ -16,6 +17,7 @@ __all__ = [
     "draw_measured_and_modelled",
     "draw_real_against_rendered",
     "draw_rendered_force",
+    "draw_root_locus",
     "draw_structures",
     "draw_two_models",
     "draw_work_precision",
