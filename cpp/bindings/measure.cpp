@@ -164,6 +164,7 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
     summary["position_range"] = std::pair{outlets.positions.lower, outlets.positions.upper};
     summary["force_range"] = std::pair{outlets.forces.lower, outlets.forces.upper};
     if (wanted.keep) {
+        summary["profile"] = bench.device;
         summary["kept"] = columns(outlets.kept);
     }
     told(summary);
@@ -219,7 +220,10 @@ py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
     wanted.session.loop.rate_hz = info.rate_hz;
     validate(wanted.session.loop);
     wanted.transducer = (info.capabilities & wire::has_transducer) != 0;
+    detail::require(!wanted.probe.wanted || wanted.probe.upper,
+                    "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     const ProbeSettings standard;
+    wanted.probe.force_limit = wanted.probe.force_limit.value_or(standard.force_limit);
     const std::optional<ProbeSettings> probe = wanted.probe.granted(bench, standard.lower, standard.upper);
     UsbDevice device{{.serial = serial, .makes_force = probe || wanted.push}};
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
@@ -256,7 +260,7 @@ void bind_measure(py::module_& module) {
            std::optional<double> lower, std::optional<double> upper, std::optional<double> speed,
            std::optional<double> stiffness, std::optional<double> force_limit, std::optional<double> push,
            double rate_hz, double duration_s, const std::string& record, bool keep, int priority, int cpu,
-           const std::optional<py::function>& progress) {
+           double lowest_rate_share, const std::optional<py::function>& progress) {
             Measurement wanted{transducer,
                                {position_unit, force_unit == "N*m" ? "Nm" : force_unit},
                                {probe, lower, upper, speed, stiffness, force_limit},
@@ -267,6 +271,7 @@ void bind_measure(py::module_& module) {
                                progress};
             wanted.session.loop.rate_hz = rate_hz;
             wanted.session.loop.duration_s = duration_s;
+            wanted.session.loop.lowest_rate_share = lowest_rate_share;
             wanted.session.real_time = {priority, cpu};
             if (device == "usb" || device.starts_with("usb:")) {
                 return measure_on_usb(device.substr(std::min<std::size_t>(device.size(), 4)), wanted);
@@ -280,8 +285,9 @@ void bind_measure(py::module_& module) {
         "upper"_a = py::none(), "speed"_a = py::none(), "stiffness"_a = py::none(),
         "force_limit"_a = py::none(), "push"_a = py::none(), "rate_hz"_a = loop.rate_hz,
         "duration_s"_a = loop.duration_s, "record"_a = "", "keep"_a = false,
-        "priority"_a = real_time.priority, "cpu"_a = real_time.cpu, "progress"_a = py::none(),
-        "A real object measured in real time on a simulated device, on which the model `object` is "
+        "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
+        "lowest_rate_share"_a = loop.lowest_rate_share, "progress"_a = py::none(),
+        "A real object measured in real time; on the simulated device the model `object` is "
         "mounted.\n\n"
         "A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;\n"
         "with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: "

@@ -32,7 +32,8 @@ class FailureLine:
     def ratio(self) -> Float1D:
         """Measured over theory, where both are known."""
         known = np.isfinite(self.measured) & np.isfinite(self.theory) & (self.theory != 0.0)
-        return self.measured[known] / self.theory[known]
+        ratio: Float1D = self.measured[known] / self.theory[known]
+        return ratio
 
     def as_json(self) -> dict[str, Any]:
         """Lists of numbers; null for NaN."""

@@ -96,14 +96,13 @@ def _with_tables(text: str, page: Path, maps: list[FailureMap], where: dict[str,
         f"{where['machine']}, {where['seconds']} s.\n"
     )
     for name, table in tables.items():
-        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->\n)"
-        text, found = re.subn(
-            pattern, lambda match, table=table: match[1] + table + match[2], text, flags=re.DOTALL
-        )
-        if found != 1:
+        marked = re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->\n)", flags=re.DOTALL)
+        if len(marked.findall(text)) != 1:
             raise InputError(
-                f"{page}: there must be one table between '<!-- {name} -->' and '<!-- end -->', found {found}"
+                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line"
             )
+        before, after = marked.split(text)
+        text = before + table + after
     return text
 
 

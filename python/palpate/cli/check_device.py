@@ -13,10 +13,11 @@ import click
 from .._core import __version__
 from ..devices import DeviceError
 from ..errors import InputError
+from .arguments import PATH
 from .device_options import device_options
 from .ending import FAILED
 from .live_line import LiveLine
-from .output import number, print_json, print_numbers, talk
+from .output import number, print_json, print_numbers, require_writable, talk
 from .verb import Verb
 
 _MARKS = {True: "ok", False: "WRONG", None: "-"}
@@ -29,6 +30,18 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
 @click.option(
     "--push", is_flag=True, help="Also push the handle a little: sign of the force, delay, mechanics."
 )
+@click.option(
+    "--profile", type=PATH, metavar="DEVICE.toml", help="What the device is thought to be: does that hold?"
+)
+@click.option(
+    "--model", "model_file", type=PATH, metavar="MODEL.json", help="One with a certificate: does that hold?"
+)
+@click.option(
+    "--write-profile",
+    type=PATH,
+    metavar="OUT.toml",
+    help="Write the device as it was measured; needs --push.",
+)
 @click.option("--yes", is_flag=True, help="Push without asking.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
@@ -40,6 +53,9 @@ def check_device(
     rate_hz: float,
     duration_s: float,
     push: bool,
+    profile: Path | None,
+    model_file: Path | None,
+    write_profile: Path | None,
     yes: bool,
     as_json: bool,
 ) -> None:
@@ -51,8 +67,15 @@ def check_device(
     """
     from ..devices import check_device as check
     from ..model import load_model
+    from ..planning import DeviceProfile
 
+    if write_profile is not None:
+        if not push:
+            raise InputError("--write-profile needs --push: inertia and damping show only in motion")
+        require_writable(write_profile)
     mounted = None if object_file is None else load_model(object_file)
+    expected = None if profile is None else DeviceProfile.load(profile)
+    certified = None if model_file is None else load_model(model_file)
     if push and not yes and device != "simulated":
         if not sys.stdin.isatty():
             raise InputError("--push moves the handle; at no terminal it needs --yes")
@@ -67,6 +90,8 @@ def check_device(
             rate_hz=rate_hz,
             duration_s=duration_s,
             push=push,
+            profile=expected,
+            model=certified,
             progress=line.show,
         )
     except DeviceError as error:
@@ -100,5 +125,8 @@ def check_device(
             }
         )
         click.echo(found.verdict)
+    if write_profile is not None:
+        found.profile().save(write_profile)
+        talk(f"wrote {write_profile}; its friction is 0, the safe side: fill in what you know")
     if not found.suitable:
         ctx.exit(FAILED)

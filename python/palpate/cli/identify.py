@@ -110,7 +110,7 @@ def identify(
     judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
     with finishing():
         if plot is not None:
-            picture_verification(plot, model, verified)
+            picture_verification(plot, model, verified, recordings)
         model.save(output)
         if as_json:
             print_json(result)

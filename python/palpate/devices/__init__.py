@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Devices: which there are, what is set before a run, whether one is fit, how an object is recorded."""
 
-from .check import Check, Finding, check_device, judge, with_pushes
+from .check import Check, check_device, judge, with_pushes
 from .errors import DeviceError
+from .finding import Finding
 from .measuring import measure, record
 from .push import Push, push_response
 from .udev import install_rule

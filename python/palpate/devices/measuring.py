@@ -104,6 +104,8 @@ def record(
             "this device has no force transducer, and its motor shows nothing of a force while somebody else "
             "moves the handle: probe instead"
         )
+    if not probe:
+        sweep["lowest_rate_share"] = 0.0  # nothing is rendered: a low rate is told, and no reason to stop
     return measure(
         device,
         object=object,

@@ -32,46 +32,61 @@ class Push:
 def push_response(ticks: Mapping[str, Any]) -> Push:
     """Read sign, delay and mechanics from the ticks of alternating pushes.
 
-    A command F > 0 pushes towards smaller positions. The mechanics J dv/dt = -F - b v of a handle at rest,
+    A force F > 0 pushes towards smaller positions. The mechanics J dv/dt = -F - b v of a handle at rest,
     integrated twice so that nothing is differentiated, are linear in both numbers:
 
         J (x - x_0) + b int (x - x_0) dt = - int int F dt dt.
 
+    Everything but the delay is in the device's own time: how late the host was does not matter.
+
     Parameters
     ----------
     ticks : mapping
-        ``force`` (sent), ``applied``, ``position``, ``device_time``: (n,) each.
+        ``force`` (sent), ``applied``, ``position``, ``device_time``, ``sequence``: (n,) each.
     """
-    sent, applied, position = (np.asarray(ticks[name]) for name in ("force", "applied", "position"))
-    period = float(np.median(np.diff(ticks["device_time"])))
-    begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
-    ways, delays = [], []
+    fresh = np.concatenate(([True], np.diff(ticks["sequence"].astype(np.int64)) > 0))
+    applied, position, time = (
+        np.asarray(ticks[name])[fresh] for name in ("applied", "position", "device_time")
+    )
+    ways: list[float] = []
     columns: list[Float1D] = []
     targets: list[Float1D] = []
-    for begin, end in zip(begins, [*begins[1:], len(sent)], strict=True):
-        felt = np.flatnonzero(applied[begin + 1 : end] != 0.0)
-        pushing = np.flatnonzero(sent[begin:end])[-1] + 1
-        ways.append(-np.sign(sent[begin]) * (position[min(begin + pushing, end - 1)] - position[begin]))
-        if felt.size:
-            delays.append(int(felt[0]))
-        last = min(begin + 2 * pushing, end)
-        moved = position[begin:last] - position[begin]
-        force = applied[begin + 1 : last]  # a reading tells the force that acted until it was taken
-        impulse = np.concatenate(([0.0], np.cumsum(force))) * period
-        columns.append(np.stack([moved, _integral(moved, period)], axis=1))
-        targets.append(-(_integral(impulse, period)))
-    moved_by = float(np.mean(ways)) if ways else 0.0
-    inertia = damping = None
-    if columns:
-        A, y = np.concatenate(columns), np.concatenate(targets)
-        (fit_J, fit_b), *_ = np.linalg.lstsq(A, y, rcond=None)
-        left = np.linalg.norm(A @ (fit_J, fit_b) - y) / max(float(np.linalg.norm(y)), 1e-300)
-        if fit_J > 0.0 and fit_b >= 0.0 and left < _MOST_LEFT:
-            inertia, damping = float(fit_J), float(fit_b)
-    return Push(moved_by, int(np.median(delays)) if delays else None, inertia, damping)
+    # A reading tells the force that acted until it was taken: a push begins one reading before it is seen.
+    pushing = applied != 0.0
+    begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
+    for begin in begins:
+        held = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
+        last = min(begin + 2 * held, len(position))
+        rows = slice(begin, last)
+        moved, seconds = position[rows] - position[begin], np.diff(time[rows])
+        ways.append(-float(np.sign(applied[begin + 1]) * moved[min(held, len(moved) - 1)]))
+        impulse = np.concatenate(([0.0], np.cumsum(applied[begin + 1 : last] * seconds)))
+        columns.append(np.stack([moved, _integral(moved, seconds)], axis=1))
+        targets.append(-_integral(impulse, seconds))
+    inertia, damping = _mechanics(columns, targets)
+    return Push(float(np.mean(ways)) if ways else 0.0, _delay(ticks), inertia, damping)
 
 
-def _integral(values: Float1D, period: float) -> Float1D:
+def _mechanics(columns: list[Float1D], targets: list[Float1D]) -> tuple[float | None, float | None]:
+    """Least squares; nothing where the two numbers do not explain the motion."""
+    if not columns:
+        return None, None
+    A, y = np.concatenate(columns), np.concatenate(targets)
+    fit, *_ = np.linalg.lstsq(A, y, rcond=None)
+    left = float(np.linalg.norm(A @ fit - y)) / max(float(np.linalg.norm(y)), 1e-300)
+    if fit[0] <= 0.0 or fit[1] < 0.0 or left > _MOST_LEFT:
+        return None, None
+    return float(fit[0]), float(fit[1])
+
+
+def _delay(ticks: Mapping[str, Any]) -> int | None:
+    """Samples from a command to the first reading whose force is it, less the one that every command takes."""
+    sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
+    begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
+    delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]
+    return int(np.median(delays)) if delays else None
+
+
+def _integral(values: Float1D, seconds: Float1D) -> Float1D:
     """Trapezoids from the first value on."""
-    steps = 0.5 * period * (values[1:] + values[:-1])
-    return np.concatenate(([0.0], np.cumsum(steps)))
+    return np.concatenate(([0.0], np.cumsum(0.5 * seconds * (values[1:] + values[:-1]))))
