@@ -23,6 +23,12 @@ ForceModel hysteretic() {
     return {network, loss, test::unit_domain(), 0.02};
 }
 
+Scheme direct() {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    return scheme;
+}
+
 /// Enough of everything for any of the models here.
 DeviceProfile strong() {
     DeviceProfile device;
@@ -54,13 +60,13 @@ const std::vector<std::pair<std::string, std::function<void(ForceBounds&, double
 
 TEST(CertificateCheck, BelievesWhatItWouldSayItself) {
     const ForceModel model = hysteretic();
-    EXPECT_EQ(disagreement(certify(model, Scheme{}, strong()), model), "");
+    EXPECT_EQ(disagreement(certify(model, direct(), strong()), model), "");
 }
 
 // An older release bounded less sharply: what it proved is still true.
 TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter) {
     const ForceModel model = hysteretic();
-    const Certificate certificate = certify(model, Scheme{}, strong());
+    const Certificate certificate = certify(model, direct(), strong());
     ASSERT_TRUE(certificate.certified()) << certificate.why;
     for (const auto& [name, widen] : wider) {
         const auto by = [&widen = widen](double amount) {
@@ -76,7 +82,7 @@ TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter)
 
 TEST(CertificateCheck, TakesNoBoundThatIsNotANumber) {
     const ForceModel model = hysteretic();
-    const Certificate certificate = certify(model, Scheme{}, strong());
+    const Certificate certificate = certify(model, direct(), strong());
     for (const double none :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
         for (const auto& [name, widen] : wider) {
@@ -92,7 +98,7 @@ TEST(CertificateCheck, TakesNoBoundThatIsNotANumber) {
 // Wider bounds, and the lines of the tighter ones: the lines are what is proved, and they follow from the bounds.
 TEST(CertificateCheck, RefusesLinesThatAreNotThoseOfTheStoredBounds) {
     const ForceModel model = hysteretic();
-    Certificate certificate = certify(model, Scheme{}, strong());
+    Certificate certificate = certify(model, direct(), strong());
     certificate.bounds.slope.upper += 1.0;
     const std::string wrong = disagreement(certificate, model);
     EXPECT_EQ(wrong.rfind("certificate.inequalities[1].right is ", 0), 0U) << wrong;
@@ -100,7 +106,7 @@ TEST(CertificateCheck, RefusesLinesThatAreNotThoseOfTheStoredBounds) {
 
 TEST(CertificateCheck, RefusesAWideBoundThatProvesNothingAnyMore) {
     const ForceModel model = hysteretic();
-    const Certificate certificate = certify(model, Scheme{}, strong());
+    const Certificate certificate = certify(model, direct(), strong());
     Certificate weak = with_bounds(certificate, [](ForceBounds& bounds) { bounds.slope.upper = 1e9; });
     weak.verdict = Verdict::Certified;
     const std::string wrong = disagreement(weak, model);

@@ -12,6 +12,7 @@ import pytest
 
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
 from palpate.cli.main import main
+from palpate.model.certified import device_record
 from palpate.planning import example_profiles, profile_file
 from palpate.planning.root_locus import root_locus
 from test_planning import keyswitch_by_hand, model_by_hand
@@ -40,7 +41,8 @@ def test_every_example_loads_under_its_name_and_says_where_its_numbers_are_from(
 
 
 def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
-    assert DeviceProfile.load(KNOB.save(tmp_path / "knob.toml")) == KNOB
+    again = DeviceProfile.load(KNOB.save(tmp_path / "knob.toml"))
+    assert device_record(again) == device_record(KNOB)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +97,7 @@ def test_a_weak_device_gets_a_force_whose_slope_it_holds_and_is_told_the_loss() 
     assert np.gradient(model.force(x), x).max() > limit
     rendered = chosen.model.force(x)
     assert np.gradient(rendered, x).max() <= limit * (1.0 + 1e-9)
-    assert np.abs(rendered - model.force(x)).max() <= chosen.loss.largest * (1.0 + 1e-6)
+    assert np.abs(rendered - model.force(x)).max() <= chosen.loss.largest * 1.001
 
 
 def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
@@ -169,14 +171,15 @@ def test_what_is_planned_survives_hands_on_the_device_it_was_planned_for() -> No
     from palpate.planning import force_error
 
     model = model_by_hand(linear=[60.0], weight=[0.0])
-    weak = DeviceProfile(id="weak", viscous_damping=0.01, coulomb_friction=0.02, inertia=2e-4)
-    hand = Hand(stiffness=15.0, damping=0.0, low=0.02, high=0.03, period_s=1.0)
+    weak = DeviceProfile(id="weak", viscous_damping=0.01, coulomb_friction=0.02)
+    hand = Hand(stiffness=15.0, damping=0.0, lower=0.02, upper=0.1)
     chosen = plan(model, weak)
     calm = simulate(chosen, weak, hand, 2.0)
-    shaking = simulate(Plan(model, Scheme()), weak, hand, 2.0)
-    swing = [float(np.ptp(each.position[-500:])) for each in (calm, shaking)]
-    assert swing[1] > 10.0 * swing[0], swing
-    assert force_error(chosen, calm).end < 0.05
+    shaking = simulate(Plan(model, Scheme(structure="direct")), weak, hand, 2.0)
+    jerks = [float(np.abs(np.diff(each.position, 2))[-1000:].max()) for each in (calm, shaking)]
+    assert jerks[0] < 3.0 * weak.encoder_step
+    assert jerks[1] > 100.0 * weak.encoder_step
+    assert force_error(chosen, calm).end < 0.01
 
 
 def test_the_poles_are_those_of_the_step_and_leave_the_circle_where_the_certificate_says() -> None:
@@ -201,7 +204,11 @@ def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.Capt
     assert main(["plan", "m.json", "--device", "knob.toml", "-o", "m.json", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     stored = json.loads((here / "m.json").read_text(encoding="utf-8"))
-    assert told == {"plan": stored["plan"], "certificate": stored["certificate"]}
+    assert told == {
+        "plan": stored["plan"],
+        "certificate": stored["certificate"],
+        "seconds": told["seconds"],
+    }
     for line in told["certificate"]["inequalities"]:
         assert line["margin"] == line["left"] - line["right"]
         assert line["holds"] == (line["left"] >= line["right"])

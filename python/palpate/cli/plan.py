@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +94,9 @@ def plan(
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
+    began = time.perf_counter()
     chosen = choose(model, profile, **wishes)
+    seconds = time.perf_counter() - began
     certificate = chosen.certificate
     assert certificate is not None
     if certificate.refused:
@@ -106,12 +109,13 @@ def plan(
         if as_json:
             from ..model.certified import certificate_record
 
-            print_json({"plan": chosen.record(), "certificate": certificate_record(certificate)})
+            record = certificate_record(certificate)
+            print_json({"plan": chosen.record(), "certificate": record, "seconds": seconds})
         else:
-            _tell(chosen, certificate)
+            _tell(chosen, certificate, seconds)
 
 
-def _tell(plan: Plan, certificate: Certificate) -> None:
+def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
     """The plan first, then what was refused on the way to it, then every inequality."""
     scheme = plan.scheme
     unit = plan.model.units["force"] or "in the model's unit"
@@ -132,6 +136,7 @@ def _tell(plan: Plan, certificate: Certificate) -> None:
     )
     rows["verdict"] = certificate.verdict
     rows["holds for"] = f"up to {number(1e3 * certificate.longest_period_s)} ms between two samples"
+    rows["planned in"] = f"{seconds:.1f} s"
     print_numbers(rows)
     if plan.refused:
         click.echo("\nrefused")

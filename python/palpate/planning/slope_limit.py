@@ -28,8 +28,9 @@ _SAMPLES = 1001
 """Positions over the domain [-]"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
-"""Standard deviation of the kernel [share of the travel], and whether the force has to begin where contact
-does: a free end whose force begins at once needs a steep way there."""
+"""Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both ends:
+one that begins at once where contact does needs a steep way there, and so does the continuation of one that is not
+zero or less at the lower end, or zero or more at the upper one."""
 
 _RESERVE = 0.985
 """Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""
@@ -83,8 +84,8 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
         Slopes of either stroke [force/position]; may be infinite.
     """
     travel = float(model.upper[0] - model.lower[0])
-    for smoothing, from_contact in _ATTEMPTS:
-        limited = _limited_once(model, low, high, smoothing * travel, from_contact)
+    for smoothing, restoring in _ATTEMPTS:
+        limited = _limited_once(model, low, high, smoothing * travel, restoring)
         found = sliding_slopes(limited)
         if found[0] >= low and found[1] <= high:
             return limited
@@ -126,11 +127,11 @@ def _strokes(model: Model, x: Float1D) -> Float2D:
     return np.array([model.force(x, direction=side) for side in sides])
 
 
-def _limited_once(model: Model, low: float, high: float, sigma: float, from_contact: bool) -> Model:
+def _limited_once(model: Model, low: float, high: float, sigma: float, restoring: bool) -> Model:
     x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
     changes = [
-        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, from_contact) for stroke in strokes
+        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, restoring) for stroke in strokes
     ]
     if len(changes) == 2:  # of g and h
         changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
@@ -184,7 +185,7 @@ def _least_loss(model: Model) -> float:
 
 
 def _change(
-    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, from_contact: bool
+    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, restoring: bool
 ) -> Float1D:
     """What has to be added to a force for its slopes to lie within limits, kinks rounded; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
@@ -200,8 +201,10 @@ def _change(
         wide = np.pad(force, (before, after))
     grid = x[0] + step * (np.arange(len(wide)) - before)
     nearest = slope_limited(grid, wide, low, high)
-    if from_contact and model.below == "free":
-        nearest = np.minimum(nearest, high * np.maximum(grid - x[0], 0.0))
+    if restoring and model.period is None:
+        rise, fall = high * (grid - x[0]), high * (grid - x[-1])
+        nearest = np.minimum(nearest, np.maximum(rise, 0.0) if model.below == "free" else rise)
+        nearest = np.maximum(nearest, np.minimum(fall, 0.0) if model.above == "free" else fall)
     nearest = _extended(nearest, margin)
     inside = slice(margin + before, margin + before + n)
     smooth = gaussian_filter1d(nearest, sigma / step, mode="nearest")[inside]
