@@ -21,8 +21,9 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 
 bool chooses_rendering(const Options& options) {
     const SchemeChoices& scheme = options.scheme;
-    return options.structure || scheme.compensated || scheme.coupling_stiffness || scheme.coupling_damping ||
-           scheme.mass || scheme.damping || scheme.play_radius || options.slew_s || options.tolerated;
+    return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
+           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || options.slew_s ||
+           options.tolerated;
 }
 
 void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {

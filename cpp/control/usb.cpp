@@ -47,19 +47,19 @@ Story story_of(const UsbDevice& device) {
     const auto number = [](std::uint64_t count) { return std::to_string(count); };
     return {
         {{"round trip", percentiles(stream.round_trip)},
-         {"delay", "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
-                       readable(samples(1.0)) + " samples, from a sample to the force made of it" +
-                       (stream.late_commands == 0
-                            ? ""
-                            : "; " + number(stream.late_commands) + " later than certified")},
+         {"delay",
+          "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
+              readable(samples(1.0)) + " samples, from a sample to the force made of it" +
+              (stream.late_commands == 0 ? ""
+                                         : "; " + number(stream.late_commands) + " later than certified")},
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
                       number(stream.repeated) + " repeated, " + number(stream.malformed) + " malformed, " +
                       number(health.discarded) + " discarded; " + number(health.skipped_commands) +
-                      " commands skipped, " + number(health.lost_commands) +
-                          " lost, " + number(stream.refused_commands) + " refused, " +
-                      number(stream.late_echoes) + " late echoes; " + number(health.timeouts) +
-                      " timeouts, " + number(health.stalls) + " stalls, " + number(health.bus_errors) +
-                      " bus errors, " + number(stream.watchdog_trips) + " watchdog trips"}},
+                      " commands skipped, " + number(health.lost_commands) + " lost, " +
+                      number(stream.refused_commands) + " refused, " + number(stream.late_echoes) +
+                      " late echoes; " + number(health.timeouts) + " timeouts, " + number(health.stalls) +
+                      " stalls, " + number(health.bus_errors) + " bus errors, " +
+                      number(stream.watchdog_trips) + " watchdog trips"}},
         {{"packets", stream.packets},
          {"lost", stream.lost},
          {"repeated", stream.repeated},

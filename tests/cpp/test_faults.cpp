@@ -180,8 +180,9 @@ TEST(Faults, ATickLaterThanCertifiedEndsTheRunWithZeroForceAndSaysSo) {
     EXPECT_FALSE(is_orderly(late.report->ending));
     ASSERT_EQ(late.ticks.size(), 400U) << "the late tick makes no force";
     EXPECT_GT(late.ticks.back().force, 0.1);
-    EXPECT_EQ(ending_text(*late.report, settings),
-              "stopped because a tick came 1.501 ms after the one before: the certificate holds up to 1.5 ms");
+    EXPECT_EQ(
+        ending_text(*late.report, settings),
+        "stopped because a tick came 1.501 ms after the one before: the certificate holds up to 1.5 ms");
 }
 
 struct Expected {

@@ -17,7 +17,7 @@ from test_planning import model_by_hand
 pytestmark = needs_program
 
 # A certificate that a busy machine does not leave: its longest period is a tenth of a second.
-PATIENT_KNOB = DeviceProfile(id="knob", viscous_damping=50.0, coulomb_friction=0.01)
+PATIENT_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.01)
 
 
 @pytest.fixture

@@ -204,15 +204,22 @@ def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.Capt
     assert main(["plan", "m.json", "--device", "knob.toml", "-o", "m.json", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     stored = json.loads((here / "m.json").read_text(encoding="utf-8"))
-    assert told == {
-        "plan": stored["plan"],
-        "certificate": stored["certificate"],
-        "seconds": told["seconds"],
-    }
+    assert list(told) == ["plan", "certificate", "steepest_slope", "felt_slope", "seconds"]
+    assert (told["plan"], told["certificate"]) == (stored["plan"], stored["certificate"])
+    assert told["felt_slope"] == told["steepest_slope"]
     for line in told["certificate"]["inequalities"]:
         assert line["margin"] == line["left"] - line["right"]
         assert line["holds"] == (line["left"] >= line["right"])
     assert Plan.of(load_model("m.json")).certificate is not None
+
+
+def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    stiffness = told["plan"]["coupling"]["stiffness"]
+    assert 1.0 / told["felt_slope"] == pytest.approx(1.0 / told["steepest_slope"] + 1.0 / stiffness)
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
+    assert f"slopes up to {told['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

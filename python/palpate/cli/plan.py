@@ -76,9 +76,9 @@ def plan(
 ) -> None:
     """Choose how a model is rendered on a device, and prove what can be proved of it.
 
-    The simplest structure that is certified is taken: direct; direct with its slope limited to what the device
-    can render; massless behind a coupling; implicit; explicit, which is stable at best. Every refusal says
-    which inequality failed and by how much. Exit code 1: no structure holds, and nothing is written.
+    The simplest structure that is certified is taken: direct; direct with its slope limited to what the
+    device can render; massless behind a coupling; implicit; explicit, which is stable at best. Every refusal
+    says which inequality failed and by how much. Exit code 1: no structure holds, and nothing is written.
     """
     from ..model import load_model
     from ..planning import DeviceProfile, profile_file
@@ -110,7 +110,9 @@ def plan(
             from ..model.certified import certificate_record
 
             record = certificate_record(certificate)
-            print_json({"plan": chosen.record(), "certificate": record, "seconds": seconds})
+            felt, steepest = _felt_slopes(chosen, certificate)
+            slopes = {"steepest_slope": steepest, "felt_slope": felt}
+            print_json({"plan": chosen.record(), "certificate": record, **slopes, "seconds": seconds})
         else:
             _tell(chosen, certificate, seconds)
 
@@ -130,9 +132,12 @@ def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
         rows["object"] = f"m = {number(scheme.mass)}, B_o = {number(scheme.damping)}"
     if scheme.play_radius:
         rows["play radius"] = number(scheme.play_radius)
+    felt, steepest = _felt_slopes(plan, certificate)
+    if felt < steepest:
+        rows["softer"] = f"slopes up to {number(steepest)} are felt as up to {number(felt)}"
     lost = plan.loss
-    rows["lost"] = (
-        "nothing" if lost is None else f"up to {number(lost.largest)}, {number(lost.rms)} RMS ({unit})"
+    rows["force lost"] = (
+        "none" if lost is None else f"up to {number(lost.largest)}, {number(lost.rms)} RMS ({unit})"
     )
     rows["verdict"] = certificate.verdict
     rows["holds for"] = f"up to {number(1e3 * certificate.longest_period_s)} ms between two samples"
@@ -151,6 +156,19 @@ def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
             f"{number(line.left)} against {number(line.right)}, margin {number(line.margin)}", indent="    "
         )
     print_paragraph(certificate.why)
+
+
+def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
+    """The steepest slope that is felt, and that of the model: a coupling in between is soft where it is not taken
+    out of the model, whose bounds then are those of what is left.
+    """
+    from .._core import felt_slope
+
+    steepest = max(0.0, certificate.bounds.slope_max)
+    if plan.structure == "direct":
+        return steepest, steepest
+    felt = felt_slope(steepest, plan.scheme.coupling_stiffness)
+    return felt, felt if plan.scheme.compensated else steepest
 
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
@@ -177,5 +195,8 @@ def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
             play_radius=radius,
         )
     slopes = np.unique([max(bounds.slope_min, -0.9 * scheme.coupling_stiffness), bounds.slope_max])
-    with figure_file(path, height_inches=3.8) as (axes,):
-        draw_root_locus(axes, root_locus(scheme, slopes, profile.period_s), damping=scheme.damping)
+    units = plan.model.units
+    unit = f"{units['force']}/{units['position']}".replace("*", "\u00b7") if units["force"] else ""
+    with figure_file(path, height_inches=3.6) as (axes,):
+        locus = root_locus(scheme, slopes, profile.period_s)
+        draw_root_locus(axes, locus, damping=scheme.damping, slope_unit=unit)

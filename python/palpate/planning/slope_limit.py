@@ -28,9 +28,9 @@ _SAMPLES = 1001
 """Positions over the domain [-]"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
-"""Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both ends:
-one that begins at once where contact does needs a steep way there, and so does the continuation of one that is not
-zero or less at the lower end, or zero or more at the upper one."""
+"""Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both
+ends: one that begins at once where contact does needs a steep way there, and so does the continuation of one
+that is not zero or less at the lower end, or zero or more at the upper one."""
 
 _RESERVE = 0.985
 """Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _LINES = ("-", "--", ":", "-.")
 
 
-def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float) -> None:
+def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit: str) -> None:
     """Poles over the damping B_o, one line style for each slope; the chosen damping marked.
 
     Parameters
@@ -25,6 +25,8 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float) -> None:
         What to draw.
     damping : float
         The chosen B_o, for the legend [force*s/position].
+    slope_unit : str
+        Of the slopes, for the legend.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color="0.6", linewidth=0.8)
@@ -33,7 +35,7 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float) -> None:
         style = _LINES[k % len(_LINES)]
         for pole in range(2):
             path = locus.poles[k, :, pole]
-            name = f"slope {slope:.4g}" if pole == 0 else None
+            name = f"slope {slope:.4g} {slope_unit}" if pole == 0 else None
             axes.plot(path.real, path.imag, style, color="black", linewidth=1.0, label=name)
         axes.plot(
             locus.chosen[k].real,
@@ -44,11 +46,11 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float) -> None:
             color="black",
             markerfacecolor="white",
             zorder=3,
-            label=f"$B_o$ = {damping:.3g}, slope {slope:.4g}",
+            label=f"the same, $B_o$ = {damping:.3g}",
         )
     axes.set_aspect("equal")
     axes.set_xlim(-1.3, 1.3)
     axes.set_ylim(-1.15, 1.15)
     axes.set_xlabel("real part of z")
     axes.set_ylabel("imaginary part of z")
-    axes.figure.legend(frameon=False, loc="outside upper center", ncols=2)
+    axes.figure.legend(frameon=False, loc="outside upper center", ncols=2, columnspacing=1.0)

@@ -31,8 +31,8 @@ namespace detail {
 /// release bounded less sharply and what it proved is still true.
 [[nodiscard]] inline std::string tighter_than_true(const ForceBounds& stored, const ForceBounds& now) {
     const auto sentence = [](const char* name, double bound, const char* side, double true_bound) {
-        return std::string("certificate.bounds.") + name + " is " + readable(bound) + ": must be " + side + " " +
-               readable(true_bound) + ", which is what model and device give; plan it again";
+        return std::string("certificate.bounds.") + name + " is " + readable(bound) + ": must be " + side +
+               " " + readable(true_bound) + ", which is what model and device give; plan it again";
     };
     for (const auto& [name, left, right] : {std::tuple{"slope_min", stored.slope.lower, now.slope.lower},
                                             {"loss_min", stored.loss.lower, now.loss.lower}}) {
