@@ -73,9 +73,9 @@ def test_a_certificate_of_something_else_is_refused(certified: str, reason: str)
 
 
 def planned(folder: Path, **device: Any) -> Path:
-    """The spring, planned for the emulated knob; patient, as its frames do not keep to the clock."""
+    """The spring, planned for the emulated knob; in lock-step the host may be four packets behind."""
     profile = {"id": "EMU-1", "viscous_damping": 50.0, "coulomb_friction": 0.01, "force_step": 1e-6}
-    plans = plan(load_model(SPRING), DeviceProfile(**{**profile, "delay_samples": 1, **device}))
+    plans = plan(load_model(SPRING), DeviceProfile(**{**profile, "delay_samples": 5, **device}))
     return plans.stored().save(folder / "planned.json")
 
 
