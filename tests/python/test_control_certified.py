@@ -33,9 +33,7 @@ def changed(path: Path, **certificate: Any) -> Path:
 
 
 def metadata(record: Path) -> str:
-    return "\n".join(
-        line for line in record.read_text(encoding="utf-8").splitlines() if line.startswith("#")
-    )
+    return "\n".join(line for line in record.read_text(encoding="utf-8").splitlines() if line.startswith("#"))
 
 
 def test_the_plan_of_the_file_is_what_is_rendered(tmp_path: Path) -> None:
@@ -50,7 +48,7 @@ def test_a_certified_run_takes_rate_and_device_of_its_certificate_and_says_so(
     planned: Path, tmp_path: Path
 ) -> None:
     record = tmp_path / "felt.csv"
-    answer = control(planned, "--duration-s", 0.3, "--record", record)
+    answer = control(planned, "--duration-s", 0.2, "--record", record)
     assert answer.returncode == 0, answer.stderr
     assert "uncertified" not in answer.stderr
     assert "certified: certified" in metadata(record)

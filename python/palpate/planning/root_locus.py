@@ -48,9 +48,7 @@ def root_locus(scheme: Scheme, slopes: Float1D, period_s: float, *, samples: int
     # Where two poles meet, T B/m = 2 sqrt(c) - c with c = T^2 K/m, a sample lies: the path has a corner there.
     c = np.maximum(period_s**2 * (slopes + scheme.coupling_stiffness) / scheme.mass, 0.0)
     meeting = scheme.mass / period_s * (2.0 * np.sqrt(c) - c) - scheme.coupling_damping
-    dampings = np.union1d(
-        np.linspace(0.0, largest, samples), meeting[(meeting > 0.0) & (meeting < largest)]
-    )
+    dampings = np.union1d(np.linspace(0.0, largest, samples), meeting[(meeting > 0.0) & (meeting < largest)])
     return RootLocus(
         slopes=slopes,
         dampings=dampings,
