@@ -159,8 +159,9 @@ def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
 
 
 def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
-    """The steepest slope that is felt, and that of the model: a coupling in between is soft where it is not taken
-    out of the model, whose bounds then are those of what is left.
+    """The steepest slope that is felt, and that of the model: a coupling in between is soft.
+
+    Where it was taken out of the model, the certificate's bounds are of what is left.
     """
     from .._core import felt_slope
 

@@ -45,7 +45,7 @@ def root_locus(scheme: Scheme, slopes: Float1D, period_s: float, *, samples: int
     """
     slopes = np.asarray(slopes, dtype=np.float64)
     largest = max(2.0 * scheme.mass / period_s - scheme.coupling_damping, scheme.damping)
-    # Where two poles meet, T B/m = 2 sqrt(c) - c with c = T^2 K/m, a sample lies: the path has a corner there.
+    # A sample where two poles meet, T B/m = 2 sqrt(c) - c with c = T^2 K/m: their path has a corner there.
     c = np.maximum(period_s**2 * (slopes + scheme.coupling_stiffness) / scheme.mass, 0.0)
     meeting = scheme.mass / period_s * (2.0 * np.sqrt(c) - c) - scheme.coupling_damping
     dampings = np.union1d(np.linspace(0.0, largest, samples), meeting[(meeting > 0.0) & (meeting < largest)])
