@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from .. import _core
+from .._core import ForceBounds
 from .._typing import Float1D, Float2D
 from ..identification.constraints import domain_bounds, impose, slope_limited
 from ..identification.identified import Readings
@@ -66,10 +68,16 @@ class Loss:
     rms: float
 
 
-def sliding_slopes(model: Model) -> tuple[float, float]:
-    """Proved (smallest, largest) slope while sliding, continuations included."""
+@lru_cache(maxsize=8)
+def sliding_bounds(model: Model) -> ForceBounds:
+    """Proved bounds while sliding, continuations included: of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
-    bounds = _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0)
+    return _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0)
+
+
+def sliding_slopes(model: Model) -> tuple[float, float]:
+    """The smallest and largest slope of these bounds."""
+    bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
 
@@ -86,6 +94,8 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
     travel = float(model.upper[0] - model.lower[0])
     for smoothing, restoring in _ATTEMPTS:
         limited = _limited_once(model, low, high, smoothing * travel, restoring)
+        if limited is None:
+            continue
         found = sliding_slopes(limited)
         if found[0] >= low and found[1] <= high:
             return limited
@@ -127,27 +137,25 @@ def _strokes(model: Model, x: Float1D) -> Float2D:
     return np.array([model.force(x, direction=side) for side in sides])
 
 
-def _limited_once(model: Model, low: float, high: float, sigma: float, restoring: bool) -> Model:
+def _limited_once(model: Model, low: float, high: float, sigma: float, restoring: bool) -> Model | None:
+    """The model with the change fitted; None where its continuations would be steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
     changes = [
         _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, restoring) for stroke in strokes
     ]
+    wanted = strokes + np.array(changes)
+    middle, travel = wanted.mean(axis=0), x[-1] - x[0]
+    pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
+    if not restoring and pushed_out and np.abs(middle).max() > high * travel:
+        return None
     if len(changes) == 2:  # of g and h
         changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
     alpha, beta = _candidates(x, np.any(np.array(changes) != 0.0, axis=0), sigma)
     close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
     before = model.alpha[:, 0], model.beta[:, 0]
     chosen = _chosen(x, np.array(changes), before, (alpha, beta), sigma, close)
-    wanted = strokes + _strokes_of(np.array(changes))
     return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
-
-
-def _strokes_of(readings: Float2D) -> Float2D:
-    """Pressing and releasing from g and h."""
-    return (
-        readings if len(readings) == 1 else np.array([readings[0] + readings[1], readings[0] - readings[1]])
-    )
 
 
 def _fitted(
@@ -170,7 +178,8 @@ def _fitted(
         Basis(alpha[:, None] * travel, (beta[:, None] - lower) / travel)
     )
     slopes = (low * float(travel[0]), high * float(travel[0]))
-    bounds = domain_bounds(problem, hysteresis=hysteretic and _least_loss(model) >= 0.0, slopes=slopes)
+    lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
+    bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
     found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
     new: dict[str, Any] = {"alpha": found.alpha.tolist(), "beta": found.beta.tolist()}
     for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
@@ -178,10 +187,6 @@ def _fitted(
         new[f"linear{suffix}"] = found.linear[k].tolist()
         new[f"weight{suffix}"] = found.weights[k].tolist()
     return changed_network(model, **new)
-
-
-def _least_loss(model: Model) -> float:
-    return float(_core.force_bounds(model, float(model.upper[0] - model.lower[0])).loss_min)
 
 
 def _change(
