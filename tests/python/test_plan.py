@@ -215,6 +215,18 @@ def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.Capt
     assert Plan.of(load_model("m.json")).certificate is not None
 
 
+def test_a_model_with_a_plan_is_simulated_as_planned_on_its_device(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "m.json", "--device", "weak.toml", "-o", "planned.json"]) == 0
+    for words, structure in (([], "direct"), (["--structure", "implicit"], "implicit")):
+        capsys.readouterr()
+        assert main(["simulate", "planned.json", "--duration-s", "0.2", "--json", *words]) == 0
+        told = capsys.readouterr()
+        assert json.loads(told.out)["structure"] == structure
+        assert ("weak knob" in told.err) == (structure == "direct")
+
+
 def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
