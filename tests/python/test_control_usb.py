@@ -207,9 +207,10 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
     assert not frames(trace)[-1].enabled
 
 
-# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is zero:
-# the packet that shows it, the next one that carries zero, the frame in which it acts, and up to four packets that
-# the host may be behind (in lock-step it does not catch up by itself, as it does by the clock); or the watchdog.
+# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is
+# zero: the packet that shows it, the next one that carries zero, the frame in which it acts, and up to four
+# packets that the host may be behind (in lock-step it does not catch up by itself, as it does by the clock);
+# or the watchdog.
 WATCHDOG = 14
 PACKET = 10
 UNSOUND = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
