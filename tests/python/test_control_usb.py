@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from palpate import read_recording
+from palpate import DeviceProfile, load_model, plan, read_recording
 from usb_emulation import RUNNER, emulated, frames, needs_emulation
 
 PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
@@ -70,6 +70,59 @@ def test_a_certificate_of_something_else_is_refused(certified: str, reason: str)
     answer = control(device=LOCK_STEP, model=SPRING.parent / certified)
     assert answer.returncode == 2
     assert reason in answer.stderr
+
+
+def planned(folder: Path, **device: Any) -> Path:
+    """The spring, planned for the emulated knob; in lock-step the host may be four packets behind."""
+    profile = {"id": "EMU-1", "viscous_damping": 50.0, "coulomb_friction": 0.01, "force_step": 1e-6}
+    plans = plan(load_model(SPRING), DeviceProfile(**{**profile, "delay_samples": 5, **device}))
+    return plans.stored().save(folder / "planned.json")
+
+
+def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
+    record = tmp_path / "felt.csv"
+    words = ["--wait-ms", 500, "--duration-s", 0.1, "--record", record]
+    answer = control(*words, device=LOCK_STEP, model=planned(tmp_path))
+    # On a busy machine the first late packet ends it: nothing else is certified.
+    assert answer.returncode == 0 or "zero force sent" in answer.stderr, answer.stderr
+    assert "direct; emulated knob EMU-1" in answer.stderr
+    assert "uncertified" not in answer.stderr
+    assert "# certified: yes" in record.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("device", "reason"),
+    [
+        ({"id": "EMU-2"}, "is certified for the device EMU-2, not for EMU-1"),
+        ({"period_s": 2e-3}, "is certified for a period of 2 ms"),
+        ({"encoder_step": 1e-5}, "is certified for an encoder step of 1e-05"),
+        ({"force_limit": 6.0}, "is certified for 6 N*m, the device makes 5"),
+    ],
+)
+def test_a_certificate_of_another_device_moves_nothing(
+    device: dict[str, Any], reason: str, tmp_path: Path
+) -> None:
+    trace = tmp_path / "trace.csv"
+    model = planned(tmp_path, **device)
+    answer = control("--wait-ms", 500, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
+    assert answer.returncode == 2
+    assert reason in answer.stderr
+    assert all(frame.torque == 0.0 for frame in frames(trace))
+
+
+def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: Path) -> None:
+    trace = tmp_path / "trace.csv"
+    model = planned(tmp_path, delay_samples=0)
+    words = ["--wait-ms", 500, "--duration-s", 0.3]
+    for _ in range(20):  # on a busy machine a lost packet may end the run before
+        answer = control(*words, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
+        if "stopped by a fault of the device: Lost" not in answer.stderr:
+            break
+    assert answer.returncode == 1
+    assert "stopped by a fault of the device: Timeout" in answer.stderr
+    assert " later than certified" in answer.stdout
+    assert frames(trace)[-1].torque == 0.0
+    assert not frames(trace)[-1].enabled
 
 
 @pytest.mark.parametrize(
@@ -157,9 +210,10 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
     assert not frames(trace)[-1].enabled
 
 
-# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is zero:
-# the packet that shows it, the next one that carries zero, the frame in which it acts, and up to four packets that
-# the host may be behind (in lock-step it does not catch up by itself, as it does by the clock); or the watchdog.
+# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is
+# zero: the packet that shows it, the next one that carries zero, the frame in which it acts, and up to four
+# packets that the host may be behind (in lock-step it does not catch up by itself, as it does by the clock);
+# or the watchdog.
 WATCHDOG = 14
 PACKET = 10
 UNSOUND = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
