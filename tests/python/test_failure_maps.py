@@ -47,7 +47,7 @@ def test_the_command_draws_writes_and_fills_the_tables(
     quick = ("encoder", "pole", "guard")
     monkeypatch.setattr(analysis, "failure_map_names", quick)
     page = tmp_path / PAGE.name
-    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "where")))
+    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "guards", "where")))
     assert main(["chart", "failures", "--to", str(tmp_path), "--points", "3"]) == 0
     for name in quick:
         assert (tmp_path / "figures" / f"failure-{name}.png").stat().st_size > 5000
@@ -77,7 +77,8 @@ def test_the_page_has_a_picture_and_a_table_for_every_map() -> None:
         assert text.count(f"(figures/failure-{name}.png)") == 1
         assert text.count(f"<!-- {name} -->\n") == 1
         assert (PAGE.parent / "figures" / f"failure-{name}.png").exists()
-    assert len(re.findall(r"<!-- end -->", text)) == len(failure_map_names) + 1
+    assert text.count("<!-- guards -->\n") == 1
+    assert len(re.findall(r"<!-- end -->", text)) == len(failure_map_names) + 2
 
 
 def test_the_numbers_of_the_page_are_those_of_its_file() -> None:
