@@ -5,8 +5,8 @@ Every structure, with and without compensation, over a grid of couplings, masses
 three devices in closed loop, as the plan is, each with the identified model and with the one whose slopes the
 plan limited: for a spring that meets a wall, a switch that snaps through and, where PALPATE_DATA names the
 measured data, real keyboard switches. The error is the commanded force less the identified model's at the
-handle at the end of the tick, RMS, while a hand sweeps the domain to and fro. Each is then leaned on, where the object is
-steepest, by hands that damp nothing.
+handle at the end of the tick, RMS, while a hand sweeps the domain to and fro. Each is then leaned on, where
+the object is steepest, by hands that damp nothing.
 
 Prints both tables of FOLDER/plan-against-trial.md, puts them there, writes all numbers to
 FOLDER/figures/plan-against-trial.json, and ends with 1 where a plan is left shaking or is worse than 1.2
@@ -31,7 +31,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate import DeviceProfile, Hand, Model, Scheme, _core, identify, plan, read_recording
-from palpate.cli.marks import with_tables
+from palpate.cli.pages import with_tables
 from palpate.identification.constraints import slope_limited
 from palpate.planning import Plan
 from palpate.planning.choices import renderable_slopes
@@ -199,7 +199,7 @@ def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) ->
 
 def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
     """Share of the travel where the nearest force within the device's slopes is the identified one, and the
-    largest departure of what is rendered from the identified force there. A stick's h / r is slope as well."""
+    largest departure of what is rendered from it there. A stick's h / r counts as slope."""
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
     stick = _core.force_bounds(chosen.model, chosen.scheme.play_radius).loss_per_play
     low, high = (bound - np.copysign(stick, bound) for bound in renderable_slopes(device))

@@ -11,6 +11,7 @@ import pytest
 from palpate import analysis
 from palpate.analysis import failure_map_names, measure_failure_map
 from palpate.cli.main import main
+from palpate.cli.pages import with_tables
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "where-each-method-fails.md"
@@ -69,6 +70,13 @@ def test_a_page_without_its_marks_is_refused_in_one_sentence(
     assert main(["chart", "failures", "--to", str(tmp_path), "--points", "2"]) == 2
     assert "'<!-- pole -->'" in capsys.readouterr().err
     assert page.read_text() == "nothing to fill\n"
+
+
+def test_marks_with_nothing_between_are_filled_too(tmp_path: Path) -> None:
+    bare = "<!-- one -->\n<!-- end -->\nbetween\n<!-- two -->\nold\n<!-- end -->\n"
+    assert with_tables(bare, tmp_path, {"one": "1\n", "two": "2\n"}) == (
+        "<!-- one -->\n1\n<!-- end -->\nbetween\n<!-- two -->\n2\n<!-- end -->\n"
+    )
 
 
 def test_the_page_has_a_picture_and_a_table_for_every_map() -> None:

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ..recording.files import replacing
 from .arguments import PATH
 from .figures import figure_file
-from .marks import with_tables
 from .output import number, talk
+from .pages import with_tables, write_text
 from .verb import Verb
 
 if TYPE_CHECKING:
@@ -60,16 +59,11 @@ def chart_failures(to: Path, points: int) -> None:
         "maps": [each.as_json() for each in maps],
         "guards": [dataclasses.asdict(each) for each in guards],
     }
-    _write(figures / "failure-maps.json", json.dumps(written, indent=1) + "\n")
+    write_text(figures / "failure-maps.json", json.dumps(written, indent=1) + "\n")
     talk(f"wrote {len(maps)} figures and failure-maps.json to {figures}")
     if text is not None:
-        _write(page, with_tables(text, page, _tables(maps, guards, where)))
+        write_text(page, with_tables(text, page, _tables(maps, guards, where)))
         talk(f"wrote the tables of {page}")
-
-
-def _write(path: Path, text: str) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def _where(seconds: float) -> dict[str, Any]:
