@@ -67,10 +67,11 @@ void bind_failure(py::module_& module) {
         "arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known);\n"
         "searched (up to how many times the theory, where none failed) and linear (the limit spans no "
         "decades).");
-    module.def("guard_effects", &guard_effects_in_python,
-               "Every guard by itself: its cost where nothing is wrong, and what it makes of what is.\n\n"
-               "By row: guard, cost (RMS change of the force over its RMS), wrong (what is wrong, and what of\n"
-               "it is measured), without and with the guard.");
+    module.def(
+        "guard_effects", &guard_effects_in_python,
+        "Every guard by itself: its cost where nothing is wrong, and what it makes of what is.\n\n"
+        "By row: guard, cost (RMS change of the force over its RMS), wrong (what is wrong, and what of\n"
+        "it is measured), without and with the guard.");
 }
 
 }  // namespace palpate::bindings
