@@ -24,7 +24,7 @@ SWING = 4.0
 """To and fro after four seconds is no rest [encoder steps]"""
 ANGLE = (
     DeviceProfile(id="knob", coulomb_friction=0.005),
-    DeviceProfile(id="weak knob", viscous_damping=0.008, coulomb_friction=0.002),
+    DeviceProfile(id="weak knob", viscous_damping=0.005, coulomb_friction=0.002),
     DeviceProfile(id="late knob", coulomb_friction=0.01, delay_samples=1),
 )
 LENGTH = {"position_unit": "m", "inertia": 0.05, "encoder_step": 1e-6, "force_limit": 20.0}
