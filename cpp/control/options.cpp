@@ -93,7 +93,9 @@ void add_guards(CLI::App& app, Options& options) {
 }
 
 void add_running(CLI::App& app, Options& options) {
-    app.add_option("--device", options.device, "simulated, or usb[:SERIAL]")->capture_default_str();
+    app.add_option("--device", options.device,
+                   "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z")
+        ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
         ->check(number_between(lowest_rate_hz, highest_rate_hz))
         ->capture_default_str();
