@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -139,6 +140,19 @@ void bind_rendering(py::module_& module) {
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
         "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
         "driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.");
+
+    module.def(
+        "solver_name",
+        [](const ForceModel& model, const Scheme& s, double period_s) -> std::optional<std::string> {
+            require_period(period_s);
+            const auto name = solver_name(model, s, period_s);
+            return name ? std::optional<std::string>{*name} : std::nullopt;
+        },
+        "model"_a, "scheme"_a, "period_s"_a,
+        "How the load line is solved: 'table' where certified tables answer, at least in part, else "
+        "'newton';\n"
+        "None where a structure has no load line.");
+
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
         "substeps"_a = 20, "start_position"_a = 0.0,

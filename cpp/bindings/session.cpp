@@ -72,7 +72,8 @@ void bind_session(py::module_& module) {
     const LoopSettings loop;
     const RealTimeOptions real_time;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
-    py::class_<LoopSettings>(module, "LoopSettings", "When a rendering ticks, and when it ends: the defaults.")
+    py::class_<LoopSettings>(module, "LoopSettings",
+                             "When a rendering ticks, and when it ends: the defaults.")
         .def(py::init<>())
         .def_readonly("rate_hz", &LoopSettings::rate_hz)
         .def_readonly("duration_s", &LoopSettings::duration_s)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .errors import InputError
     from .identification import IdentifyOptions, frame_bounds
     from .identification.identify import identify
+    from .identification.identify_files import identify_files
     from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
     from .planning import DeviceProfile, Plan, simulate
@@ -33,6 +34,7 @@ _HOME = {
     "IdentifyOptions": "identification",
     "frame_bounds": "identification",
     "identify": "identification",
+    "identify_files": "identification.identify_files",
     "Model": "model",
     "load_model": "model",
     "Plan": "planning",
@@ -60,6 +62,7 @@ __all__ = [
     "__version__",
     "frame_bounds",
     "identify",
+    "identify_files",
     "load_model",
     "plan",
     "read_recording",

@@ -108,7 +108,7 @@ def test_velocity_comes_from_time_where_it_is_no_column() -> None:
 @pytest.mark.parametrize(
     ("inputs", "told"),
     [
-        ("position,place", "has no input 'place', only position, velocity"),
+        ("position,place", "has no input place, only position, velocity; read the recording with"),
         ("position,hysteresis,velocity", "hysteresis is identified over position alone"),
         ("position,position", "inputs is 'position,position'"),
     ],

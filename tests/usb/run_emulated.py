@@ -51,13 +51,9 @@ def emulator() -> Path | str:
     return program
 
 
-def main() -> int:
-    program = emulator()
-    if isinstance(program, str):
-        print(f"skipped: {program}", file=sys.stderr)
-        return MISSING
-    return subprocess.run([program, *sys.argv[1:]], check=False).returncode
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    found = emulator()
+    if isinstance(found, str):
+        print(f"skipped: {found}", file=sys.stderr)
+        sys.exit(MISSING)
+    os.execv(found, [str(found), *sys.argv[1:]])  # so that a signal reaches the emulator, which passes it on

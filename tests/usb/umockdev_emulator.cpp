@@ -6,21 +6,24 @@
 // The command finds a socket in PALPATE_EMULATOR that takes orders as datagrams: fault KIND COUNT, plug, state.
 // The exit code is that of the command.
 #include <sys/prctl.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <atomic>
+#include <algorithm>
+#include <chrono>
 #include <condition_variable>
-#include <csignal>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
+#include "command.hpp"
 #include "emulation.hpp"
 #include "usbfs_node.hpp"
 
@@ -28,13 +31,6 @@ namespace emulator {
 namespace {
 
 constexpr const char* preload = "libumockdev-preload.so.0";
-std::atomic<pid_t> child{0};
-
-void pass_on(int signal) {
-    if (child > 0) {
-        ::kill(child, signal);
-    }
-}
 
 class Emulation {
   public:
@@ -55,27 +51,20 @@ class Emulation {
     Emulation& operator=(const Emulation&) = delete;
 
     int run() {
-        const std::string orders = open_orders();
-        child = ::fork();
-        if (child == 0) {
-            become_the_command(orders);
-        }
+        const Orders orders{[this](const std::string& order) { return obeyed(order); }};
+        Command command{settings_.command, [this] { prepare(); }};
         std::thread frames{[this] { run_frames(); }};
-        std::thread obeying{[this] { obey_orders(); }};
-        int status = 0;
-        while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-        }
+        const int code = command.wait();
         {
             const std::lock_guard locked{mutex_};
             over_ = true;
         }
         changed_.notify_all();
         frames.join();
-        ::shutdown(orders_, SHUT_RDWR);
-        obeying.join();
-        ::close(orders_);
-        ::unlink(orders.c_str());
-        return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+        if (trace_.is_open() && !places_.empty()) {
+            trace_ << places_.back()->node->port().device().trace_row();  // how the command left it
+        }
+        return code;
     }
 
   private:
@@ -116,9 +105,8 @@ class Emulation {
         fs::permissions(node, fs::perms::none);
     }
 
-    [[noreturn]] void become_the_command(const std::string& orders) {
-        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        ::setenv("PALPATE_EMULATOR", orders.c_str(), 1);
+    /// In the child: what stands before the command's own libraries, and who runs it.
+    void prepare() {
         const std::string first = settings_.preload_first;
         ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
         if (settings_.denied && ::getuid() == 0) {
@@ -127,15 +115,6 @@ class Emulation {
                 ::_exit(126);
             }
         }
-        std::vector<char*> words;
-        for (std::string& word : settings_.command) {
-            words.push_back(word.data());
-        }
-        words.push_back(nullptr);
-        ::execvp(words[0], words.data());
-        std::cerr << "umockdev_emulator: " << words[0] << ": " << std::generic_category().message(errno)
-                  << "\n";
-        ::_exit(127);
     }
 
     /// Every frame that is due; when to look again. Under the mutex.
@@ -179,49 +158,14 @@ class Emulation {
         }
     }
 
-    std::string open_orders() {
-        const auto path =
-            std::filesystem::temp_directory_path() / ("palpate-emulator-" + std::to_string(::getpid()));
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-        ::unlink(path.c_str());
-        orders_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-        if (::bind(orders_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-            throw std::runtime_error("no socket at " + path.string());
-        }
-        ::chmod(path.c_str(), 0777);
-        return path.string();
-    }
-
-    void obey_orders() {
-        std::array<char, 512> text{};
-        sockaddr_un from{};
-        while (true) {
-            socklen_t size = sizeof from;
-            const ssize_t length =
-                ::recvfrom(orders_, text.data(), text.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
-            if (length <= 0) {
-                return;
-            }
-            const std::string answer = obeyed({text.data(), static_cast<std::size_t>(length)});
-            ::sendto(orders_, answer.data(), answer.size(), MSG_NOSIGNAL,
-                     reinterpret_cast<const sockaddr*>(&from), size);
-        }
-    }
-
     std::string obeyed(const std::string& order) {
-        try {
-            if (order == "plug") {
-                plug(settings_.devices.front(), {});
-                places_.back()->node->tell_arrival();
-                return "ok";
-            }
-            const std::lock_guard locked{mutex_};
-            return obey(places_.back()->node->port(), order);
-        } catch (const std::exception& error) {
-            return std::string("error: ") + error.what();
+        if (order == "plug") {
+            plug(settings_.devices.front(), {});
+            places_.back()->node->tell_arrival();
+            return "ok";
         }
+        const std::lock_guard locked{mutex_};
+        return obey(places_.back()->node->port(), order);
     }
 
     Settings settings_;
@@ -232,7 +176,6 @@ class Emulation {
     std::vector<std::unique_ptr<Place>> places_;
     FrameClock::Clock::time_point wakes_at_{};  ///< of the frames' own thread
     int next_address_ = 2;
-    int orders_ = -1;
     bool over_ = false;
 };
 
@@ -252,9 +195,6 @@ int main(int count, char** words) {
         if (settings.command.empty()) {
             std::cerr << "Usage: umockdev_emulator [OPTIONS] -- COMMAND...\n\n" << emulator::options_text;
             return asks ? 0 : 2;
-        }
-        for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-            std::signal(signal, emulator::pass_on);
         }
         emulator::Emulation emulation{std::move(settings)};
         return emulation.run();

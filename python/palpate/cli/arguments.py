@@ -89,6 +89,7 @@ def reading_options(command: F) -> F:
         negate: tuple[str, ...],
         torque_constant: float | None,
         rows: tuple[int | None, int | None] | None,
+        zero: tuple[int | None, int | None] | None,
         invalid: str,
         **others: Any,
     ) -> Any:
@@ -102,6 +103,7 @@ def reading_options(command: F) -> F:
                 "negate": negate,
                 "torque_constant": torque_constant,
                 "rows": rows,
+                "zero": zero,
                 "invalid": invalid,
             }
         )
@@ -143,6 +145,13 @@ def reading_options(command: F) -> F:
                 callback=_row_range,
                 default=None,
                 help="Use these rows only, counted from 0.",
+            ),
+            click.option(
+                "--zero",
+                metavar="START:STOP",
+                callback=_row_range,
+                default=None,
+                help="Rows in which the tool touches nothing: their mean force is taken off.",
             ),
             click.option(
                 "--invalid",

@@ -15,6 +15,7 @@ from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_o
 from .beside_baselines import as_records, baselines_option, fit_baselines, print_beside
 from .figures import require_figure_name
 from .identify_options import identify_options
+from .large_files import LargeFiles, large_file_options
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_verification
 from .verb import Verb
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     help="Keep every K-th row out of the identification and report the error on these rows.",
 )
 @baselines_option
+@large_file_options
 @plot_option("measured and modelled force over position, residuals beneath")
 @json_option
 @reading_options
@@ -50,6 +52,7 @@ def identify(
     output: Path,
     hold_out_every: int | None,
     beside: bool,
+    large: LargeFiles,
     plot: Path | None,
     as_json: bool,
     reading: ReadingOptions,
@@ -70,8 +73,12 @@ def identify(
     for target in filter(None, (output, plot)):
         require_writable(target, inputs=recording_files)
     require_distinct(output, plot)
-    columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
-    recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
+    recordings: list[Recording] = []
+    if large.wanted:
+        large.require_alone({"--hold-out-every": hold_out_every, "--baselines": beside, "--plot": plot})
+    else:
+        columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+        recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
     others = fit_baselines(recordings, hold_out_every) if beside else []
     judged_on = recordings
     if hold_out_every is not None:
@@ -79,7 +86,10 @@ def identify(
         recordings, judged_on = [train for train, _ in parts], [test for _, test in parts]
     talk("identifying ...")
     start = time.perf_counter()
-    model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
+    if large.wanted:
+        model = large.identify(recording_files, reading, options)
+    else:
+        model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
     for note in model.notes.get("identification", ()):
@@ -100,7 +110,7 @@ def identify(
     judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
     with finishing():
         if plot is not None:
-            picture_verification(plot, model, verified)
+            picture_verification(plot, model, verified, recordings)
         model.save(output)
         if as_json:
             print_json(result)

@@ -58,17 +58,26 @@ class Compressor:
     max_positions : int
         With more distinct positions than this they are gathered in that many cells of a regular grid.
     weight : (n,), optional
-        Samples that each row stands for, above 0; 1 without it.
+        Samples that each row stands for, >= 0; 1 without it. A row of weight 0 is no row.
+    within : float
+        Sum of squares about the rows themselves, where they stand for several samples.
     """
 
     def __init__(
-        self, positions: Float2D, force: Float1D, *, max_positions: int, weight: Float1D | None = None
+        self,
+        positions: Float2D,
+        force: Float1D,
+        *,
+        max_positions: int,
+        weight: Float1D | None = None,
+        within: float = 0.0,
     ) -> None:
-        self._key, self._per_axis = _position_key(positions, max_positions)
-        self.kept: NDArray[np.int64] | slice = slice(None)
+        self._within = within
+        self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
         """The rows that stand for all."""
+        self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
         if 0 < self._per_axis < LEAST_PER_AXIS:
-            self.kept = np.linspace(0, len(force) - 1, max_positions).round().astype(np.int64)
+            self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
             self._key, self._per_axis = np.arange(max_positions), 0
         self._positions = positions[self.kept]
         self._force = force[self.kept]
@@ -98,7 +107,7 @@ class Compressor:
         x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
         y = _mean(group, count, weight * self._force)
         dy = self._force - y[group]
-        within = float(dy @ (weight * dy))
+        within = self._within + float(dy @ (weight * dy))
         spread = np.zeros_like(x)
         if self._per_axis:
             dx = self._positions - x[group]
@@ -110,9 +119,10 @@ class Compressor:
     def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
         """The same cells with fewer rows."""
         part = copy(self)
-        part.kept = slice(None)
+        part.kept = np.arange(np.count_nonzero(rows))
         part._key, part._positions = self._key[rows], self._positions[rows]
         part._force, part._weight = self._force[rows], self._weight[rows]
+        part._within = self._within * float(part._weight.sum() / self._weight.sum())
         return part
 
     def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:

@@ -15,6 +15,8 @@ from .separable import Solution
 class IdentifiedNetwork:
     """An identified force law f = g(x) + s h(x), and how it came about."""
 
+    inputs: tuple[str, ...]
+    """(d,) names"""
     alpha: Float2D
     """(N, d) dilations [1/position]"""
     beta: Float2D

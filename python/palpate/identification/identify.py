@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """identify: from recordings to a model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -11,7 +11,7 @@ from ..model import Fit, Model, PathStep
 from ..recording import Recording, Source
 from .environment import VELOCITY_INPUTS, fit_environment
 from .identified import IdentifiedNetwork
-from .inputs import Observations, observations
+from .inputs import observations
 from .options import IdentifyOptions, options_from
 
 
@@ -53,26 +53,29 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
-            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
         )
-    return _model_of(network, seen, recordings, settings)
+    source = Source.merged(part.source for part in recordings)
+    return model_of(network, recordings[0].units, source, settings, seen.notes)
 
 
-def _model_of(
+def model_of(
     network: IdentifiedNetwork,
-    seen: Observations,
-    recordings: Sequence[Recording],
+    units: Mapping[str, str],
+    source: Source,
     options: IdentifyOptions,
+    notes: Sequence[str] = (),
 ) -> Model:
-    notes = [*seen.notes, *network.notes]
+    """The model of an identified network."""
+    notes = [*notes, *network.notes]
     path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
     ]
     return Model(
-        kind=_kind(network, seen.names),
-        inputs=seen.names,
-        units=recordings[0].units,
+        kind=_kind(network),
+        inputs=network.inputs,
+        units=units,
         alpha=network.alpha,
         beta=network.beta,
         weight=network.weight,
@@ -87,6 +90,8 @@ def _model_of(
         above=network.above,
         period=options.period,
         play_radius=network.play_radius,
+        mass=network.mass if options.filters == "matched" else options.assumed_mass,
+        damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
         fit=Fit(
             rung=network.rung,
             stop_reason=network.stop_reason,
@@ -95,12 +100,12 @@ def _model_of(
             n_parameters=network.n_parameters,
             path=path,
         ),
-        data=Source.merged(part.source for part in recordings),
+        data=source,
         notes={"identification": notes} if notes else None,
     )
 
 
-def _kind(network: IdentifiedNetwork, names: Sequence[str]) -> str:
-    if len(names) == 1:
+def _kind(network: IdentifiedNetwork) -> str:
+    if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
-    return "position_velocity" if tuple(names) == VELOCITY_INPUTS else "general"
+    return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

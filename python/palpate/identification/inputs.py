@@ -2,7 +2,7 @@
 """What the force is taken to depend on: from recordings and names to the rows of a regression."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..recording import Recording
-from ..recording.motion import velocity
+from ..recording.motion import Piece, pieces, velocity
 from .options import IdentifyOptions
+from .paper import paper_target
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Observations:
     """(n,) direction of the stroke, where every recording says it"""
     starts: tuple[int, ...] | None
     """Rows at which a recording begins, where every one has time"""
+    parts: tuple[Piece, ...]
+    """The motion between gaps of time, where every recording has time; rows count over all recordings"""
     notes: tuple[str, ...]
 
 
@@ -49,10 +52,31 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     if all(part.direction is not None for part in recordings):
         sides = [np.asarray(part.direction, dtype=float) for part in recordings]
         side = np.concatenate([each[rows] for each, rows in zip(sides, kept, strict=True)])
-    elif all(part.time is not None for part in recordings):
-        starts = (0, *np.cumsum([np.count_nonzero(rows) for rows in kept])[:-1].tolist())
-    force = np.concatenate([part.force[rows] for part, rows in zip(recordings, kept, strict=True)])
-    return Observations(names, np.concatenate(columns), force, side, starts, notes)
+    parts: tuple[Piece, ...] = ()
+    if len(names) == 1 and all(part.time is not None for part in recordings):
+        first = np.cumsum([0, *(len(part) for part in recordings)])
+        parts = tuple(
+            replace(piece, rows=slice(start + piece.rows.start, start + piece.rows.stop))
+            for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
+            for piece in pieces(recording)
+        )
+    if side is None and all(part.time is not None for part in recordings):
+        starts = _starts(recordings, kept)
+    if options.filters == "matched":
+        forces = [part.force for part in recordings]
+    else:
+        forces, parts = [paper_target(part, options) for part in recordings], ()
+    force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
+    return Observations(names, np.concatenate(columns), force, side, starts, parts, notes)
+
+
+def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
+    """Rows, of those that are kept, at which a recording or a piece between gaps of time begins."""
+    starts, before = [], 0
+    for recording, rows in zip(recordings, kept, strict=True):
+        starts += [before + int(np.count_nonzero(rows[: piece.rows.start])) for piece in pieces(recording)]
+        before += int(np.count_nonzero(rows))
+    return tuple(dict.fromkeys(start for start in starts if start < before))
 
 
 def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
@@ -83,8 +107,9 @@ def _column(recording: Recording, name: str) -> Float1D:
         if name in (known, recording.source.columns.get(known)):
             return recording.inputs[:, index]
     known_inputs = ", ".join(("position", *recording.input_names))
-    hint = f"; read it with inputs=({name!r},)" if name in recording.columns else ""
-    raise InputError(f"the recording has no input {name!r}, only {known_inputs}{hint}")
+    raise InputError(
+        f"the recording has no input {name}, only {known_inputs}; read the recording with inputs=({name!r},)"
+    )
 
 
 def _names(recording: Recording, options: IdentifyOptions) -> tuple[str, ...]:

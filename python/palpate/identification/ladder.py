@@ -34,6 +34,9 @@ LIBRARY_ENTRIES = 2**23
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
 
+GAINS_ENERGY = 2.0
+"""Ratio of the RMS errors with and without h >= 0 above which the loop is run through the wrong way."""
+
 LEAST_FRESH = 20
 """Fresh rows below which they are too few to refuse a rung."""
 
@@ -54,9 +57,11 @@ class Ladder:
         Rows at which a motion starts, from which the play operator gives a hysteresis input (d = 1).
     network : str
         Name of the rung that a network over the inputs is.
-    slope_unit : float
-        Length of the box along a single input [position].
+    lower, reach : float
+        Corner and length of the box along the position.
     max_positions : int
+    within : float
+        Sum of squares of the force inside rows that stand for several samples.
     """
 
     def __init__(
@@ -69,23 +74,36 @@ class Ladder:
         options: IdentifyOptions,
         *,
         network: str,
-        slope_unit: float,
+        lower: float,
+        reach: float,
         max_positions: int,
+        within: float = 0.0,
     ) -> None:
         self.notes: list[str] = []
         self.path: list[PathPoint] = []
-        self._options, self._name, self._slope_unit = options, network, slope_unit
+        self._options, self._name, self._slope_unit = options, network, reach
+        self._fixed_force = None
+        if options.fixed_force is not None:
+            place, fixed = options.fixed_force
+            if not lower <= place <= lower + reach:
+                raise InputError(
+                    f"fixed_force is at {place:g}, outside the positions from {lower:g} to {lower + reach:g}"
+                )
+            self._fixed_force = (place - lower) / reach, fixed
         self._box, self._force, self._side = box, force, side
         self._starts = starts if side is None and box.shape[1] == 1 else None
-        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions)
+        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
         self._fresh = kept_back(len(force), starts)
+        if weight is not None:
+            self._fresh &= weight > 0.0
         if side is None and self._starts is None and "hysteresis" in options.inputs:
             raise InputError(
                 "inputs names hysteresis, but the recording has neither both directions nor time; "
                 "name a direction column or leave hysteresis out"
             )
-        if (samples := self._compressor.rows_used) < len(force):
-            self.notes.append(f"{samples} of {len(force)} rows, evenly spread, stand for all of them")
+        given = len(force) if weight is None else int(np.count_nonzero(weight))
+        if (used := self._compressor.rows_used) < given:
+            self.notes.append(f"{used} of {given} rows, evenly spread, stand for all of them")
 
     def climb(self) -> Rung:
         """The highest rung that earned its place, or the one that the inputs name."""
@@ -176,7 +194,13 @@ class Ladder:
         kept = self._constrained(free)
         if named or kept is free:
             return kept
-        return self._better(self._single_valued(kept) if len(below.solution.basis) else below, kept)
+        best = self._better(self._single_valued(kept) if len(below.solution.basis) else below, kept)
+        if best.name != "hysteresis" and kept.rmse > GAINS_ENERGY * free.rmse:
+            self.notes.append(
+                "press and release differ, but the loop would gain energy; if position or force is turned, "
+                "give --negate position or --negate force"
+            )
+        return best
 
     def _single_valued(self, hysteresis: Rung) -> Rung:
         """A force of position alone on the wavelets of a hysteresis rung, those it does not need removed.
@@ -256,7 +280,9 @@ class Ladder:
         """
         options, problem, slopes = self._options, rung.problem, self._options.slope_limits
         box_slopes = None if slopes is None else (slopes[0] * self._slope_unit, slopes[1] * self._slope_unit)
-        bounds = domain_bounds(problem, hysteresis=options.hysteresis_nonnegative, slopes=box_slopes)
+        bounds = domain_bounds(
+            problem, hysteresis=options.hysteresis_nonnegative, slopes=box_slopes, fixed=self._fixed_force
+        )
         if problem.dimension > 1 or not bounds:
             return rung
         kept = impose(problem, rung.solution, bounds)

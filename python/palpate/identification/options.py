@@ -12,11 +12,13 @@ from .stopping import CRITERIA
 RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
 """What `inputs` may hold beside the names of columns."""
 
-SELECTIONS = ("orthogonal", "residual", "backward")
-"""What `selection` may be."""
-
-LOSSES = ("squares", "huber")
-"""What `loss` may be."""
+WORDS: dict[str, tuple[str, ...]] = {
+    "criterion": tuple(CRITERIA),
+    "selection": ("orthogonal", "residual", "backward"),
+    "loss": ("squares", "huber"),
+    "filters": ("matched", "paper-implicit", "paper-explicit"),
+}
+"""Settings that are words, and what each may be."""
 
 COUPLING_SHARE = 0.9
 """Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
@@ -34,7 +36,7 @@ class IdentifyOptions:
 
     inputs: str | tuple[str, ...] = "auto"
     """"auto": the ladder decides, over the position and the recording's further inputs. Or names, as a tuple
-    or with commas between: position, then hysteresis, velocity (from time) or columns; they are then given."""
+    or with commas between: position, then hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"
@@ -64,10 +66,20 @@ class IdentifyOptions:
     many cells [-]"""
     loss: str = "squares"
     """squares, or huber: rows far from the others pull no more than the others do"""
+    filters: str = "matched"
+    """matched, or as published: paper-implicit (figure 11), paper-explicit (figure 13)"""
+    assumed_mass: float = 1e-3
+    """m of the paper's figures [force/position s^2]"""
+    assumed_damping: float = 0.5
+    """B_o of its figure 13 [force/position s]"""
     hysteresis_nonnegative: bool = True
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
     """(min, max) of df/dx, imposed over the domain [force/position]"""
+    monotone: bool = False
+    """Impose df/dx >= 0 over the domain"""
+    fixed_force: tuple[float, float] | None = None
+    """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
     coupling_stiffness: float | None = None
     """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
@@ -86,12 +98,9 @@ class IdentifyOptions:
                     f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
                     "depends on: hysteresis, velocity, columns"
                 )
-        if self.criterion not in CRITERIA:
-            raise InputError(f"criterion is {self.criterion!r}; it must be one of {', '.join(CRITERIA)}")
-        if self.selection not in SELECTIONS:
-            raise InputError(f"selection is {self.selection!r}; it must be one of {', '.join(SELECTIONS)}")
-        if self.loss not in LOSSES:
-            raise InputError(f"loss is {self.loss!r}; it must be one of {', '.join(LOSSES)}")
+        for name, words in WORDS.items():
+            if getattr(self, name) not in words:
+                raise InputError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(words)}")
         for name, least in _WHOLE_NUMBERS.items():
             value = getattr(self, name)
             if not isinstance(value, int) or isinstance(value, bool) or value < least:
@@ -104,8 +113,10 @@ class IdentifyOptions:
 
     @property
     def slope_limits(self) -> tuple[float, float] | None:
-        """Both slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
+        """All slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
         low, high = self.slope_bounds or (-math.inf, math.inf)
+        if self.monotone:
+            low = max(low, 0.0)
         if self.coupling_stiffness is not None:
             high = min(high, COUPLING_SHARE * self.coupling_stiffness)
         return None if math.isinf(low) and math.isinf(high) else (low, high)
@@ -119,9 +130,12 @@ class IdentifyOptions:
         limits = self.slope_limits
         if limits is not None and not limits[0] < limits[1]:
             raise InputError(
-                f"slope_bounds asks for a slope of {limits[0]:g} or more, but coupling_stiffness "
-                f"{self.coupling_stiffness:g} allows no more than {limits[1]:g}"
+                f"slope_bounds, monotone and coupling_stiffness ask for a slope of {limits[0]:g} or more, "
+                f"but allow no more than {limits[1]:g}"
             )
+        fixed: tuple[float, ...] | None = self.fixed_force
+        if fixed is not None and not (len(fixed) == 2 and all(map(math.isfinite, fixed))):
+            raise InputError(f"fixed_force is {self.fixed_force!r}; it must be (position, force)")
 
 
 _WHOLE_NUMBERS = {
@@ -140,6 +154,8 @@ _NUMBERS = {
     "frame_scale": 1.0,
     "frame_step": 0.0,
     "contact_share": -math.inf,
+    "assumed_mass": 0.0,
+    "assumed_damping": 0.0,
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }

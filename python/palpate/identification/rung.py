@@ -61,7 +61,7 @@ class Rung:
         basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
         bends = _core.wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
         curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
-        return binning_error(self.rows, curvature) > BINNING_SHARE * self.rmse
+        return binning_error(self.rows, curvature) > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
 
     def modelled(self, positions: Float2D) -> Float1D:
         """The rung's force at every row (n,), positions in the unit box."""

@@ -26,6 +26,10 @@ from .fresh import FreshRows
 RIDGE = 1e-11
 """Relative ridge on unit-norm columns: keeps a nearly dependent basis solvable, far below any noise."""
 
+RESOLVED = 2.0**-16
+"""Share of the force's range below which no error counts: one step of a 16-bit converter. What was rendered
+and recorded has no noise at all, and a criterion would ask for wavelets down to the last digit of it."""
+
 CORE = float(np.sqrt(3.0))
 """|u| of a wavelet's side lobe: what lies within is the core that data must resolve."""
 
@@ -141,11 +145,15 @@ class SeparableProblem:
         return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
 
     def total(self, rss: float) -> float:
-        """Error over all samples [force^2]; never quite zero, so that noise-free data has a logarithm."""
-        return max(rss + self.within, (1e-12 * self.force_range) ** 2 * self.samples, TINY)
+        """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
+        return max(rss + self.within, (RESOLVED * self.force_range) ** 2 * self.samples, TINY)
 
     def rmse(self, solution: Solution) -> float:
         """Root mean square error over all samples [force]."""
+        return float(np.sqrt((solution.rss + self.within) / self.samples))
+
+    def resolved_rmse(self, solution: Solution) -> float:
+        """The same, but never less than a sensor resolves: what other errors are measured by."""
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
     def fresh_errors(self, solution: Solution, fresh: FreshRows) -> Float1D:

@@ -53,8 +53,8 @@ class Plan:
 
     @property
     def solver(self) -> str | None:
-        """How the load line is solved; None where there is nothing to solve."""
-        return None if self.structure in ("direct", "explicit") else "newton"
+        """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
+        return _core.solver_name(self.model, self.scheme, DeviceProfile().period_s)
 
     @classmethod
     def of(cls, model: Model) -> Plan:

@@ -4,8 +4,8 @@
 The nearest force with slopes between two limits is an isotonic regression; it differs from the model on whole
 stretches around what is too steep, and has kinks at their ends. Smoothing by a narrow positive kernel rounds
 the kinks and keeps the limits. The change alone is then given to further wavelets, chosen one by one
-(orthogonal least squares, values and slopes), so that elsewhere the model stays what it was. What comes out
-is certified; where a slope still stands out, the limits are drawn in by as much and it is done again.
+(orthogonal least squares, values and slopes), and the limits are imposed in a last least squares over all
+wavelets, so that elsewhere the model stays what it was and the limits are certified.
 """
 
 from __future__ import annotations
@@ -19,14 +19,23 @@ from scipy.ndimage import gaussian_filter1d
 
 from .. import _core
 from .._typing import Float1D, Float2D
-from ..identification.constraints import slope_limited
+from ..identification.constraints import domain_bounds, impose, slope_limited
+from ..identification.identified import Readings
+from ..identification.separable import Basis, Block, SeparableProblem
 from ..model import Model
 
 _SAMPLES = 1001
 """Positions over the domain [-]"""
 
-_SMOOTHINGS = (0.005, 0.02)
-"""Standard deviations of the kernel that are tried [share of the travel]"""
+_ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
+"""Standard deviation of the kernel [share of the travel], and whether the force has to begin where contact
+does: a free end whose force begins at once needs a steep way there."""
+
+_RESERVE = 0.985
+"""Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""
+
+_CERTIFIED = 0.997
+"""Share of a limit that is imposed: the rest is for bounds that are wider than what they bound [-]"""
 
 _CLOSE = 5e-5
 """RMS error at which no further wavelets are taken [share of the force's range]"""
@@ -37,8 +46,8 @@ _CLOSE_SLOPE = 0.01
 _MOST = 64
 """Further wavelets at most [-]"""
 
-_ROUNDS = 4
-"""How often the limits are drawn in before a wider kernel is tried [-]"""
+_NEW = 1e-5
+"""Share of a candidate's squared norm that must stand outside what was chosen for it to be taken [-]"""
 
 _SCALE_RATIO = 1.6
 _SCALE_STEP = 0.75
@@ -73,18 +82,12 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
     low, high : float
         Slopes of either stroke [force/position]; may be infinite.
     """
-    for smoothing in _SMOOTHINGS:
-        sigma = smoothing * float(model.upper[0] - model.lower[0])
-        inner = [low, high]
-        for _ in range(_ROUNDS):
-            if not inner[0] < inner[1]:
-                break
-            limited = _limited_once(model, inner[0], inner[1], sigma)
-            found = sliding_slopes(limited)
-            if found[0] >= low and found[1] <= high:
-                return limited
-            inner[0] += max(0.0, 1.1 * (low - found[0]))
-            inner[1] -= max(0.0, 1.1 * (found[1] - high))
+    travel = float(model.upper[0] - model.lower[0])
+    for smoothing, from_contact in _ATTEMPTS:
+        limited = _limited_once(model, low, high, smoothing * travel, from_contact)
+        found = sliding_slopes(limited)
+        if found[0] >= low and found[1] <= high:
+            return limited
     return None
 
 
@@ -123,42 +126,66 @@ def _strokes(model: Model, x: Float1D) -> Float2D:
     return np.array([model.force(x, direction=side) for side in sides])
 
 
-def _limited_once(model: Model, low: float, high: float, sigma: float) -> Model:
+def _limited_once(model: Model, low: float, high: float, sigma: float, from_contact: bool) -> Model:
     x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
-    changes = [_change(x, stroke, low, high, sigma, model) for stroke in strokes]
+    changes = [
+        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, from_contact) for stroke in strokes
+    ]
     if len(changes) == 2:  # of g and h
         changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
     alpha, beta = _candidates(x, np.any(np.array(changes) != 0.0, axis=0), sigma)
     close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
     before = model.alpha[:, 0], model.beta[:, 0]
-    chosen, coefficients = _fit(x, np.array(changes), before, (alpha, beta), sigma, close)
-    network = model.to_dict()["network"]
-    new: dict[str, Any] = {
-        "alpha": network["alpha"] + [[a] for a in alpha[chosen].tolist()],
-        "beta": network["beta"] + [[b] for b in beta[chosen].tolist()],
-    }
-    for row, suffix in zip(coefficients, ("", "_hysteresis"), strict=False):
-        row[: 2 + model.n_wavelets] += [
-            network[f"bias{suffix}"],
-            network[f"linear{suffix}"][0],
-            *network[f"weight{suffix}"],
-        ]
-        new[f"bias{suffix}"] = float(row[0])
-        new[f"linear{suffix}"] = [float(row[1])]
-        new[f"weight{suffix}"] = row[2:].tolist()
-    limited = changed_network(model, **new)
-    if model.hysteretic and _least_loss(model) >= 0.0 > (least := _least_loss(limited)):
-        # The fit may pull h below zero by its own small error.
-        limited = changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.1 * least)
-    return limited
+    chosen = _chosen(x, np.array(changes), before, (alpha, beta), sigma, close)
+    wanted = strokes + _strokes_of(np.array(changes))
+    return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
+
+
+def _strokes_of(readings: Float2D) -> Float2D:
+    """Pressing and releasing from g and h."""
+    return (
+        readings if len(readings) == 1 else np.array([readings[0] + readings[1], readings[0] - readings[1]])
+    )
+
+
+def _fitted(
+    model: Model, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
+) -> Model:
+    """Least squares on the wavelets that there were and further ones, the slope limits and h >= 0 imposed."""
+    lower, travel = model.lower, model.upper - model.lower
+    box = ((x - lower) / travel)[:, None]
+    ones = np.ones_like(x)
+    hysteretic = len(wanted) == 2
+    problem = SeparableProblem(
+        [Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted],
+        np.array([[0.5, 0.5], [0.5, -0.5]]) if hysteretic else np.array([[1.0]]),
+        samples=wanted.size,
+        within=0.0,
+        force_range=float(np.ptp(wanted)) or 1.0,
+        resolved_by=1,
+    )
+    basis = Basis(model.alpha * travel, (model.beta - lower) / travel).joined(
+        Basis(alpha[:, None] * travel, (beta[:, None] - lower) / travel)
+    )
+    slopes = (low * float(travel[0]), high * float(travel[0]))
+    bounds = domain_bounds(problem, hysteresis=hysteretic and _least_loss(model) >= 0.0, slopes=slopes)
+    found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
+    new: dict[str, Any] = {"alpha": found.alpha.tolist(), "beta": found.beta.tolist()}
+    for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
+        new[f"bias{suffix}"] = float(found.bias[k])
+        new[f"linear{suffix}"] = found.linear[k].tolist()
+        new[f"weight{suffix}"] = found.weights[k].tolist()
+    return changed_network(model, **new)
 
 
 def _least_loss(model: Model) -> float:
     return float(_core.force_bounds(model, float(model.upper[0] - model.lower[0])).loss_min)
 
 
-def _change(x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model) -> Float1D:
+def _change(
+    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, from_contact: bool
+) -> Float1D:
     """What has to be added to a force for its slopes to lie within limits, kinks rounded; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
     margin = int(np.ceil(6.0 * sigma / step))
@@ -172,7 +199,10 @@ def _change(x: Float1D, force: Float1D, low: float, high: float, sigma: float, m
         before, after = (n if side == "free" else 0 for side in (model.below, model.above))
         wide = np.pad(force, (before, after))
     grid = x[0] + step * (np.arange(len(wide)) - before)
-    nearest = _extended(slope_limited(grid, wide, low, high), margin)
+    nearest = slope_limited(grid, wide, low, high)
+    if from_contact and model.below == "free":
+        nearest = np.minimum(nearest, high * np.maximum(grid - x[0], 0.0))
+    nearest = _extended(nearest, margin)
     inside = slice(margin + before, margin + before + n)
     smooth = gaussian_filter1d(nearest, sigma / step, mode="nearest")[inside]
     touched = np.abs(nearest[inside] - force) > 1e-9 * np.ptp(force)
@@ -203,16 +233,15 @@ def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, F
     return np.concatenate(alpha), np.concatenate(beta)
 
 
-def _fit(
+def _chosen(
     x: Float1D,
     changes: Float2D,
     before: tuple[Float1D, Float1D],
     candidates: tuple[Float1D, Float1D],
     sigma: float,
     close: float,
-) -> tuple[Sequence[int], Float2D]:
-    """Candidates chosen one by one, and coefficients (outputs, 2 + N + chosen) of bias, slope, what was there
-    before, and the chosen.
+) -> Sequence[int]:
+    """Candidates chosen one by one for changes (outputs, n), beside a line and the wavelets that there were.
 
     Slopes are fitted beside the values, sigma times a slope weighing as much as a value.
     """
@@ -242,7 +271,7 @@ def _fit(
     factor = np.empty((_MOST, len(size)))
     chosen: list[int] = []
     while len(chosen) < _MOST and rest > residual.size * close**2:
-        new = size > 1e-6 * norms
+        new = size > _NEW * norms
         gains = np.where(new, np.square(products).sum(axis=1) / np.where(new, size, 1.0), 0.0)
         best = int(np.argmax(gains))
         if gains[best] <= 0.0:
@@ -253,6 +282,4 @@ def _fit(
         size = size - np.square(factor[k])
         rest -= float(gains[best])
         chosen.append(best)
-    design = np.concatenate([always, columns[:, chosen]], axis=1)
-    coefficients = np.linalg.lstsq(design, targets, rcond=None)[0]
-    return chosen, np.asarray(coefficients.T)
+    return chosen

@@ -27,7 +27,7 @@ UNEVEN = 0.01
 """Share of the period by which the steps of a piece may differ from it before it is resampled."""
 
 MARGIN = 3.0
-"""Time constants of L that are left out at both ends of a piece."""
+"""Time constants of L, 2/w_c for its two poles, that are left out at both ends of a piece."""
 
 FINEST = 0.25
 """Highest cutoff tried [1/period]: above it L would be no filter."""
@@ -35,8 +35,11 @@ FINEST = 0.25
 NOISE_SHARE = 0.01
 """Noise of the position that L may let into the variance of a derivative."""
 
-CUTOFFS = 40
-"""Cutoffs tried, each 0.85 of the one before."""
+STEP = 0.85
+"""Ratio of the cutoffs that are tried one after the other."""
+
+LEAST_CONSTANTS = 200.0
+"""1/w_c that the recording must last: what is slower is no motion."""
 
 
 @dataclass(frozen=True)
@@ -84,16 +87,18 @@ class LowPass:
 
     def margin(self, period: float) -> int:
         """Samples at each end that the ends of a signal disturb."""
-        return math.ceil(MARGIN / (self.cutoff * period))
+        return math.ceil(2.0 * MARGIN / (self.cutoff * period))
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
-        """The signal (k,) without what lies above the cutoff, and without delay; its ends are held."""
+        """The signal (k,) without what lies above the cutoff, and without delay; its ends are mirrored."""
         pole = math.exp(-self.cutoff * period)
         response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
+        mirrored = min(len(signal) - 1, self.margin(period))
+        wide = np.concatenate([signal[mirrored:0:-1], signal, signal[-2 : -mirrored - 2 : -1]])
         for _ in range(2):
-            start = signal[0]
-            signal = (start + response.filter(np.ascontiguousarray(signal - start)))[::-1]
-        return signal
+            start = wide[0]
+            wide = (start + response.filter(np.ascontiguousarray(wide - start)))[::-1]
+        return wide[mirrored : mirrored + len(signal)]
 
 
 def pieces(recording: Recording) -> list[Piece]:
@@ -146,8 +151,9 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
         return None
     noise = float(np.mean(np.concatenate(sixth) ** 2)) / math.comb(12, 6)
     derive = (velocity_of, acceleration_of)[order - 1]
-    for power in range(CUTOFFS):
-        low_pass = LowPass(FINEST * 0.85**power / parts[0].period)
+    duration = sum(part.period * len(part.time) for part in parts)
+    low_pass = LowPass(FINEST / parts[0].period)
+    while low_pass.cutoff * duration > LEAST_CONSTANTS:
         moving = [
             low_pass(derive(part.position, part.period), part.period)[low_pass.margin(part.period) :][
                 : -low_pass.margin(part.period)
@@ -162,6 +168,7 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
         passed = float(np.sum(low_pass(derive(impulse, period), period) ** 2))
         if noise * passed <= NOISE_SHARE * float(np.mean(np.concatenate(moving) ** 2)):
             return low_pass
+        low_pass = LowPass(STEP * low_pass.cutoff)
     return None
 
 

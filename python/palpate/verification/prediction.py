@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..identification.inputs import input_columns
 from ..model import Model
 from ..recording import Recording
+from ..recording.motion import acceleration, velocity
 
 _UNSTATED = ""
 
@@ -44,10 +45,32 @@ def predict(model: Model, recording: Recording) -> Prediction:
     """
     require_same_units(model, recording.units)
     if model.mass is not None or model.damping is not None:
+        return _moving(model, recording)
+    return _static(model, recording)
+
+
+def _moving(model: Model, recording: Recording) -> Prediction:
+    """With what mass and damping add: m a + B v, from the recording's own time."""
+    if recording.time is None:
         raise InputError(
             "the model has a mass or a damping, which act on acceleration and velocity: "
-            "it can be compared in closed loop, not row by row"
+            "the recording needs time (--time NAME)"
         )
+    static = _static(model, recording)
+    total, known = np.zeros(len(recording)), np.ones(len(recording), dtype=bool)
+    for value, derivative in ((model.damping, velocity), (model.mass, acceleration)):
+        if value is not None:
+            derived, here = derivative(recording)
+            total, known = total + value * derived, known & here
+    rows = static.rows & known
+    force = (static.force + total[static.rows])[known[static.rows]]
+    left_out = int(np.count_nonzero(static.rows & ~known))
+    notes = (f"{left_out} rows at the ends and at gaps of time have no velocity and are left out",)
+    outside = model.extrapolated(recording.position[rows])
+    return Prediction(rows, force, int(np.count_nonzero(outside)), static.notes + notes)
+
+
+def _static(model: Model, recording: Recording) -> Prediction:
     rows = np.ones(len(recording), dtype=bool)
     notes: tuple[str, ...] = ()
     if model.dimension > 1:

@@ -31,6 +31,7 @@ struct UsbOptions {
 struct UsbHealth {
     StreamHealth stream;
     std::uint64_t skipped_commands = 0;  ///< not sent, since the last one was still on its way
+    std::uint64_t lost_commands = 0;     ///< that did not arrive
     std::uint64_t timeouts = 0;          ///< exchanges in which no packet came
     std::uint64_t discarded = 0;         ///< packets that nobody had taken for too long
     std::uint64_t stalls = 0;            ///< endpoints that halted and were cleared
@@ -46,7 +47,7 @@ struct UsbHealth {
 ///
 /// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
 /// to the device than `UsbOptions::longest_delay_s`; Fault when the
-/// device reports one, was disabled or is gone, and then for good; Lost when it did not understand a command; Limited
+/// device reports one, was disabled or is gone, and then for good; Lost when a command did not arrive or was not understood; Limited
 /// when it clipped one. Lost and repeated samples speak through Reading::sequence.
 class UsbDevice {
   public:
@@ -82,8 +83,8 @@ class UsbDevice {
         detail::UsbTransfers& transfers = *open_->transfers;
         discard_old();
         // A host that is behind takes what waits, and sends what follows from it at once afterwards; but not twice.
-        open_->skipped_last = transfers.arrived() > 0 && !open_->skipped_last;
-        if (open_->skipped_last) {
+        open_->catches_up = transfers.arrived() > 0 && !open_->catches_up;
+        if (open_->catches_up) {
             ++open_->skipped_commands;
         } else {
             send(command.force);
@@ -92,7 +93,7 @@ class UsbDevice {
         while (transfers.wait_for_arrival(deadline)) {
             detail::UsbArrival arrival;
             if (transfers.take(arrival) && open_->stream.take(arrival.packet(), arrival.time)) {
-                return open_->stream.reading();
+                return judged(open_->stream.reading());
             }
         }
         if (transfers.is_gone()) {
@@ -130,9 +131,13 @@ class UsbDevice {
         if (open_ == nullptr) {
             return last_health_;
         }
-        UsbHealth health{
-            open_->stream.health(), open_->skipped_commands, open_->timeouts, open_->discarded, 0, 0};
+        UsbHealth health;
+        health.stream = open_->stream.health();
+        health.skipped_commands = open_->skipped_commands;
+        health.timeouts = open_->timeouts;
+        health.discarded = open_->discarded;
         if (open_->transfers != nullptr) {
+            health.lost_commands = open_->transfers->lost_writes();
             health.stalls = open_->transfers->stalls();
             health.bus_errors = open_->transfers->bus_errors();
         }
@@ -162,9 +167,11 @@ class UsbDevice {
         detail::UsbConnection connection;
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
-        Nanoseconds moment = 0;  ///< a quarter of a frame
-        bool skipped_last = false;
+        Nanoseconds frame = 0;
+        bool catches_up = false;
+        bool sent_last = true;
         std::uint64_t skipped_commands = 0;
+        std::uint64_t lost_commands = 0;
         std::uint64_t timeouts = 0;
         std::uint64_t discarded = 0;
     };
@@ -173,7 +180,7 @@ class UsbDevice {
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
         open_->stream = PacketStream{connection.info(), longest_delay()};
-        open_->moment = nanoseconds_a_second / (4 * connection.info().rate_hz);
+        open_->frame = nanoseconds_a_second / connection.info().rate_hz;
         if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
             return "cannot be disabled: " + detail::usb_reason(code);
         }
@@ -238,14 +245,15 @@ class UsbDevice {
         open_->stream.pause();
     }
 
-    /// The last command's end and the packet that wakes a host come in the same frame, in any order: a moment of
-    /// waiting keeps every frame a command. Whatever takes longer than that is skipped.
+    /// The end of the last command and the packet that wakes a host come in the same frame, in any order: up to a
+    /// frame of waiting keeps every frame a command. A device that takes longer is not taking commands.
     void send(double force) noexcept {
-        (void)open_->transfers->wait_for_write(monotonic_now() + open_->moment);
+        (void)open_->transfers->wait_for_write(monotonic_now() + open_->frame);
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
         const int code = open_->transfers->write(packet);
-        if (code == 0) {
+        open_->sent_last = code == 0;
+        if (open_->sent_last) {
             open_->stream.sent(packet, now);
         }
         open_->skipped_commands += code == LIBUSB_ERROR_BUSY ? 1 : 0;
@@ -256,6 +264,16 @@ class UsbDevice {
         send(0.0);
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
         (void)open_->transfers->request(wire::Request::Enable, 0);  // where it fails the watchdog is left
+    }
+
+    /// Where a command did not go out, or was lost on its way, an older force acts.
+    [[nodiscard]] Reading judged(Reading reading) noexcept {
+        const std::uint64_t lost = open_->transfers->lost_writes();
+        const bool arrived = std::exchange(open_->lost_commands, lost) == lost && open_->sent_last;
+        if (!arrived && sends_force(reading.status)) {
+            reading.status = Status::Lost;
+        }
+        return reading;
     }
 
     /// The last reading again, of no use but for its position.

@@ -157,6 +157,10 @@ class UsbTransfers {
     [[nodiscard]] std::uint64_t bus_errors() const noexcept {
         return bus_errors_.load(std::memory_order_relaxed);
     }
+    /// Commands that were on their way and did not arrive.
+    [[nodiscard]] std::uint64_t lost_writes() const noexcept {
+        return lost_writes_.load(std::memory_order_relaxed);
+    }
     [[nodiscard]] int in_flight() const noexcept {
         return reads_in_flight_.load(std::memory_order_acquire) +
                writes_in_flight_.load(std::memory_order_acquire) +
@@ -291,6 +295,9 @@ class UsbTransfers {
     }
 
     void write_ended(const libusb_transfer& transfer) noexcept {
+        if (transfer.status != LIBUSB_TRANSFER_COMPLETED) {
+            lost_writes_.fetch_add(1, std::memory_order_relaxed);
+        }
         switch (transfer.status) {
             case LIBUSB_TRANSFER_STALL:
                 stalls_.fetch_add(1, std::memory_order_relaxed);
@@ -392,6 +399,7 @@ class UsbTransfers {
     std::atomic<int> error_{0};
     std::atomic<std::uint64_t> stalls_{0};
     std::atomic<std::uint64_t> bus_errors_{0};
+    std::atomic<std::uint64_t> lost_writes_{0};
     bool reads_halted_ = false;   ///< of the event thread
     bool writes_halted_ = false;  ///< of the event thread
     int errors_in_a_row_ = 0;     ///< of the event thread

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate-control on a USB device that is emulated below libusb: what it refuses, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import ROOT
+from palpate import read_recording
+from usb_emulation import RUNNER, emulated, frames, needs_emulation
+
+PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
+SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
+SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
+
+# The transfers are the clock: how fast this machine is does not matter, and the rate is nobody's business.
+LOCK_STEP = ["--lock-step"]
+PATIENT = ["--wait-ms", "500", "--lowest-rate-share", "0", "--priority", "0"]
+
+pytestmark = [
+    needs_emulation,
+    pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control"),
+]
+
+
+def control(*words: Any, device: list[str], model: Path = SPRING) -> subprocess.CompletedProcess[str]:
+    named = [] if "--device" in words else ["--device", "usb"]
+    return emulated(PROGRAM, model, *named, *words, device=device)
+
+
+def rows(record: Path) -> int:
+    return sum(not line.startswith("#") for line in record.read_text(encoding="utf-8").splitlines()) - 1
+
+
+def wait_for_rows(part: Path) -> None:
+    while not part.exists() or rows(part) < 10:
+        time.sleep(0.01)
+
+
+def uncertified(*words: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
+    return control("--uncertified", *PATIENT, *words, device=[*LOCK_STEP, *device])
+
+
+def test_a_model_without_certificate_is_refused_unless_the_risk_is_typed_in_full() -> None:
+    for words in ([], ["--uncert"], ["--unc"]):
+        answer = control(*words, device=LOCK_STEP)
+        assert answer.returncode == 2
+        assert "certificate" in answer.stderr or "--unc" in answer.stderr
+    assert "type --uncertified to render without" in control(device=LOCK_STEP).stderr
+
+
+@pytest.mark.parametrize(
+    ("certified", "reason"),
+    [
+        ("certificate_massless.json", "is certified for the device "),
+        ("certificate_stable.json", "is not certified: "),
+    ],
+)
+def test_a_certificate_of_something_else_is_refused(certified: str, reason: str) -> None:
+    answer = control(device=LOCK_STEP, model=SPRING.parent / certified)
+    assert answer.returncode == 2
+    assert reason in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "device", "reason"),
+    [
+        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
+        ([], ["--serial", "A", "--serial", "B"], "2 USB devices could be meant (A, B)"),
+        (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; there is EMU-1"),
+        (["--device", "usb:"], [], "--device is 'usb:', must be simulated or usb[:SERIAL]"),
+        ([], ["--somebody-elses"], "is 1209:0001 but not of this protocol"),
+        ([], ["--denied"], "sudo palpate devices --install-udev-rule"),
+        (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: choose --rate-hz 1000"),
+        (["--force-limit", "6"], [], "--force-limit is 6, the device makes 5"),
+        (["--fault", "late@1"], [], "--fault is for the simulated device"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_moves(
+    words: list[str], device: list[str], reason: str, tmp_path: Path
+) -> None:
+    trace = tmp_path / "trace.csv"
+    answer = uncertified(*words, device=[*device, "--trace", str(trace)])
+    assert answer.returncode == 2, answer.stderr
+    assert reason in answer.stderr
+    assert all(frame.torque == 0.0 for frame in frames(trace))
+
+
+def test_a_model_in_metres_is_refused_by_a_device_that_turns(tmp_path: Path) -> None:
+    model = json.loads(SPRING.read_text(encoding="utf-8"))
+    model["units"] = {"position": "m", "force": "N"}
+    linear = tmp_path / "linear.json"
+    linear.write_text(json.dumps(model), encoding="utf-8")
+    answer = control("--uncertified", *PATIENT, device=LOCK_STEP, model=linear)
+    assert answer.returncode == 2
+    assert "is in m and N; emulated knob EMU-1" in answer.stderr
+
+
+def test_a_run_is_recorded_and_ends_with_zero_torque_and_a_disabled_device(tmp_path: Path) -> None:
+    record, trace = tmp_path / "felt.csv", tmp_path / "trace.csv"
+    answer = uncertified("--duration-s", 1, "--record", record, "--json", device=["--trace", str(trace)])
+    assert answer.returncode == 0, answer.stderr
+    summary = json.loads(answer.stdout)
+    assert summary["ticks"] == summary["recorded"] == 1000
+    assert summary["usb"]["round_trip"]["p50_us"] > 0.0
+    assert summary["usb"]["delay_samples"]["p50"] == pytest.approx(1.0, abs=0.01)
+    recording = read_recording(record)
+    assert recording.force.max() > 0.02
+    # The object pushes back: torque against the position, as the device itself felt it.
+    felt = frames(trace)
+    strongest = min(felt, key=lambda frame: frame.torque)
+    assert strongest.torque == pytest.approx(-2.0 * strongest.position, rel=0.2)
+    assert felt[-1].torque == 0.0
+    assert not felt[-1].enabled
+    # What was sent is what was applied two rows later: one sample of delay, and the latch.
+    force, applied = recording.force, recording.columns["applied_Nm"]
+    assert abs(force[300:-2] - applied[302:]).max() < 2e-6
+
+
+@pytest.mark.parametrize("ask", [signal.SIGINT, signal.SIGTERM])
+def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp_path: Path) -> None:
+    trace, part = tmp_path / "trace.csv", tmp_path / "felt.csv"
+    command = [
+        RUNNER,
+        *LOCK_STEP,
+        "--trace",
+        trace,
+        "--",
+        PROGRAM,
+        SPRING,
+        "--device",
+        "usb",
+        "--uncertified",
+    ]
+    words = [*command, *PATIENT, "--duration-s", "inf", "--record", part]
+    process = subprocess.Popen(
+        [sys.executable, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr is not None
+    assert "emulated knob" in process.stderr.readline()
+    wait_for_rows(Path(f"{part}.part"))
+    process.send_signal(ask)  # the emulator passes it on
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "stopped because it was asked to" in out
+    assert frames(trace)[-1].torque == 0.0
+    assert not frames(trace)[-1].enabled
+
+
+# Kind -> how many frames it lasts, whether nothing can follow it, and within how many frames the torque is zero:
+# the packet that shows it, the next one that carries zero, the frame in which it acts, and up to four packets that
+# the host may be behind (in lock-step it does not catch up by itself, as it does by the clock); or the watchdog.
+WATCHDOG = 14
+PACKET = 10
+UNSOUND = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
+FAULTS: dict[str, tuple[int, bool, int]] = {
+    "stall-in": (1, False, WATCHDOG),
+    "stall-out": (1, False, PACKET),
+    "short": (1, False, PACKET),
+    "magic": (1, False, PACKET),
+    "version": (1, False, PACKET),
+    "long": (1, False, PACKET),
+    "skip": (3, False, PACKET),
+    "repeat": (1, False, PACKET),
+    "freeze": (15, False, WATCHDOG),
+    "mute": (15, False, WATCHDOG + 15),
+    "deaf": (12, False, WATCHDOG),
+    "encoder": (1, True, PACKET),
+    "over-temperature": (1, True, PACKET),
+    "emergency-stop": (1, True, PACKET),
+    "reset": (1, True, PACKET),
+    "jump": (1, True, PACKET),
+    "unplug": (2, True, PACKET),
+}
+
+
+def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_path: Path) -> None:
+    seed = int(os.environ.get("PALPATE_TEST_SEED", "7"))
+    generator = random.Random(seed)
+    passing = [kind for kind, (_, final, _) in FAULTS.items() if not final]
+    final = [kind for kind in FAULTS if kind not in passing]
+    done = 0
+    run = 0
+    while done < 100 * SCALE:
+        run += 1
+        kinds = generator.choices(passing, k=9)
+        if run % 2:
+            kinds.append(generator.choice(final))
+        at, script = 260, []
+        for kind in kinds:
+            script.append((kind, at))
+            at += generator.randrange(40, 70)
+        where = f"seed {seed}, run {run}: {script}"
+        faults = [word for kind, frame in script for word in ("--fault", f"{kind}@{frame}x{FAULTS[kind][0]}")]
+        record, trace = tmp_path / f"felt{run}.csv", tmp_path / "trace.csv"
+        answer = uncertified(
+            "--duration-s", 0.9, "--record", record, "--json", device=[*faults, "--trace", str(trace)]
+        )
+        ends = kinds[-1] in final
+        assert answer.returncode == int(ends), f"{where}\n{answer.stderr}"
+        summary = json.loads(answer.stdout)
+        assert rows(record) == summary["ticks"], where
+        assert summary["lost_records"] == 0, where
+        for row in record.read_text(encoding="utf-8").splitlines():
+            cells = row.split(",")
+            if cells[-1] in UNSOUND:
+                assert float(cells[2]) == 0.0, where  # in the tick that saw it
+        felt = frames(trace)
+        by_start = {frame.started: index for index, frame in enumerate(felt)}
+        for kind, frame in script:
+            index = by_start[frame]
+            after = felt[index : index + FAULTS[kind][2] + 1]
+            assert any(one.torque == 0.0 for one in after) or after[-1].unplugged, (
+                f"{where}: {kind} at {frame}"
+            )
+            done += 1
+        assert felt[-1].torque == 0.0 or felt[-1].unplugged, where
+        assert not felt[-1].enabled or felt[-1].unplugged, where
+        record.unlink()

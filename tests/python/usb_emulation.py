@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that run as if the emulated USB device were plugged in."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import ROOT
+
+RUNNER = ROOT / "tests" / "usb" / "run_emulated.py"
+
+MISSING = next(
+    (
+        f"needs {package}"
+        for tool, package in {"umockdev-run": "umockdev"}.items()
+        if shutil.which(tool) is None
+    ),
+    "needs libumockdev-dev" if not Path("/usr/include/umockdev-1.0/umockdev.h").exists() else "",
+)
+needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation at hand")
+
+
+def emulated(
+    *command: Any, device: Sequence[str] = (), timeout: float = 120.0
+) -> subprocess.CompletedProcess[str]:
+    """Run a command under the emulator; `device` are options of tests/usb/run_emulated.py."""
+    words = [sys.executable, RUNNER, *device, "--", *command]
+    return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=timeout)
+
+
+@dataclass
+class Frame:
+    """What really happened in one millisecond of the device."""
+
+    started: int
+    """Frames since the first command."""
+    position: float
+    torque: float
+    status: int
+    unplugged: bool
+
+    @property
+    def enabled(self) -> bool:
+        return bool(self.status & 1)
+
+
+def frames(trace: Path) -> list[Frame]:
+    with trace.open(encoding="utf-8") as file:
+        return [
+            Frame(
+                int(row["started"]),
+                float(row["position_rad"]),
+                float(row["torque_Nm"]),
+                int(row["status"]),
+                row["unplugged"] == "1",
+            )
+            for row in csv.DictReader(file)
+        ]
