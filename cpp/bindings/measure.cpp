@@ -220,6 +220,11 @@ py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
     wanted.session.loop.rate_hz = info.rate_hz;
     validate(wanted.session.loop);
     wanted.transducer = (info.capabilities & wire::has_transducer) != 0;
+    detail::require(
+        wanted.transducer || wanted.probe.wanted || wanted.record.empty(),
+        bench.device.id +
+            " has no force transducer, and its motor shows nothing of a force while somebody else "
+            "moves the handle: probe instead");
     detail::require(!wanted.probe.wanted || wanted.probe.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     const ProbeSettings standard;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "certified.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "palpate/readable.hpp"
 
@@ -52,6 +54,25 @@ std::string not_certified(const ModelFile& file, const Options& options, const D
         return "is certified as it was planned: leave --structure and its numbers out";
     }
     return "";
+}
+
+Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units, const Bench& bench) {
+    if (!options.uncertified) {
+        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
+            refuse(options.model + " " + reason +
+                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+        }
+    }
+    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
+    const GuardSettings guards = guards_of(options, bench);
+    Job job{std::move(file), std::move(units), scheme, guards, {}};
+    job.settings.loop = options.loop;
+    job.settings.real_time = options.real_time;
+    if (!options.uncertified) {
+        job.settings.loop.lowest_rate_share = std::max(options.loop.lowest_rate_share, certified_rate_share);
+    }
+    validate(job.settings.loop);
+    return job;
 }
 
 }  // namespace palpate::control

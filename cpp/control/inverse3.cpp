@@ -56,21 +56,7 @@ int run_on_inverse3(const Options& options, ModelFile file, RecordUnits units) {
     }
     Bench bench = bench_for(file.model, false, 1.0 / options.loop.rate_hz);
     bench.device = profile_of(device.info(), options, file, bench.device);
-    if (!options.uncertified) {
-        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
-            refuse(options.model + " " + reason +
-                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
-        }
-    }
-    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
-    const GuardSettings guards = guards_of(options, bench);
-    Job job{std::move(file), std::move(units), scheme, guards, {}};
-    job.settings.loop = options.loop;
-    job.settings.real_time = options.real_time;
-    if (!options.uncertified) {
-        job.settings.loop.lowest_rate_share = std::max(options.loop.lowest_rate_share, certified_rate_share);
-    }
-    validate(job.settings.loop);
+    const Job job = job_on_real_device(options, std::move(file), std::move(units), bench);
     const Inverse3Info info = device.info();
     const Metadata about{
         {"device", bench.device.id + " through the Haply Inverse Service, " + options.device},
@@ -80,7 +66,7 @@ int run_on_inverse3(const Options& options, ModelFile file, RecordUnits units) {
                                (options.uncertified ? ", uncertified," : "");
     return render_on(device, called, options, job, about, [&] {
         return Story{{{"service", filters_of(info)}},
-                     {{"force_gate", info.force_gate}, {"damping", info.damping}}};
+                     {{"inverse3", {{"force_gate", info.force_gate}, {"damping", info.damping}}}}};
     });
 }
 

@@ -38,6 +38,8 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
         Refused before anything moved: with the device, the reason and its cure.
     """
     if object is not None:
+        if device != "simulated":
+            raise InputError(f"an object is mounted on the simulated device only; {device} has its own")
         settings["position_unit"] = object.units["position"]
         settings["force_unit"] = object.units["force"]
         if object.units["force"] == "A":
