@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conftest import ROOT
 from palpate import DeviceProfile, InputError, load_model
 from palpate.devices import Check, check, check_device, judge, push_response
-from conftest import ROOT
 from usb_emulation import emulated, frames, needs_emulation
 
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
@@ -24,7 +24,7 @@ SHARE_OF_FORCE = 0.005
 
 
 def heard(**changed: Any) -> dict[str, Any]:
-    """What `measure` says of a faultless device that a hand moves against a spring, as far as `judge` reads it."""
+    """What `measure` says of a faultless device in a hand against a spring, for `judge`."""
     time = 1e-3 * np.arange(2000)
     moves = np.where(time > 0.5, 0.2 * (1.0 - np.cos(2 * np.pi * (time - 0.5))), 0.0)
     position = STEP * np.round(moves / STEP)
@@ -129,7 +129,7 @@ def test_a_flipped_sign_is_caught_before_any_force(what: str, monkeypatch: pytes
 def pushed(
     obeys: float = 1.0, says: float = 1.0, moves: Callable[[np.ndarray], np.ndarray] | None = None
 ) -> dict[str, np.ndarray]:
-    """Ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad; force and sign are the motor's."""
+    """Ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
     sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
     sent[np.arange(2000) % 200 >= 170] = 0.025
     sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
@@ -225,7 +225,7 @@ def test_a_model_without_a_certificate_cannot_be_held_against_a_device() -> None
 
 def checked(*words: Any, device: list[str], seconds: float = 3.0) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "palpate", "check-device", "--device", "usb", "--duration-s", seconds]
-    return emulated(*command, "--json", *words, device=["--lock-step", *device])
+    return emulated(*command, "--wait-ms", 2000, "--json", *words, device=["--lock-step", *device])
 
 
 def told_of(answer: subprocess.CompletedProcess[str]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -274,7 +274,7 @@ def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
 def test_a_device_that_is_only_listened_to_is_never_enabled(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
     answer = checked(device=["--spring", "3", "--flipped", "--trace", str(trace)])
-    result, findings = told_of(answer)
+    _, findings = told_of(answer)
     assert findings["sign of the transducer"]["right"]
     assert findings["sign of the velocity"]["right"]
     assert findings["sign of the force"]["right"] is None

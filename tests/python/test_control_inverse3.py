@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control on a Haply Inverse3: a real WebSocket, and a small server that speaks the documented messages."""
+"""palpate-control on a Haply Inverse3: a real WebSocket, and a server of the documented messages."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import pytest
 
 pytest.importorskip("websockets")
 
-from control_program import PATIENT, control, needs_program
 from conftest import ROOT
+from control_program import PATIENT, control, needs_program
 from inverse3_service import Service, serving
 from palpate import read_recording
 

@@ -98,7 +98,7 @@ def main() -> dict[str, Any]:
     stalls = []
     for _ in range(2):
         try:
-            handle.read(STREAM_IN, 64, timeout=1000)
+            handle.read(STREAM_IN, 64, timeout=200)
         except usb.core.USBError as error:
             stalls.append(error.errno)
     handle.clear_halt(STREAM_IN)

@@ -82,6 +82,7 @@ def check_device(
     push: bool = False,
     profile: DeviceProfile | None = None,
     model: Model | None = None,
+    wait_s: float | None = None,
     progress: Progress | None = None,
 ) -> Check:
     """Measure a device for some seconds and judge it.
@@ -107,6 +108,8 @@ def check_device(
         What the device is thought to be.
     model : Model, optional
         One with a certificate: whether that holds on this device.
+    wait_s : float, optional
+        How long a packet of a USB device is waited for [s].
     progress : callable, optional
         Is told ten times a second: ticks, position, force.
 
@@ -122,6 +125,7 @@ def check_device(
         "object": object,
         "transducer": transducer,
         "rate_hz": rate_hz,
+        "wait_s": wait_s,
         "progress": progress,
         "keep": True,
         "lowest_rate_share": 0.0,  # a low rate is a finding, and no reason to stop

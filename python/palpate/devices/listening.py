@@ -142,7 +142,7 @@ def _velocity(ticks: Mapping[str, Any], step: float) -> Finding:
         f"{'right' if share > 0.0 else 'flipped'}: {share:.2f} of what the positions show",
         abs(share - 1.0) <= _VELOCITY_TOLERANCE,
         "its firmware measures it wrongly; do not enable force",
-        True,
+        share <= 0.0,
     )
 
 

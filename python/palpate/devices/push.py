@@ -62,7 +62,7 @@ def push_response(ticks: Mapping[str, Any]) -> Push:
     # A reading tells the force that acted until it was taken: a push begins one reading before it is seen.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
-    for begin in begins[begins > 0]:
+    for begin in begins[begins > 2]:  # before the first push nobody knows where the handle goes
         held = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
         last = min(begin + 2 * held, len(position))
         rows = slice(begin, last)
@@ -86,10 +86,10 @@ def push_response(ticks: Mapping[str, Any]) -> Push:
 
 
 def _way(time: Float1D, position: Float1D, begin: int, held: int) -> float:
-    """How far a push moved the handle from where its speed before would have brought it."""
-    before, end = slice(max(0, begin - held), begin + 1), min(begin + held, len(position) - 1)
-    line = np.polynomial.Polynomial.fit(time[before], position[before], 1)
-    return float(position[end] - line(time[end]))
+    """How far a push moved the handle from where it was going: on a parabola, since hands are slow."""
+    before, end = slice(max(0, begin - 2 * held), begin + 1), min(begin + held, len(position) - 1)
+    hand = np.polynomial.Polynomial.fit(time[before], position[before], 2)
+    return float(position[end] - hand(time[end]))
 
 
 def _mechanics(columns: list[Float1D], targets: list[Float1D]) -> tuple[float | None, float | None]:
