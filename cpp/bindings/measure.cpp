@@ -199,7 +199,7 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
     SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
     wanted.transducer = object && wanted.transducer;
     if (object) {
-        device.mount({object_of(*object, 0.0), wanted.transducer});
+        device.mount({object_of(*object, bench, 0.0), wanted.transducer});
     }
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
@@ -273,7 +273,8 @@ void bind_measure(py::module_& module) {
            std::optional<double> lower, std::optional<double> upper, std::optional<double> speed,
            std::optional<double> stiffness, std::optional<double> force_limit, std::optional<double> push,
            double rate_hz, double duration_s, const std::string& record, bool keep, int priority, int cpu,
-           double lowest_rate_share, std::optional<double> wait_s, const std::optional<py::function>& progress) {
+           double lowest_rate_share, std::optional<double> wait_s,
+           const std::optional<py::function>& progress) {
             detail::require(!wait_s || (std::isfinite(*wait_s) && *wait_s > 0.0),
                             "wait_s is " + readable(wait_s.value_or(0.0)) + ", must be > 0");
             Measurement wanted{transducer,
@@ -309,7 +310,8 @@ void bind_measure(py::module_& module) {
         "with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: "
         "until\n"
         "Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a\n"
-        "second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows as record.part; with `keep` the summary, "
+        "second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows "
+        "as record.part; with `keep` the summary, "
         "returned\n"
         "by name, holds the ticks. ValueError where it is refused before anything moves.");
 }

@@ -244,11 +244,13 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert findings["sign of the force"]["right"], answer.stdout
     assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
-    assert result["delay_samples"] == 1
+    assert result["delay_p50_us"] == pytest.approx(1000.0, rel=0.02)
+    assert result["delay_samples"] in (1, 2)  # that of the latest in a thousand: the machine may be busy
     assert result["round_trip_p50_us"] > 0.0
     assert (result["lost_samples"], result["repeated_samples"]) == (0, 0)
     written = DeviceProfile.load(profile)
-    assert (written.id, written.delay_samples, written.force_limit) == ("EMU-1", 1, 5.0)
+    assert (written.id, written.force_limit) == ("EMU-1", 5.0)
+    assert written.delay_samples == result["delay_samples"]
     felt = frames(trace)
     assert max(abs(frame.torque) for frame in felt) <= 1.001 * SHARE_OF_FORCE * 5.0
     assert felt[-1].torque == 0.0
@@ -256,12 +258,12 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
 
 
 @needs_emulation
-@pytest.mark.parametrize("hand", [["--no-hand"], []], ids=["free", "held"])
+@pytest.mark.parametrize(("hand", "seconds"), [(["--no-hand"], 2.0), ([], 6.0)], ids=["free", "held"])
 def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
-    hand: list[str], tmp_path: Path
+    hand: list[str], seconds: float, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
-    answer = checked("--push", "--yes", device=["--flipped", *hand, "--trace", str(trace)], seconds=8.0)
+    answer = checked("--push", "--yes", device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
     result, findings = told_of(answer)
     assert answer.returncode == 1
     assert findings["sign of the force"]["right"] is False

@@ -178,7 +178,8 @@ def judge(listened: Mapping[str, Any]) -> Check:
         delay_us = listened["delay"]
         samples = max(0, math.ceil(1e-6 * delay_us["p999_us"] / base.period_s - _DELAY_TOLERANCE))
         numbers["delay_samples"] = float(samples)
-        numbers.update({f"round_trip_{name}": value for name, value in listened["round_trip"].items()})
+        for told in ("round_trip", "delay"):
+            numbers.update({f"{told}_{name}": value for name, value in listened[told].items()})
         findings.append(
             Finding(
                 "delay",
