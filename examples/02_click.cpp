@@ -37,7 +37,7 @@ double largest_fall(const std::vector<double>& force) {
 int main(int count, char** words) {
     using namespace palpate;
 
-    // 1. The object. Pressed, its force falls all at once; released, it comes back elsewhere: press and release differ.
+    // 1. The object. Pressed, its force falls all at once; released, it comes back elsewhere.
     const ForceModel click = load_model_file(count > 1 ? words[1] : "examples/02_click.json").model;
     const double lower = click.domain().lower[0];
     const double upper = click.domain().upper[0];

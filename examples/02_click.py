@@ -3,8 +3,8 @@
 
 python examples/02_click.py
 
-02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); a millimetre of the key is
-0.1 rad of the knob, and a newton is 1 N*m. To feel it, on a device that `palpate check-device` found fit for it:
+02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); a millimetre of
+02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); a millimetre of
 
 palpate-control examples/02_click.json --device usb --uncertified --force-limit 1
 """
@@ -27,13 +27,12 @@ def largest_fall(force: Iterable[float]) -> float:
     return fall
 
 
-# 1. The object. Pressed, its force falls all at once; released, it comes back elsewhere: press and release differ.
+# 1. The object. Pressed, its force falls all at once; released, it comes back elsewhere.
 switch = palpate.load_model(Path(__file__).with_suffix(".json"))
 position = np.linspace(switch.lower[0], switch.upper[0], 1001)
 press, release = (switch.force(position, direction=way) for way in (+1, -1))
-print(
-    f"the switch: the press falls by {largest_fall(press):.3f} N*m, the release by {largest_fall(release):.3f} N*m"
-)
+falls = largest_fall(press), largest_fall(release)
+print(f"the switch: the press falls by {falls[0]:.3f} N*m, the release by {falls[1]:.3f} N*m")
 
 # 2. A knob that suits it, and a hand that presses for a second. Simulated.
 bench = bench_for(switch)

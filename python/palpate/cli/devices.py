@@ -55,17 +55,17 @@ def devices(
     except DeviceError as error:
         raise WorkError(str(error)) from None
     if as_json:
-        print_json({"devices": [asdict(device) for device in found]})
+        print_json({"devices": [asdict(one) for one in found]})
         return
-    for device in found:
-        name = " ".join(part for part in (device.product, device.serial) if part) or "without a name"
-        click.echo(f"{name} ({device.place})")
-        if device.info is None:
-            click.echo(f"  {device.problem}")
+    for one in found:
+        name = " ".join(part for part in (one.product, one.serial) if part) or "without a name"
+        click.echo(f"{name} ({one.place})")
+        if one.info is None:
+            click.echo(f"  {one.problem}")
             continue
-        info = device.info
+        info = one.info
         click.echo(
-            f"  --device usb:{device.serial}\n"
+            f"  --device usb:{one.serial}\n"
             f"  encoder {info.counts_per_rev} counts a turn ({number(info.encoder_step)} rad), "
             f"torque up to {number(info.max_torque)} N*m, {info.rate_hz} Hz, watchdog {info.watchdog_ms} ms\n"
             f"  force transducer: {'yes' if info.transducer else 'no'}; "
