@@ -3,8 +3,8 @@
 
 python examples/02_click.py
 
-02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); a millimetre of
-02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); a millimetre of
+02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); 1 mm of the key is
+0.1 rad of the knob, 1 N is 1 N*m. To feel it on a device that `palpate check-device` found fit for it:
 
 palpate-control examples/02_click.json --device usb --uncertified --force-limit 1
 """
