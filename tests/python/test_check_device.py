@@ -185,7 +185,7 @@ def test_a_check_without_pushes_says_that_the_sign_of_the_force_was_not_seen() -
     found = check_device(duration_s=2.0)
     assert finding(found, "sign of the force").right is None
     if found.suitable:  # as far as this machine is punctual
-        assert found.verdict.endswith("not seen: sign of the velocity, sign of the force")
+        assert found.verdict.endswith("not seen: sign of the force")
 
 
 def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
