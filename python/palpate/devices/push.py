@@ -105,7 +105,7 @@ def _mechanics(columns: list[Float1D], targets: list[Float1D]) -> tuple[float | 
 
 
 def _delay(ticks: Mapping[str, Any]) -> int | None:
-    """Samples from a command to the first reading that shows its force, less the one that all take."""
+    """Samples from a command to the first reading whose force is it, less the one that each command takes."""
     sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
     begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
     delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]
