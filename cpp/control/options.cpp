@@ -151,7 +151,8 @@ void add_guards(CLI::App& app, Options& options) {
 }
 
 void add_running(CLI::App& app, Options& options) {
-    app.add_option("--device", options.device, "simulated, or usb[:SERIAL]")
+    app.add_option("--device", options.device,
+                   "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z")
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
