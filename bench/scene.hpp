@@ -26,6 +26,24 @@ inline WaveletNetwork spring_and_wall(std::size_t size) {
     return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }
 
+/// Two clicks and a wall: the force falls with slopes to -23 N*m/rad, so that a soft coupling snaps through.
+/// `size` wavelets, eight of which matter.
+inline WaveletNetwork two_clicks(std::size_t size) {
+    NetworkParameters network{1,
+                              {30.0, 25.0, 15.0, 8.0, 40.0, 60.0, 45.0, 38.0},
+                              {0.15, 0.45, 0.5, 0.62, 0.3, 0.41, 0.27, 0.36},
+                              {-0.45, 0.3, -0.8, 1.5, 0.02, 0.02, -0.5, -0.3},
+                              {12.0},
+                              0.0};
+    for (std::size_t k = network.weight.size(); k < size; ++k) {
+        const double fraction = static_cast<double>(k) / static_cast<double>(size);
+        network.alpha.push_back(10.0 + 30.0 * fraction);
+        network.beta.push_back(0.6 * fraction);
+        network.weight.push_back(0.01 / static_cast<double>(size));
+    }
+    return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+}
+
 /// A hand pressing and letting go twice a second, sampled at 1 kHz: what a structure sees tick by tick.
 inline std::vector<double> hand_motion(std::size_t ticks) {
     std::vector<double> position(ticks);

@@ -8,8 +8,7 @@ endif()
 
 # What is done without where it is not there: the USB device (Debian: libusb-1.0-0-dev) and its emulation below libusb
 # (Debian: libumockdev-dev).
-find_package(PkgConfig QUIET)
+include(cmake/PalpateUsb.cmake)
 if(PkgConfig_FOUND)
-  pkg_check_modules(libusb QUIET IMPORTED_TARGET libusb-1.0>=1.0.24)
   pkg_check_modules(umockdev QUIET IMPORTED_TARGET umockdev-1.0>=0.17)
 endif()

@@ -4,7 +4,7 @@
 set -euo pipefail
 
 scale=${PALPATE_BENCH_SCALE:-1}
-seconds=$(awk -v scale="$scale" 'BEGIN { print 0.5 * scale }')
+seconds=$(awk -v scale="$scale" 'BEGIN { print 0.1 * scale }')
 governor=$(cat /sys/devices/system/cpu/cpu0/cpufreq/scaling_governor 2>/dev/null || echo unknown)
 commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -18,7 +18,8 @@ flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCa
 for source in bench/*.cpp; do
     name=$(basename "$source" .cpp)
     "build/release/bench/$name" \
-        --benchmark_min_time="$seconds" \
+        --benchmark_min_time="$seconds" --benchmark_repetitions=5 --benchmark_enable_random_interleaving=true \
+        --benchmark_display_aggregates_only=true \
         --benchmark_out="build/bench/$name.json" --benchmark_out_format=json \
         --benchmark_context=commit="$commit" --benchmark_context=governor="$governor" \
         --benchmark_context=compiler="$("$compiler" --version | head -1 | tr ', ' '__')" \
@@ -29,6 +30,7 @@ for source in bench/*.cpp; do
     fi
 done
 .venv/bin/palpate chart speed build/bench --to build/bench/figures
+.venv/bin/python bench/ratios.py build/bench
 echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."
 
 echo "Lateness of the real-time loop beside cyclictest"

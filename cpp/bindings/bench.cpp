@@ -27,9 +27,8 @@ void bind_bench(py::module_& module) {
                std::optional<bool> compensated, std::optional<double> coupling_stiffness,
                std::optional<double> coupling_damping, std::optional<double> mass,
                std::optional<double> damping, std::optional<double> play_radius) {
-                SchemeChoices chosen{std::nullopt,     compensated, coupling_stiffness,
-                                     coupling_damping, mass,        damping,
-                                     play_radius};
+                SchemeChoices chosen{std::nullopt, compensated, coupling_stiffness, coupling_damping,
+                                     mass,         damping,     play_radius};
                 if (structure) {
                     chosen.structure = structure_named(*structure);
                 }
@@ -43,10 +42,11 @@ void bind_bench(py::module_& module) {
             return "Bench(device=" + py::repr(py::cast(bench.device)).cast<std::string>() +
                    ", hand=" + py::repr(py::cast(bench.hand)).cast<std::string>() + ")";
         });
-    module.def("bench_for", &bench_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
-               "The bench on which a model of one position is tried. An angle is tried on the default knob;\n"
-               "for any other unit it is the same knob as a scale model: lengths and forces are multiplied so\n"
-               "that travel and largest force stand to the device as in the knob's own scene.");
+    module.def(
+        "bench_for", &bench_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
+        "The bench on which a model of one position is tried. An angle is tried on the default knob;\n"
+        "for any other unit it is the same knob as a scale model: lengths and forces are multiplied so\n"
+        "that travel and largest force stand to the device as in the knob's own scene.");
 }
 
 }  // namespace palpate::bindings

@@ -12,8 +12,10 @@ void bind_model(pybind11::module_& module);
 void bind_dynamics(pybind11::module_& module);
 void bind_device(pybind11::module_& module);
 void bind_rendering(pybind11::module_& module);
+void bind_failure(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
 void bind_bench(pybind11::module_& module);
 void bind_session(pybind11::module_& module);
+void bind_measure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

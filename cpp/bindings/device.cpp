@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <pybind11/operators.h>
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
@@ -55,7 +54,6 @@ void bind_device(py::module_& module) {
                       "rad, and forces are in N*m; or m, and they are in N.")
         .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,
                                "period_s + jitter_s: what a certificate has to hold for [s].")
-        .def(py::self == py::self)
         .def("__repr__", [](const DeviceProfile& p) {
             return "DeviceProfile(id='" + p.id + "', period_s=" + std::to_string(p.period_s) +
                    ", inertia=" + std::to_string(p.inertia) +

@@ -11,7 +11,9 @@ PYBIND11_MODULE(_core, module) {
     palpate::bindings::bind_dynamics(module);
     palpate::bindings::bind_device(module);
     palpate::bindings::bind_rendering(module);
+    palpate::bindings::bind_failure(module);
     palpate::bindings::bind_stability(module);
     palpate::bindings::bind_bench(module);
     palpate::bindings::bind_session(module);
+    palpate::bindings::bind_measure(module);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -109,12 +110,14 @@ void bind_rendering(py::module_& module) {
                 period_s ? validate(s, model, *period_s) : validate(s, model);
             },
             "model"_a, "period_s"_a = py::none(),
-            "ValueError names the field, its value and what would be right for this model; with a period also\n"
+            "ValueError names the field, its value and what would be right for this model; with a period "
+            "also\n"
             "what is sure to diverge at it.")
         .def(
             "steepest_slope",
             [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
-            "Largest slope of the model that the structure meets, never below 0; h / r is part of it while a\n"
+            "Largest slope of the model that the structure meets, never below 0; h / r is part of it while "
+            "a\n"
             "hysteresis model sticks.")
         .def("__repr__", [](const Scheme& s) {
             return "Scheme(structure='" +
@@ -131,11 +134,25 @@ void bind_rendering(py::module_& module) {
         "explicit_slope_limit",
         [](const Scheme& s, double period_s, bool coupled) {
             require_period(period_s);
-            return explicit_slope_limit(s.inertia, coupled ? s.coupling : VirtualCoupling{0.0, 0.0}, period_s);
+            return explicit_slope_limit(s.inertia, coupled ? s.coupling : VirtualCoupling{0.0, 0.0},
+                                        period_s);
         },
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
         "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
         "driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.");
+
+    module.def(
+        "solver_name",
+        [](const ForceModel& model, const Scheme& s, double period_s) -> std::optional<std::string> {
+            require_period(period_s);
+            const auto name = solver_name(model, s, period_s);
+            return name ? std::optional<std::string>{*name} : std::nullopt;
+        },
+        "model"_a, "scheme"_a, "period_s"_a,
+        "How the load line is solved: 'table' where certified tables answer, at least in part, else "
+        "'newton';\n"
+        "None where a structure has no load line.");
+
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
         "substeps"_a = 20, "start_position"_a = 0.0,

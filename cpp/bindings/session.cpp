@@ -14,6 +14,7 @@
 #include "palpate/bench.hpp"
 #include "palpate/device/simulated.hpp"
 #include "palpate/session_text.hpp"
+#include "summary.hpp"
 
 namespace palpate::bindings {
 
@@ -21,31 +22,6 @@ namespace py = pybind11;
 using namespace py::literals;
 
 namespace {
-
-py::dict microseconds(const DurationHistogram& histogram) {
-    return py::dict("p50_us"_a = 1e-3 * histogram.quantile(0.5), "p99_us"_a = 1e-3 * histogram.quantile(0.99),
-                    "p999_us"_a = 1e-3 * histogram.quantile(0.999),
-                    "max_us"_a = 1e-3 * static_cast<double>(histogram.largest()));
-}
-
-py::dict statuses(const LoopReport& loop) {
-    py::dict counts;
-    for (std::size_t k = 0; k < status_texts.size(); ++k) {
-        if (loop.ticks_by_status[k] > 0) {
-            counts[status_texts[k].word] = loop.ticks_by_status[k];
-        }
-    }
-    return counts;
-}
-
-/// Ctrl-C reaches Python as an exception of its next line; while C++ waits it has to ask.
-void ask_python(std::atomic<bool>& asked) {
-    const py::gil_scoped_acquire locked;
-    if (PyErr_CheckSignals() != 0) {
-        PyErr_Clear();
-        asked.store(true, std::memory_order_relaxed);
-    }
-}
 
 py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const std::string& position_unit,
                           const std::string& force_unit, double rate_hz, double duration_s,
@@ -85,31 +61,9 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
         report = render_live(model, scheme, device, guards, settings, outlets, asked,
                              [&](const SessionView& /*view*/) { ask_python(asked); });
     }
-    std::vector<std::string> notes = report.refused;
-    const std::string asked_for = record;
-    if (!record.empty()) {
-        for (std::string& warning : finish_record(outlets.file, report, settings.loop, record)) {
-            notes.push_back(std::move(warning));
-        }
-        if (!is_orderly(report.loop.ending)) {
-            notes.push_back(write_last_ticks(asked_for, units, metadata, report, settings.loop));
-        }
-    }
-    return py::dict("orderly"_a = is_orderly(report.loop.ending),
-                    "ended"_a = ending_text(report.loop, settings.loop),
-                    "status"_a = text(report.loop.status).word, "ticks"_a = report.loop.timing.ticks(),
-                    "rate_hz"_a = report.loop.timing.rate_hz(), "wanted_rate_hz"_a = rate_hz,
-                    "period"_a = microseconds(report.loop.timing.period),
-                    "lateness"_a = microseconds(report.loop.timing.lateness),
-                    "missed_deadlines"_a = report.loop.timing.missed,
-                    "longest_gap_us"_a = 1e-3 * static_cast<double>(report.loop.timing.period.largest()),
-                    "ticks_by_status"_a = statuses(report.loop), "lost_samples"_a = report.loop.lost_samples,
-                    "repeated_samples"_a = report.loop.repeated_samples,
-                    "record"_a = record.empty() ? py::object(py::none()) : py::cast(record),
-                    "recorded"_a = outlets.file.written(),
-                    "lost_records"_a = report.lost_records + outlets.file.refused(),
-                    "telemetry_sent"_a = outlets.telemetry.sent(),
-                    "telemetry_dropped"_a = outlets.telemetry.dropped(), "notes"_a = notes);
+    const std::vector<std::string> notes =
+        close_record(outlets, report, settings.loop, units, metadata, record);
+    return summary_of(report, settings.loop, outlets, record, notes);
 }
 
 }  // namespace
@@ -118,7 +72,8 @@ void bind_session(py::module_& module) {
     const LoopSettings loop;
     const RealTimeOptions real_time;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
-    py::class_<LoopSettings>(module, "LoopSettings", "When a rendering ticks, and when it ends: the defaults.")
+    py::class_<LoopSettings>(module, "LoopSettings",
+                             "When a rendering ticks, and when it ends: the defaults.")
         .def(py::init<>())
         .def_readonly("rate_hz", &LoopSettings::rate_hz)
         .def_readonly("duration_s", &LoopSettings::duration_s)

@@ -161,6 +161,9 @@ void bind_stability(py::module_& module) {
         "stiffness"_a, "damping"_a, "period_s"_a, "delay_samples"_a = 0,
         "Device damping over the longest period that a coupling of K_c and B_c needs for any passive "
         "object.");
+    module.def(
+        "device_difference", &device_difference, "certified"_a, "device"_a,
+        "The first field in which a device is not the certified one, as a sentence; empty where it is.");
     module.def("fingerprint", &fingerprint, "model"_a,
                "16 hexadecimal digits that change with every number of which the model's force is made.");
 }

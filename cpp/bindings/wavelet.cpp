@@ -133,6 +133,27 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
     return {std::move(value), std::move(by_alpha), std::move(by_beta)};
 }
 
+std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alpha, const Array& beta) {
+    const Frame frame(x, alpha, beta);
+    std::vector<Columns> result;
+    std::vector<double*> out;
+    for (std::size_t j = 0; j < frame.dimension; ++j) {
+        result.push_back(columns(frame.samples, frame.wavelets));
+        out.push_back(result.back().mutable_data());
+    }
+    const py::gil_scoped_release unlocked;
+    for (std::size_t i = 0; i < frame.wavelets; ++i) {
+        frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
+            for (std::size_t j = 0; j < frame.dimension; ++j) {
+                const double dilation = frame.alpha[i * frame.dimension + j];
+                const double u = std::clamp(frame.scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
+                *out[j]++ = dilation * dilation * psi.curvature(u);
+            }
+        });
+    }
+    return result;
+}
+
 /// One function of the one-dimensional wavelet on every (sample, wavelet) pair.
 template <class Function>
 Columns one_dimensional_columns(const Array& x, const Array& alpha, const Array& beta, Function function) {
@@ -176,6 +197,8 @@ void bind_wavelet(py::module_& module) {
     module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
                "The wavelet columns and their derivatives by the dilations and the translations:\n"
                "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
+    module.def("wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
+               "Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
     module.def(
         "wavelet_slope_columns",
         [](const Array& x, const Array& alpha, const Array& beta) {

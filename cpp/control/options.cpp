@@ -3,23 +3,30 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <iostream>
 #include <limits>
+#include <memory>
+#include <sstream>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "palpate/session_text.hpp"
+#include "palpate/device/device_profile.hpp"
+#include "palpate/readable.hpp"
 
 namespace palpate::control {
 
 namespace {
 
 constexpr const char* epilogue =
-    "Ctrl-C ends a run in an orderly way. Exit code: 0 ran its time, or Ctrl-C; 1 stopped by a guard, a "
-    "fault or\n"
-    "a rate too low; 2 refused before anything moved.\n\n"
-    "Example: palpate-control press.json --device simulated --rate-hz 1000 --duration-s 10 --record felt.csv";
+    "Ctrl-C ends a run in an orderly way. Exit code: 0 ran its time, or Ctrl-C;\n"
+    "1 stopped by a guard, a fault or a rate too low; 2 refused before anything moved.\n\n"
+    "\"scaled\": the numbers of a knob, in proportion to the model's travel and force.\n\n"
+    "Example: palpate-control press.json --duration-s 10 --record felt.csv";
+
+constexpr double least_positive = std::numeric_limits<double>::min();
+constexpr double infinite = std::numeric_limits<double>::infinity();
 
 /// A number within bounds, said in words.
 CLI::Validator number_between(double low, double high) {
@@ -29,15 +36,21 @@ CLI::Validator number_between(double low, double high) {
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) {
             return "";
         }
-        const std::string most =
-            std::isfinite(high) ? "from " + readable(low) + " to " + readable(high) : "above 0";
-        return "must be a number " + most + ", not " + text;
+        const std::string within = std::isfinite(high) ? "from " + readable(low) + " to " + readable(high)
+                                   : low > 0.0         ? "above 0"
+                                                       : "of " + readable(low) + " or more";
+        return "must be a number " + within + ", not " + text;
     });
     return validator;
 }
 
-constexpr double least_positive = std::numeric_limits<double>::min();
-constexpr double infinite = std::numeric_limits<double>::infinity();
+CLI::Validator positive() {
+    return number_between(least_positive, infinite);
+}
+
+CLI::Validator not_negative() {
+    return number_between(0.0, infinite);
+}
 
 CLI::Validator structure_word() {
     CLI::Validator validator;
@@ -49,42 +62,87 @@ CLI::Validator structure_word() {
     return validator;
 }
 
+/// The help for a terminal of 80 columns, without the words of programmers.
+class Help : public CLI::Formatter {
+  public:
+    Help() {
+        column_width(options_width);
+        for (const char* type : {"FLOAT", "INT", "UINT"}) {
+            label(type, "NUMBER");
+        }
+    }
+
+    std::string make_option_desc(const CLI::Option* option) const override {
+        std::istringstream words{option->get_description()};
+        std::string text;
+        std::size_t line = 0;
+        for (std::string word; words >> word;) {
+            const bool fits = line + 1 + word.size() <= 80 - options_width;
+            text += (text.empty() ? "" : fits ? " " : "\n") + word;
+            line = fits ? line + 1 + word.size() : word.size();
+        }
+        return text;
+    }
+
+  private:
+    static constexpr std::size_t options_width = 34;
+};
+
 void add_rendering(CLI::App& app, Options& options) {
     const auto group = [](CLI::Option* option) { return option->group("Rendering"); };
+    SchemeChoices& scheme = options.scheme;
+    const Scheme usual;
+    const auto scaled = [](double value, const char* unit) {
+        return " [" + readable(value) + " " + unit + ", scaled]";
+    };
     group(app.add_option("--structure", options.structure, "direct, massless, implicit or explicit"))
         ->check(structure_word())
+        ->type_name("NAME")
         ->default_str(std::string(name_of(Scheme{}.structure)));
-    group(app.add_flag("--compensated", options.scheme.compensated,
-                       "Take the coupling's spring out of the model"));
-    group(app.add_option("--coupling-stiffness", options.scheme.coupling_stiffness,
-                         "K_c, force per position [100 N*m/rad, scaled to the model]"));
-    group(app.add_option("--coupling-damping", options.scheme.coupling_damping,
-                         "B_c, force per velocity [0.02 N*m*s/rad, scaled]"));
-    group(app.add_option("--mass", options.scheme.mass, "m of implicit and explicit [0.001 kg*m^2, scaled]"));
-    group(app.add_option("--damping", options.scheme.damping,
-                         "B_o of implicit and explicit [0.5 N*m*s/rad, scaled]"));
-    group(app.add_option("--play-radius", options.scheme.play_radius,
-                         "r of a model with hysteresis [the model's, or 1 % of its travel]"));
+    group(app.add_flag("--compensated", scheme.compensated, "Take the coupling's spring out of the model"));
+    group(app.add_option("--coupling-stiffness", scheme.coupling_stiffness,
+                         "K_c, force per position" + scaled(usual.coupling.stiffness, "N*m/rad")))
+        ->check(positive());
+    group(app.add_option("--coupling-damping", scheme.coupling_damping,
+                         "B_c, force per velocity" + scaled(usual.coupling.damping, "N*m*s/rad")))
+        ->check(not_negative());
+    group(app.add_option("--mass", scheme.mass,
+                         "m of implicit and explicit" + scaled(usual.inertia.mass, "kg*m^2")))
+        ->check(positive());
+    group(app.add_option("--damping", scheme.damping,
+                         "B_o of implicit and explicit" + scaled(usual.inertia.damping, "N*m*s/rad")))
+        ->check(not_negative());
+    group(app.add_option("--play-radius", scheme.play_radius,
+                         "r of a model with hysteresis [the model's, or 1 % of its travel]"))
+        ->check(positive());
 }
 
 void add_guards(CLI::App& app, Options& options) {
     const auto group = [](CLI::Option* option) { return option->group("Guards"); };
     group(app.add_option("--force-limit", options.force_limit,
-                         "In the model's unit [the device's: 5 N*m, scaled]"));
+                         "In the model's unit [the device's: " + readable(DeviceProfile{}.force_limit) +
+                             " N*m, scaled]"))
+        ->check(positive());
     group(app.add_option("--slew-s", options.slew_s, "Least time from no force to the limit, 0 = any"))
+        ->check(not_negative())
         ->capture_default_str();
     group(app.add_option("--ramp-s", options.ramp_s, "From no force to all of it at the start"))
+        ->check(not_negative())
         ->capture_default_str();
     group(app.add_option("--largest-speed", options.largest_speed,
-                         "Faster than this the encoder jumped [100 rad/s, scaled]"));
+                         "Faster than this the encoder jumped [" + readable(GuardSettings{}.largest_speed) +
+                             " rad/s, scaled]"))
+        ->check(positive());
     group(app.add_option(
               "--frozen-s", options.frozen_s,
               "A position that stands this long out of full motion is an encoder that died, 0 = never"))
+        ->check(not_negative())
         ->capture_default_str();
     group(app.add_flag("--no-energy-tank", options.no_energy_tank,
                        "Let the rendering give more energy than the model can hold"));
     group(app.add_option("--tolerated-samples", options.loop.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
+        ->check(number_between(0, 1e6))
         ->capture_default_str();
     group(app.add_option("--lowest-rate-share", options.loop.lowest_rate_share,
                          "Of the rate: less for half a second ends the run, 0 = never"))
@@ -93,12 +151,14 @@ void add_guards(CLI::App& app, Options& options) {
 }
 
 void add_running(CLI::App& app, Options& options) {
-    app.add_option("--device", options.device, "simulated, or usb[:SERIAL]")->capture_default_str();
+    app.add_option("--device", options.device, "simulated, or usb[:SERIAL]")
+        ->type_name("NAME")
+        ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
         ->check(number_between(lowest_rate_hz, highest_rate_hz))
         ->capture_default_str();
     app.add_option("--duration-s", options.loop.duration_s, "How long, or inf")
-        ->check(number_between(least_positive, infinite))
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--record", options.record, "Write every tick to this CSV file; it grows as OUT.csv.part")
         ->type_name("OUT.csv");
@@ -121,9 +181,27 @@ void add_running(CLI::App& app, Options& options) {
         ->capture_default_str();
     app.add_flag("--json", options.as_json, "Print the summary as one JSON object");
     app.add_option(
-        "--fault", options.faults,
-        "For tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES of late, lost, repeated, nan, frozen, "
-        "jump, saturated, gone");
+           "--fault", options.faults,
+           "For tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES of late, lost, repeated, nan, "
+           "frozen, jump, saturated, gone")
+        ->type_name("FAULT");
+}
+
+/// What the parser complains about, in the words of the other refusals.
+std::string sentence_of(const CLI::ParseError& error) {
+    const std::string said = error.what();
+    if (error.get_name() == "ArgumentMismatch") {
+        return said.substr(0, said.find(':')) + " needs a value";
+    }
+    if (error.get_name() == "ConversionError") {  // "Could not convert: --cpu = 0.5"
+        const std::size_t name = said.find("--");
+        const std::size_t value = said.find(" = ", name);
+        if (value != std::string::npos) {
+            return said.substr(name, value - name) + ": must be a whole number, not " +
+                   said.substr(value + 3);
+        }
+    }
+    return said;
 }
 
 }  // namespace
@@ -131,12 +209,14 @@ void add_running(CLI::App& app, Options& options) {
 std::optional<int> read_options(int count, char** words, Options& options) {
     CLI::App app{
         "Render a model on a haptic device, tick by tick.\n\n"
-        "What is sent, felt and measured can be recorded, and identified and verified like any recording.",
+        "What is rendered can be recorded, and identified and verified like any recording.",
         "palpate-control"};
-    app.get_formatter()->column_width(34);
+    app.formatter(std::make_shared<Help>());
     app.footer(epilogue);
     app.set_version_flag("--version", std::string("palpate-control ") + PALPATE_VERSION);
-    app.add_option("MODEL.json", options.model, "A model file, from palpate identify")->required();
+    app.add_option("MODEL.json", options.model, "A model file, from palpate identify")
+        ->type_name("FILE")
+        ->required();
     add_running(app, options);
     add_rendering(app, options);
     add_guards(app, options);
@@ -153,7 +233,7 @@ std::optional<int> read_options(int count, char** words, Options& options) {
         std::cout << version.what() << "\n";
         return 0;
     } catch (const CLI::ParseError& error) {
-        std::cerr << "error: " << error.what() << " (see palpate-control --help)\n";
+        std::cerr << "error: " << sentence_of(error) << " (see palpate-control --help)\n";
         return 2;
     }
     return std::nullopt;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cmath>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -52,9 +53,11 @@ int render_on(D& device, const std::string& called, const Options& options, cons
         device.close();
         throw;
     }
+    const double seconds = job.settings.loop.duration_s;
     std::cerr << options.model << ": " << job.file.model.parameters().weight.size() << " wavelets, "
               << describe(job.scheme) << "; " << called << " at " << readable(job.settings.loop.rate_hz)
-              << " Hz for " << readable(job.settings.loop.duration_s) << " s\n";
+              << " Hz " << (std::isfinite(seconds) ? "for " + readable(seconds) + " s" : "until Ctrl-C")
+              << "\n";
 
     handle_signals();
     LiveView view{job.settings.loop, job.units};

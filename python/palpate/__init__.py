@@ -13,17 +13,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._core import DeviceProfile, Hand, Scheme, __version__
+    from ._core import Hand, Scheme, __version__
     from .errors import InputError
     from .identification import IdentifyOptions, frame_bounds
     from .identification.identify import identify
+    from .identification.identify_files import identify_files
+    from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
-    from .planning import Plan, simulate
+    from .planning import DeviceProfile, Plan, simulate
+    from .planning.plan import plan
     from .recording import Recording, read_recording
     from .verification import Verification, verify
 
 _HOME = {
-    "DeviceProfile": "_core",
+    "DeviceProfile": "planning",
     "Hand": "_core",
     "Scheme": "_core",
     "__version__": "_core",
@@ -31,14 +34,17 @@ _HOME = {
     "IdentifyOptions": "identification",
     "frame_bounds": "identification",
     "identify": "identification",
+    "identify_files": "identification.identify_files",
     "Model": "model",
     "load_model": "model",
     "Plan": "planning",
+    "plan": "planning.plan",
     "simulate": "planning",
     "Recording": "recording",
     "read_recording": "recording",
     "Verification": "verification",
     "verify": "verification",
+    "WaveletNetworkRegressor": "identification.regressor",
 }
 """Where each public name lives."""
 
@@ -52,10 +58,13 @@ __all__ = [
     "Recording",
     "Scheme",
     "Verification",
+    "WaveletNetworkRegressor",
     "__version__",
     "frame_bounds",
     "identify",
+    "identify_files",
     "load_model",
+    "plan",
     "read_recording",
     "simulate",
     "verify",

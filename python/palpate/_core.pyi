@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'environment_filters', 'explicit_slope_limit', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -35,7 +35,12 @@ class Status:
       Frozen : the position stood still at once out of full motion; the force sent is zero
     
       Ramp : the force is still on its way up from zero after the start
+    
+      Drained : the rendering had given all the energy it may; a force that gives more was scaled down
+    
+      Softened : the handle buzzed; all forces are scaled down from then on
     """
+    Drained: typing.ClassVar[Status]
     Fault: typing.ClassVar[Status]
     Frozen: typing.ClassVar[Status]
     Jump: typing.ClassVar[Status]
@@ -46,6 +51,7 @@ class Status:
     NotUnique: typing.ClassVar[Status]
     Ok: typing.ClassVar[Status]
     Ramp: typing.ClassVar[Status]
+    Softened: typing.ClassVar[Status]
     Timeout: typing.ClassVar[Status]
     __members__: typing.ClassVar[dict[str, Status]]
     @typing.overload
@@ -588,6 +594,10 @@ def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, dampin
     """
     Device damping over the longest period that a coupling of K_c and B_c needs for any passive object.
     """
+def device_difference(certified: DeviceProfile, device: DeviceProfile) -> str:
+    """
+    The first field in which a device is not the certified one, as a sentence; empty where it is.
+    """
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
     The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
@@ -596,6 +606,14 @@ def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing
     """
     Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
     driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.
+    """
+def failure_map(name: str, points: typing.SupportsInt | typing.SupportsIndex = 8) -> dict:
+    """
+    Where a method fails: boundaries measured in simulation, and what theory says of them.
+    
+    By name: along and limit (what the axes hold, with units) and lines, each with its name and the
+    arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known);
+    searched (up to how many times the theory, where none failed) and linear (the limit spans no decades).
     """
 def fingerprint(model: ForceModel) -> str:
     """
@@ -609,6 +627,16 @@ def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[nump
     """
     The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
     Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def measure(device: str = 'simulated', *, object: ForceModel | None = None, transducer: bool = True, position_unit: str = 'rad', force_unit: str = 'N*m', probe: bool = False, lower: typing.SupportsFloat | typing.SupportsIndex | None = None, upper: typing.SupportsFloat | typing.SupportsIndex | None = None, speed: typing.SupportsFloat | typing.SupportsIndex | None = None, stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, force_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, push: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', keep: bool = False, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, progress: collections.abc.Callable | None = None) -> dict:
+    """
+    A real object measured in real time; on the simulated device the model `object` is mounted.
+    
+    A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;
+    with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: until
+    Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a
+    second. `record` names the recording, which grows as record.part; with `keep` the summary, returned
+    by name, holds the ticks. ValueError where it is refused before anything moves.
     """
 def mexican_hat(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
@@ -663,6 +691,11 @@ def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`
     times max|f'| wider than the true range.
     """
+def solver_name(model: ForceModel, scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex) -> str | None:
+    """
+    How the load line is solved: 'table' where certified tables answer, at least in part, else 'newton';
+    None where a structure has no load line.
+    """
 def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """
     Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`
@@ -673,6 +706,10 @@ def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], 
     psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.
     
     x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.
+    """
+def wavelet_curvature_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[numpy.typing.NDArray[numpy.float64]]:
+    """
+    Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).
     """
 def wavelet_integral_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -688,9 +725,10 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
     """
 __version__: str = '0.1.0'
+failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'solver', 'pole', 'guard')
 longest_delay_samples: int = 16
 paper_sample_time_s: float = 0.001
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start'}
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}
 structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')
 usual_telemetry_hz: float = 50.0
 wavelet_curvature_bound: float = 3.0

@@ -134,9 +134,9 @@ TEST(DeviceProfile, RefusesImpossibleValuesByName) {
     };
     EXPECT_EQ(refusal([](DeviceProfile&) {}), "accepted");
     EXPECT_EQ(refusal([](DeviceProfile& p) { p.inertia = 0.0; }),
-              "device profile: inertia is 0.000000, must be > 0");
+              "device profile: inertia is 0, must be > 0");
     EXPECT_EQ(refusal([](DeviceProfile& p) { p.delay_samples = 17; }),
-              "device profile: delay_samples is 17.000000, must be 0 to 16");
+              "device profile: delay_samples is 17, must be 0 to 16");
     EXPECT_NE(refusal([](DeviceProfile& p) { p.period_s = std::nan(""); }), "accepted");
     EXPECT_NE(refusal([](DeviceProfile& p) { p.viscous_damping = -1.0; }), "accepted");
 }
@@ -191,6 +191,20 @@ TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
         device, Implicit{test::Spring{10.0}, Inertia{}, coupling, 1e-3}, ForceLimit{5.0}};
     (void)controller.start();
     EXPECT_EQ(controller.tick().command.force, expected.step(0.2).force);
+}
+
+TEST(Controller, RaisesTheForceFromZeroAndSaysSo) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{
+        device, Direct{test::Spring{10.0}}, Guards{ForceLimit{5.0}, {}, ForceRamp{4, 0}, {}}};
+    (void)controller.start();
+    for (const double expected : {0.0, 0.5, 1.0, 1.5}) {
+        EXPECT_EQ(controller.tick().status, Status::Ramp);
+        EXPECT_EQ(device.sent, expected);
+    }
+    EXPECT_EQ(controller.tick().status, Status::Ok);
+    EXPECT_EQ(device.sent, 2.0);
 }
 
 TEST(Controller, ClipsToTheForceLimitAndSaysSo) {

@@ -146,7 +146,8 @@ TEST(Faults, ARunWithoutThemIsOrderly) {
     expect_safe(run);
     EXPECT_EQ(run.report->ending, Ending::TimeUp);
     EXPECT_EQ(run.ticks.size(), 2000U);
-    EXPECT_EQ(run.report->ticks_by_status[0], 2000U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ramp)], 20U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ok)], 1980U);
     const auto largest = std::max_element(run.ticks.begin(), run.ticks.end(),
                                           [](const auto& a, const auto& b) { return a.force < b.force; });
     EXPECT_GT(largest->force, 2.0);

@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
-from palpate import _core
+from palpate import InputError, _core
 from palpate.identification import IdentifiedNetwork, IdentifyOptions, fit_environment
 from palpate.identification.compression import Compressor
 from palpate.identification.constraints import domain_bounds, impose, violated_positions
@@ -151,3 +151,35 @@ def test_the_slope_limited_fit_is_close_to_the_nearest_slope_limited_force() -> 
     g, _ = g_and_h(network, x)
     loss = np.sqrt(np.mean((nearest - truth) ** 2))
     assert np.sqrt(np.mean((g - nearest) ** 2)) < 0.1 * loss
+
+
+def test_a_monotone_force_never_falls() -> None:
+    random = np.random.default_rng(4)
+    x = np.linspace(0.0, 1.0, 800)
+    y = x + 0.4 * np.exp(-(((x - 0.5) / 0.08) ** 2)) + random.normal(0.0, 0.01, len(x))
+    network = fit_environment(x[:, None], y, None, IdentifyOptions(monotone=True))
+    fine = np.linspace(0.0, 1.0, 100_001)
+    columns = _core.wavelet_slope_columns(fine, network.alpha, network.beta)
+    assert (columns @ network.weight + network.linear[0]).min() >= 0.0
+    assert any("slope bounds imposed over the domain, RMS error" in note for note in network.notes)
+
+
+@pytest.mark.parametrize("hysteresis", [False, True], ids=["one-force", "two-strokes"])
+def test_a_fixed_force_is_met_and_costs_little(hysteresis: bool) -> None:
+    random = np.random.default_rng(5)
+    x = np.tile(np.linspace(0.0, 0.6, 600), 2)
+    side = np.repeat([1.0, -1.0], 600) if hysteresis else None
+    y = 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01) + 0.03
+    y = y + random.normal(0.0, 0.02, len(x)) + (0.0 if side is None else 0.2 * side)
+    free = fit_environment(x[:, None], y, side)
+    fixed = fit_environment(x[:, None], y, side, IdentifyOptions(fixed_force=(0.0, 0.03)))
+    assert g_and_h(fixed, np.zeros(1))[0][0] == pytest.approx(0.03, abs=1e-7)
+    assert abs(g_and_h(free, np.zeros(1))[0][0] - 0.03) > 1e-5
+    assert fixed.rmse <= 1.02 * free.rmse
+    assert any("fixed force" in note and "imposed" in note for note in fixed.notes)
+
+
+def test_a_fixed_force_outside_the_data_is_refused() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    with pytest.raises(InputError, match="fixed_force is at 2, outside the positions from 0 to 1"):
+        fit_environment(x[:, None], x, None, IdentifyOptions(fixed_force=(2.0, 0.0)))

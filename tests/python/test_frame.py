@@ -71,10 +71,10 @@ def test_every_member_of_the_truncated_frame_has_data_within_it(dimension: int) 
     assert nearest.max() <= 0.75 * np.sqrt(dimension) + 1e-12
 
 
-def test_the_truncated_frame_leaves_out_the_levels_that_would_not_fit() -> None:
+def test_the_truncated_frame_ends_within_the_level_that_would_not_fit() -> None:
     positions = np.linspace(0.0, 1.0, 1000)[:, None]
     frame = truncated_frame(
         positions, coarsest=1.0, finest=400.0, frame_scale=2.0, frame_step=0.5, max_candidates=100
     )
-    assert len(frame) <= 100
-    assert frame.alpha.max() == 16.0
+    assert len(frame) == 100
+    assert frame.alpha.max() == 32.0

@@ -57,6 +57,17 @@ def test_exactly_linear_data_are_linear() -> None:
     assert (network.linear[0], network.bias) == (pytest.approx(4.0), pytest.approx(-1.0))
 
 
+@pytest.mark.parametrize("encoder_step", [0.0, 9.6e-5], ids=["exact", "encoder"])
+def test_data_without_noise_stop_growth_where_a_sensor_would_see_no_difference(encoder_step: float) -> None:
+    """What was rendered and recorded is exact: there is always a smaller error, and nobody measures it."""
+    x = sweep(3000, 6, encoder_step)
+    force = 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
+    network = fit_environment(x[:, None], force, starts=[0])
+    assert network.rung == "position"
+    assert len(network.weight) <= 12
+    assert network.rmse <= 2.0**-16 * np.ptp(force)
+
+
 def test_friction_between_strokes_earns_hysteresis_without_a_wavelet() -> None:
     random = np.random.default_rng(4)
     x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
@@ -183,7 +194,7 @@ def test_the_result_does_not_depend_on_units() -> None:
 @pytest.mark.parametrize(
     ("positions", "force", "told"),
     [
-        (np.full(20, 0.3), np.arange(20.0), "all positions are 0.3"),
+        (np.full(20, 0.3), np.arange(20.0), "every position is 0.3"),
         (np.arange(9.0), np.arange(9.0), "9 rows; 10 or more"),
         (np.repeat([0.0, 1.0], 10), np.arange(20.0), "2 distinct values; 3 or more"),
         (np.append(np.arange(19.0), np.nan), np.arange(20.0), "position in row 19 is"),
@@ -226,7 +237,7 @@ def test_named_inputs_decide_the_rung() -> None:
         ({"frame_scale": 1.0}, "frame_scale is 1.0"),
         ({"coupling_stiffness": -5.0}, "coupling_stiffness is -5.0"),
         ({"slope_bounds": (3.0, 1.0)}, r"slope_bounds is \(3.0, 1.0\)"),
-        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allows no more than 90"),
+        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allow no more than 90"),
         ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
         ({"period": float("nan")}, "period is nan"),
     ],

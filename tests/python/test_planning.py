@@ -83,11 +83,16 @@ def test_a_plan_claims_no_certificate() -> None:
 
 @pytest.mark.parametrize(
     ("structure", "solver"),
-    [("direct", None), ("massless", "newton"), ("implicit", "newton"), ("explicit", None)],
+    [("direct", None), ("massless", "table"), ("implicit", "table"), ("explicit", None)],
 )
 def test_a_plan_names_its_structure_and_its_solver(structure: str, solver: str | None) -> None:
     plan = Plan(model_by_hand(), Scheme(structure=structure))
     assert (plan.structure, plan.solver) == (structure, solver)
+
+
+def test_a_plan_does_not_claim_a_table_that_cannot_be_certified() -> None:
+    needle = model_by_hand(alpha=[[1e9]])
+    assert Plan(needle, Scheme(structure="massless")).solver == "newton"
 
 
 def test_a_scheme_that_does_not_fit_the_model_is_refused_by_its_field() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from control_program import MODEL, PATIENT, every_row
+from control_program import MODEL, PATIENT, every_row, wait_for_rows
 from palpate import _core, load_model, read_recording
 
 COMMAND = [sys.executable, "-m", "palpate", "render", str(MODEL)]
@@ -84,6 +84,21 @@ def test_the_verb_ends_in_an_orderly_way_when_asked(tmp_path: Path, number: sign
     told, talk = process.communicate(timeout=30)
     assert process.returncode == 0, talk
     assert json.loads(told)["recorded"] == len(every_row(out))
+
+
+def test_a_rate_that_is_not_held_ends_the_run_unless_none_is_too_low(tmp_path: Path) -> None:
+    """Stopped for most of a second, it misses the deadlines of a window of half a second."""
+    for patient in (False, True):
+        out = tmp_path / f"{patient}.csv"
+        command = [*COMMAND, "--duration-s", "1.5", "--record", str(out), "--json", *(PATIENT * patient)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        wait_for_rows(Path(f"{out}.part"), process)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.9)
+        process.send_signal(signal.SIGCONT)
+        told, _ = process.communicate(timeout=30)
+        assert process.returncode == (0 if patient else 1)
+        assert ("did not hold its rate" in told) != patient
 
 
 def test_the_verb_refuses_with_one_sentence() -> None:

@@ -8,7 +8,7 @@ from palpate.identification.compression import Compressed, Compressor
 from palpate.identification.frame import truncated_frame
 from palpate.identification.selection import Library, OrthogonalSelection, select_forward
 from palpate.identification.separable import Basis, SeparableProblem, problem_of
-from palpate.identification.stopping import CRITERIA, deviance
+from palpate.identification.stopping import CRITERIA, ON_FRESH_ROWS, deviance
 
 SIDES = {"one force": None, "two strokes": 1.0, "play": 0.7}
 
@@ -80,7 +80,7 @@ def test_selection_finds_the_wavelets_that_made_the_force() -> None:
     assert chosen == {(16.0, 0.5), (8.0, 0.25)}
 
 
-@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("criterion", sorted(set(CRITERIA) - set(ON_FRESH_ROWS)))
 def test_every_criterion_charges_for_parameters_and_rewards_a_smaller_error(criterion: str) -> None:
     assert deviance(criterion, 1.0, 100, 5) < deviance(criterion, 1.0, 100, 6)
     assert deviance(criterion, 0.9, 100, 5) < deviance(criterion, 1.0, 100, 5)

@@ -184,7 +184,9 @@ def test_further_inputs_are_taken_by_name() -> None:
     assert result.extrapolated == np.count_nonzero(~inside)
     with pytest.raises(
         InputError,
-        match=re.escape("the model needs the input load_N; read the recording with inputs=('load_N',)"),
+        match=re.escape(
+            "the recording has no input load_N, only position; read the recording with inputs=('load_N',)"
+        ),
     ):
         verify(model, recording)
 

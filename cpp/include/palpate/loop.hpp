@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -25,6 +26,8 @@ struct LoopSettings {
     double duration_s = 10.0;        ///< infinity = until it is asked to stop
     double lowest_rate_share = 0.8;  ///< of rate_hz: below it for half a second, the loop stops; 0 = never
     std::uint64_t tolerated = 5;     ///< ticks in a row without a sound sample; one more, and the loop stops
+    /// A longer time between two ticks ends the loop: nothing is certified of it [s]
+    double longest_period_s = std::numeric_limits<double>::infinity();
 };
 
 inline constexpr double lowest_rate_hz = 100.0;
@@ -40,6 +43,8 @@ inline void validate(const LoopSettings& settings) {
     require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
             settings.rate_hz, "100 to 10000");
     require(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
+    require(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s", settings.longest_period_s,
+            "at least one period");
     require(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
             settings.lowest_rate_share, "0 to 1");
 }
@@ -51,6 +56,7 @@ enum class Ending : std::uint8_t {
     Guard,        ///< the samples, or the force made of them, are not to be believed
     DeviceFault,  ///< the device said so, or stopped answering
     RateTooLow,
+    NotCertified,  ///< a tick came later than the certificate holds for
 };
 
 /// Whether a program that ran such a loop did what it was asked to.
@@ -64,6 +70,7 @@ struct LoopProgress {
     std::atomic<std::uint64_t> missed{0};
     std::atomic<double> position{0.0};
     std::atomic<double> force{0.0};
+    std::atomic<double> object_force{0.0};  ///< of a real object against the handle
     RateCheck rate;
 };
 
@@ -85,6 +92,7 @@ struct LoopReport {
     record.position = tick.reading.position;
     record.force = tick.command.force;
     record.applied = tick.reading.applied;
+    record.measured = tick.reading.measured;
     record.environment_position = tick.rendered.environment_position;
     record.velocity = tick.reading.velocity;
     record.device_time = tick.reading.device_time;
@@ -126,9 +134,16 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
     clock.start();
     for (bool running = true; running;) {
         const Wake wake = clock.wait();
+        const auto gap = static_cast<double>(wake.now - report.timing.last) * 1e-9;
+        const bool too_late = report.timing.ticks() > 0 && gap > settings.longest_period_s;
         report.timing.add(wake);
+        if (too_late) {
+            report.ending = Ending::NotCertified;
+            break;  // the last force has stood for too long already: what follows is none
+        }
         const Tick tick = controller.tick();
-        sink.push(record_of(tick, wake, report.timing.first));
+        const TickRecord record = record_of(tick, wake, report.timing.first);
+        sink.push(record);
         report.status = tick.status;
         ++report.ticks_by_status[static_cast<std::size_t>(tick.status)];
         bad_in_a_row = sends_force(tick.status) ? 0 : bad_in_a_row + 1;
@@ -137,6 +152,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         progress.missed.store(report.timing.missed, std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
         progress.force.store(tick.command.force, std::memory_order_relaxed);
+        progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);
         if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.ending)) {

@@ -48,6 +48,11 @@ namespace palpate {
             return std::string("stopped by a guard: ") + status.word + ", " + status.meaning;
         case Ending::DeviceFault:
             return std::string("stopped by a fault of the device: ") + status.word + ", " + status.meaning;
+        case Ending::NotCertified:
+            return "stopped because a tick came " +
+                   readable(1e-6 * static_cast<double>(report.timing.period.largest())) +
+                   " ms after the one before: the certificate holds up to " +
+                   readable(1e3 * settings.longest_period_s) + " ms";
         case Ending::RateTooLow:
             break;
     }

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -14,6 +14,7 @@ import click
 from .output import talk
 
 if TYPE_CHECKING:
+    from ..model import Model
     from ..recording import Recording
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -56,16 +57,22 @@ class ReadingOptions:
 
     options: dict[str, Any] = field(default_factory=dict)
 
-    def read(self, path: Path) -> Recording:
-        """Read a recording, and say first what was read and which columns were chosen."""
+    def read(self, path: Path, inputs: Sequence[str] = ()) -> Recording:
+        """Read a recording with further inputs, and say first what was read and which columns were chosen."""
         from ..recording import read_recording
 
-        recording = read_recording(path, **self.options)
+        recording = read_recording(path, inputs=inputs, **self.options)
         chosen, *others = recording.notes
         talk(f"read {path}: {len(recording)} rows; {chosen}")
         for note in others:
             talk(f"  {note}")
         return recording
+
+
+def columns_of(model: Model) -> list[str]:
+    """The columns of a file that a model's inputs beside the position were read from."""
+    known = model.data.columns
+    return [known.get(name, name) for name in model.inputs[1:] if name != "velocity" or name in known]
 
 
 def reading_options(command: F) -> F:
@@ -82,6 +89,7 @@ def reading_options(command: F) -> F:
         negate: tuple[str, ...],
         torque_constant: float | None,
         rows: tuple[int | None, int | None] | None,
+        zero: tuple[int | None, int | None] | None,
         invalid: str,
         **others: Any,
     ) -> Any:
@@ -95,6 +103,7 @@ def reading_options(command: F) -> F:
                 "negate": negate,
                 "torque_constant": torque_constant,
                 "rows": rows,
+                "zero": zero,
                 "invalid": invalid,
             }
         )
@@ -136,6 +145,13 @@ def reading_options(command: F) -> F:
                 callback=_row_range,
                 default=None,
                 help="Use these rows only, counted from 0.",
+            ),
+            click.option(
+                "--zero",
+                metavar="START:STOP",
+                callback=_row_range,
+                default=None,
+                help="Rows in which the tool touches nothing: their mean force is taken off.",
             ),
             click.option(
                 "--invalid",

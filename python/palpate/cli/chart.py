@@ -10,6 +10,7 @@ import click
 from .verb import Verbs
 
 _SUBJECTS = {
+    "failures": "Where each method fails, measured beside its theory.",
     "speed": "Error against computing time, from the output of the benchmarks.",
 }
 """Every subject with its line in the help; its file, chart_SUBJECT.py, is imported only when it is used."""

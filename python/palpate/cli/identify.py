@@ -12,8 +12,10 @@ import click
 import numpy as np
 
 from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from .beside_baselines import as_records, baselines_option, fit_baselines, print_beside
 from .figures import require_figure_name
 from .identify_options import identify_options
+from .large_files import LargeFiles, large_file_options
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_verification
 from .verb import Verb
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
     metavar="K",
     help="Keep every K-th row out of the identification and report the error on these rows.",
 )
+@baselines_option
+@large_file_options
 @plot_option("measured and modelled force over position, residuals beneath")
 @json_option
 @reading_options
@@ -47,6 +51,8 @@ def identify(
     recording_files: tuple[Path, ...],
     output: Path,
     hold_out_every: int | None,
+    beside: bool,
+    large: LargeFiles,
     plot: Path | None,
     as_json: bool,
     reading: ReadingOptions,
@@ -59,6 +65,7 @@ def identify(
     as the data allows: a constant, a line, a wavelet network, and hysteresis where press and release differ.
     """
     from ..identification import identify as identify_model
+    from ..identification.options import RESERVED_INPUTS
     from ..verification import verify
 
     if plot is not None:
@@ -66,14 +73,23 @@ def identify(
     for target in filter(None, (output, plot)):
         require_writable(target, inputs=recording_files)
     require_distinct(output, plot)
-    recordings = [reading.read(path) for path in recording_files]
+    recordings: list[Recording] = []
+    if large.wanted:
+        large.require_alone({"--hold-out-every": hold_out_every, "--baselines": beside, "--plot": plot})
+    else:
+        columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+        recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
+    others = fit_baselines(recordings, hold_out_every) if beside else []
     judged_on = recordings
     if hold_out_every is not None:
         parts = [recording.split(hold_out_every) for recording in recordings]
         recordings, judged_on = [train for train, _ in parts], [test for _, test in parts]
     talk("identifying ...")
     start = time.perf_counter()
-    model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
+    if large.wanted:
+        model = large.identify(recording_files, reading, options)
+    else:
+        model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
     for note in model.notes.get("identification", ()):
@@ -88,11 +104,13 @@ def identify(
         "nrmse": nrmse,
         "seconds": seconds,
     }
+    if beside:
+        result["baselines"] = as_records(others)
     rows = sum(len(recording) for recording in judged_on)
     judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
     with finishing():
         if plot is not None:
-            picture_verification(plot, model, verified)
+            picture_verification(plot, model, verified, recordings)
         model.save(output)
         if as_json:
             print_json(result)
@@ -107,6 +125,8 @@ def identify(
                 "seconds": f"{seconds:.2f}",
             }
         )
+        if beside:
+            print_beside(nrmse, model.n_parameters, seconds, others)
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:

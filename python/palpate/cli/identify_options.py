@@ -11,15 +11,15 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 
 import click
 
-from ..identification.options import IdentifyOptions
-from ..identification.stopping import CRITERIA
+from ..identification.options import WORDS, IdentifyOptions
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 HELP = {
-    "inputs": "auto, or names joined by commas, such as position,hysteresis.",
+    "inputs": "auto, or names joined by commas: position, then hysteresis, velocity or columns.",
     "max_wavelets": "Largest network tried.",
     "criterion": "When to stop adding wavelets.",
+    "selection": "How wavelets are taken from the frame.",
     "rung_evidence": "Fall of the criterion that a richer kind of model must show.",
     "patience": "Wavelets added without improvement before growth stops.",
     "refine": "Move and stretch the wavelets, or leave them on the frame.",
@@ -30,8 +30,14 @@ HELP = {
     "max_candidates": "Members of the frame at most.",
     "resolved_by": "Distinct positions that the core of a wavelet must hold.",
     "max_positions": "Distinct positions of a stroke beyond which they are binned.",
+    "loss": "Least squares, or rows far from the others weighed down.",
+    "filters": "matched, or the paper's figure 11 or 13 for comparison.",
+    "assumed_mass": "Mass of the paper's figures.",
+    "assumed_damping": "Damping of the paper's figure 13.",
     "hysteresis_nonnegative": "Impose that every loop loses energy.",
     "slope_bounds": "Least and largest slope imposed, in force per position.",
+    "monotone": "Impose that the force never falls with position.",
+    "fixed_force": "Position and force that the model goes through.",
     "coupling_stiffness": "Keep the slope below 0.9 of it, in force per position.",
     "play_radius": "Play radii tried without a direction, as shares of the travel, joined by commas.",
     "contact_share": "Share of the force range below which the force at the start counts as free contact.",
@@ -75,5 +81,5 @@ def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
         return click.option(flag, name, metavar="NUMBERS", callback=_numbers, **text)
     if len(kinds) == 1 and get_args(kinds[0]):
         return click.option(flag, name, type=float, nargs=len(get_args(kinds[0])), **text)
-    kind = click.Choice(list(CRITERIA)) if name == "criterion" else kinds[0]
+    kind = click.Choice(WORDS[name]) if name in WORDS else kinds[0]
     return click.option(flag, name, type=kind, **text)

@@ -17,6 +17,9 @@ _VERBS = {
     "verify": "Compare a model with a recording.",
     "simulate": "Render a model on a simulated device.",
     "render": "Render a model live, tick by tick.",
+    "record": "Record a real object.",
+    "devices": "List haptic devices.",
+    "check-device": "Measure for ten seconds whether a device is fit for it.",
     "show": "Print a model for a person.",
     "chart": "Draw the figures of the documentation.",
     "demo": "Identify, verify and render a simulated sample.",
@@ -33,7 +36,8 @@ class _LazyVerbs(Verbs):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _VERBS:
             return None
-        command = getattr(import_module(f".{cmd_name}", __package__), cmd_name)
+        name = cmd_name.replace("-", "_")
+        command = getattr(import_module(f".{name}", __package__), name)
         assert isinstance(command, click.Command)
         return command
 

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import InputError
 from .figures import figure_file
 from .output import number, print_table
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..model import Model
     from ..planning import Comparison, Plan
     from ..recording import Recording
@@ -62,9 +65,15 @@ def _is_simulated(recording: Recording) -> bool:
 
 
 def picture_verification(
-    path: Path, model: Model, verified: Sequence[tuple[Recording, Verification]]
+    path: Path,
+    model: Model,
+    verified: Sequence[tuple[Recording, Verification]],
+    identified_on: Sequence[Recording] = (),
 ) -> None:
-    """Measured and modelled force over position, residuals beneath; several recordings in one figure."""
+    """Measured and modelled force over position, residuals beneath; several recordings in one figure.
+
+    With the recordings that the model was identified on, its 95 % band is drawn too, where it is known.
+    """
     from ..plotting import draw_measured_and_modelled
     from ..recording import Recording
 
@@ -91,7 +100,24 @@ def picture_verification(
             modelled,
             one_curve=one_curve,
             seen="simulated data" if simulated else "measured",
+            standard_error=_standard_error(model, identified_on, recording),
         )
+
+
+def _standard_error(
+    model: Model, identified_on: Sequence[Recording], drawn: Recording
+) -> NDArray[np.float64] | None:
+    """Of the model's force at the rows that are drawn; None where it is not known."""
+    from ..verification import uncertainty
+
+    if not identified_on or (model.hysteretic and drawn.direction is None):
+        return None
+    try:
+        known = uncertainty(model, identified_on)
+    except InputError:
+        return None
+    stroke = None if drawn.direction is None else drawn.direction.astype(np.float64)
+    return known.force(drawn.position, stroke)
 
 
 def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from .arguments import PATH, ReadingOptions, columns_of, json_option, plot_option, reading_options
 from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import close_loops, picture_closed_loops, picture_verification, print_closed_loops
@@ -47,8 +47,8 @@ def verify(
         require_figure_name(figure)
         require_writable(figure, inputs=(model_file, recording_file))
     require_distinct(plot, plot_closed_loop)
-    recording = reading.read(recording_file)
     model = load_model(model_file)
+    recording = reading.read(recording_file, columns_of(model))
     verification = verify_model(model, recording)
     for note in verification.notes:
         talk(f"  {note}")

@@ -6,9 +6,11 @@ count, their mean force and the sum of squares within the group:
 sum_k (y_k - f(x))^2 = w (mean y - f(x))^2 + within.
 Positions that do not repeat are gathered in cells. The mean position and mean force of a cell are exact
 to second order (:func:`binning_error` is what is left), and the part of the within-sum that the slope
-across the cell explains is removed, so that what remains measures noise.
+across the cell explains is removed, so that what remains measures noise. With many inputs no grid of cells
+is both fine and small; then a share of the rows, evenly spread over the recording, stands for all.
 """
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +21,11 @@ from .._typing import Float1D, Float2D
 SIDE_LEVELS = 16
 """Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
 
-POOLED_CELLS = 5
-"""Neighbouring cells that share one slope."""
+POOLED_CELLS = 4
+"""Neighbouring cells that share one slope (2 per input where there are several)."""
+
+LEAST_PER_AXIS = 8
+"""Cells along each input below which gathering says too little of a force; rows are left out instead."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +40,12 @@ class Compressed:
     """(m,) samples that a row stands for"""
     side: Float1D | None
     """(m,) hysteresis input s in [-1, 1], or None"""
-    spread: Float1D
-    """(m,) variance of the position within a row, summed over the inputs; 0 where positions were equal"""
+    spread: Float2D
+    """(m, d) variance of the positions within a row; 0 where they were equal"""
     within: float
     """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
-    samples: int
-    """Rows of the recording"""
+    samples: float
+    """Rows of the recording that are stood for, or the sum of their weights"""
 
 
 class Compressor:
@@ -52,80 +57,124 @@ class Compressor:
     force : (n,)
     max_positions : int
         With more distinct positions than this they are gathered in that many cells of a regular grid.
+    weight : (n,), optional
+        Samples that each row stands for, >= 0; 1 without it. A row of weight 0 is no row.
+    within : float
+        Sum of squares about the rows themselves, where they stand for several samples.
     """
 
-    def __init__(self, positions: Float2D, force: Float1D, *, max_positions: int) -> None:
-        self._positions = positions
-        self._force = force
-        self._key, self._merged = _position_key(positions, max_positions)
+    def __init__(
+        self,
+        positions: Float2D,
+        force: Float1D,
+        *,
+        max_positions: int,
+        weight: Float1D | None = None,
+        within: float = 0.0,
+    ) -> None:
+        self._within = within
+        self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
+        """The rows that stand for all."""
+        self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
+        if 0 < self._per_axis < LEAST_PER_AXIS:
+            self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
+            self._key, self._per_axis = np.arange(max_positions), 0
+        self._positions = positions[self.kept]
+        self._force = force[self.kept]
+        self._weight = np.ones(len(self._force)) if weight is None else weight[self.kept]
 
-    def rows(self, side: Float1D | None = None) -> Compressed:
-        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart."""
+    @property
+    def rows_used(self) -> int:
+        """How many rows of the recording stand for all."""
+        return len(self._force)
+
+    def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
+        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart.
+
+        With only (n,), no more than these rows of the recording.
+        """
         key = self._key
+        if only is not None:
+            return self._part(only[self.kept]).rows(
+                None if side is None else side[self.kept][only[self.kept]]
+            )
         if side is not None:
+            side = side[self.kept]
             level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
             key = key + (int(key.max()) + 1) * level
-        group, count = _ranked(key)
-        x = np.column_stack([_mean(group, count, column) for column in self._positions.T])
-        y = _mean(group, count, self._force)
+        weight = self._weight
+        group, count = _ranked(key, weight)
+        x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
+        y = _mean(group, count, weight * self._force)
         dy = self._force - y[group]
-        within = float(dy @ dy)
-        spread = np.zeros(len(count))
-        if not self._merged:
+        within = self._within + float(dy @ (weight * dy))
+        spread = np.zeros_like(x)
+        if self._per_axis:
             dx = self._positions - x[group]
-            spread = _mean(group, count, np.einsum("nd,nd->n", dx, dx))
-            if self._positions.shape[1] == 1:
-                slope = self._slopes(dx[:, 0], dy)
-                within -= float(np.sum(slope * dx[:, 0] * (2.0 * dy - slope * dx[:, 0])))
-        merged_side = None if side is None else _mean(group, count, side)
-        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), len(self._force))
+            spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
+            within -= self._explained_by_slopes(dx, dy)
+        merged_side = None if side is None else _mean(group, count, weight * side)
+        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
 
-    def _slopes(self, dx: Float1D, dy: Float1D) -> Float1D:
-        """Slope of the force (n,) across each row's cell (d = 1), from deviations within the groups.
+    def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
+        """The same cells with fewer rows."""
+        part = copy(self)
+        part.kept = np.arange(np.count_nonzero(rows))
+        part._key, part._positions = self._key[rows], self._positions[rows]
+        part._force, part._weight = self._force[rows], self._weight[rows]
+        part._within = self._within * float(part._weight.sum() / self._weight.sum())
+        return part
+
+    def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:
+        """Part of the within-sum that slopes across the cells explain, from deviations within the groups.
 
         All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same few
         degrees of freedom.
         """
-        cell, count = _ranked(self._key)
-        window = np.ones(min(POOLED_CELLS, len(count)))
-        sxx = np.convolve(np.bincount(cell, dx * dx), window, "same")
-        sxy = np.convolve(np.bincount(cell, dx * dy), window, "same")
-        return np.asarray(np.divide(sxy, sxx, out=np.zeros_like(sxy), where=sxx > 0)[cell])
+        d = dx.shape[1]
+        grid = (self._per_axis,) * d
+        together = max(2, round(POOLED_CELLS ** (1.0 / d)))
+        pooled = np.array(np.unravel_index(self._key, grid)) // together
+        block, _ = _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)
+        products = [[np.bincount(block, self._weight * a * b) for b in (*dx.T, dy)] for a in dx.T]
+        table = np.array(products).transpose(2, 0, 1)
+        slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
+        return float(np.sum(slope * table[:, :, d]))
 
 
-def binning_error(rows: Compressed, curvature: Float1D) -> float:
-    """RMS error [force] that the cells put into a fit with second derivative curvature (m,) at the rows.
+def binning_error(rows: Compressed, curvature: Float2D) -> float:
+    """RMS error [force] that the cells put into a fit with second derivatives curvature (m, d) at the rows.
 
-    The mean of f over a cell differs from f at its mean position by f'' Var(x) / 2 to leading order.
+    The mean of f over a cell differs from f at its mean position by sum_j f_jj Var(x_j) / 2 to leading order.
     """
-    bias = 0.5 * curvature * rows.spread
+    bias = 0.5 * np.sum(curvature * rows.spread, axis=1)
     return float(np.sqrt(np.average(bias * bias, weights=rows.weight)))
 
 
-def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], bool]:
-    """Group number of each row, and whether the rows of a group have one and the same position."""
+def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], int]:
+    """Group number of each row, and the cells along each axis: 0 where a group is one position only."""
     d = positions.shape[1]
     if d == 1:
         distinct = np.unique(positions[:, 0])
         if len(distinct) <= max_positions:
-            return np.searchsorted(distinct, positions[:, 0]), True
+            return np.searchsorted(distinct, positions[:, 0]), 0
     else:
         rows, key = np.unique(positions, axis=0, return_inverse=True)
         if len(rows) <= max_positions:
-            return key.reshape(-1), True
+            return key.reshape(-1), 0
     per_axis = max(2, round(max_positions ** (1.0 / d)))
     low, reach = positions.min(axis=0), np.ptp(positions, axis=0)
     scale = np.divide(per_axis, reach, out=np.zeros_like(reach), where=reach > 0)
     cell = np.minimum((positions - low) * scale, per_axis - 1).astype(np.int64)
-    return np.ravel_multi_index(tuple(cell.T), (per_axis,) * d), False
+    return np.ravel_multi_index(tuple(cell.T), (per_axis,) * d), per_axis
 
 
-def _ranked(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], Float1D]:
-    """Group numbers without gaps (n,), and the rows of each group (groups,)."""
-    count = np.bincount(key)
+def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64], Float1D]:
+    """Group numbers without gaps (n,), and the weight of each group (groups,)."""
+    count = np.bincount(key, weight).astype(np.float64)
     rank = np.cumsum(count > 0) - 1
-    return rank[key], count[count > 0].astype(float)
+    return rank[key], np.asarray(count[count > 0], dtype=np.float64)
 
 
-def _mean(group: NDArray[np.int64], count: Float1D, values: Float1D) -> Float1D:
-    return np.asarray(np.bincount(group, values) / count)
+def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1D:
+    return np.asarray(np.bincount(group, weighted) / count)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constraints that hold over a whole domain: h >= 0 and slope bounds (one input).
+"""Constraints that hold over a whole domain: h >= 0 and slope bounds; a force fixed at a place (one input).
 
 Each is a bound on a *reading* of the network, a combination of its channels or the slope of one, at every
 position of the domain. The least squares is solved with the bound imposed where it was found violated.
@@ -29,6 +29,9 @@ from .separable import (
 
 MARGIN = 1e-2
 """A bound is imposed tighter than it is certified by this share of the RMS error, so that certifying ends."""
+
+POINT_TOLERANCE = 1e-9
+"""Share of the force's range by which a fixed force may be missed."""
 
 ROUNDS = 60
 """Rounds of imposing and certifying; what is left is mixed with a network that keeps all bounds."""
@@ -61,6 +64,8 @@ class Bound:
     limit: float
     unit: float
     """How much of the reading weighs as much as a force of 1: 1 for a force"""
+    at: float | None = None
+    """The only position where it holds [box]; None: everywhere"""
 
     def channels(self, problem: SeparableProblem) -> Float1D:
         """The reading as a combination of the problem's channels."""
@@ -68,11 +73,21 @@ class Bound:
 
 
 def domain_bounds(
-    problem: SeparableProblem, *, hysteresis: bool, slopes: tuple[float, float] | None
+    problem: SeparableProblem,
+    *,
+    hysteresis: bool,
+    slopes: tuple[float, float] | None,
+    fixed: tuple[float, float] | None = None,
 ) -> list[Bound]:
-    """The bounds in force: h >= 0, and (min, max) of the slope [force/box] of the strokes g + h and g - h."""
+    """The bounds in force: h >= 0, and (min, max) of the slope [force/box] of the strokes g + h and g - h.
+
+    With fixed, (position [box], force), g goes through that point: a bound from above and one from below.
+    """
     two = len(problem.readout) == 2
     bounds = []
+    if fixed is not None:
+        g = (1.0, 0.0) if two else (1.0,)
+        bounds += [Bound(g, False, "fixed force", sign, fixed[1], 0.0, fixed[0]) for sign in (1.0, -1.0)]
     if hysteresis and two:
         bounds.append(Bound((0.0, 1.0), False, "h >= 0", 1.0, 0.0, 1.0))
     for stroke in [(1.0, 1.0), (1.0, -1.0)] if two else [(1.0,)]:
@@ -97,13 +112,13 @@ def moved_to_bounds(
     grid = np.linspace(0.0, 1.0, GRID + 1)
     readings = problem.readout @ solution.coefficients @ _columns(solution.basis, False, grid).T
     before = readings.copy()
-    if any(not bound.of_slope for bound in bounds):
+    if any(not bound.of_slope and bound.at is None for bound in bounds):
         readings[1] = np.maximum(readings[1], 0.0)
     if any(bound.of_slope for bound in bounds):
         low = max([bound.limit for bound in bounds if bound.of_slope and bound.sign > 0], default=-np.inf)
         high = min([bound.limit for bound in bounds if bound.of_slope and bound.sign < 0], default=np.inf)
         mix = np.array([[1.0, 1.0], [1.0, -1.0]])[: len(readings), : len(readings)]
-        strokes = [_slope_limited(grid, stroke, low, high) for stroke in mix @ readings]
+        strokes = [slope_limited(grid, stroke, low, high) for stroke in mix @ readings]
         readings = np.linalg.solve(mix, np.array(strokes))
     shift = [np.interp(rows.positions[:, 0], grid, change) for change in readings - before]
     moved = rows.force + shift[0] + (shift[1] * rows.side if rows.side is not None else 0.0)
@@ -115,7 +130,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
 
     The free solution itself is returned if it keeps them.
     """
-    margin = MARGIN * problem.rmse(free)
+    margin = MARGIN * problem.resolved_rmse(free)
     rows: list[Float2D] = []
     limits: list[Float1D] = []
     current = free
@@ -140,6 +155,9 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
         reading = _columns(solution.basis, bound.of_slope, x) @ weights
         return np.asarray(bound.sign * (reading - bound.limit))
 
+    if bound.at is not None:
+        here = np.array([bound.at])
+        return here[excess(here) < -POINT_TOLERANCE * problem.force_range]
     edges = np.linspace(0.0, 1.0, CELLS + 1)
     left, right = edges[:-1], edges[1:]
     at_left, at_right = excess(edges)[:-1], excess(edges)[1:]
@@ -223,7 +241,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
     return np.asarray(start + step / norm).reshape(free.coefficients.shape)
 
 
-def _slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
+def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
     """The nearest force (k,) with slope within [low, high]: isotonic regressions in turn (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
@@ -254,6 +272,9 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
     }
     readings = np.zeros((len(problem.readout), solution.coefficients.shape[1]))
     readings[0, 1] = inside[bool(lows), bool(highs)]
+    for bound in bounds:
+        if bound.at is not None:
+            readings[0, 0] = bound.limit - readings[0, 1] * bound.at
     readings[1:, 0] = problem.force_range
     safe = np.linalg.solve(problem.readout, readings)
     refused, kept = 0.0, 1.0

@@ -91,24 +91,31 @@ def truncated_frame(
     """Members of the single-scaling frame that have data within them, from coarsest to finest.
 
     Each level's translations are found by walking from the data to the lattice points around it, so that the
-    full grid, whose size grows exponentially with the inputs, is never built. A level that would bring more
-    than max_candidates members is left out: refinement reaches what is finer.
+    full grid, whose size grows exponentially with the inputs, is never built. From the first level that would
+    bring more than max_candidates members on, only those at lattice points that most data are nearest to are
+    taken, and finer levels are left out: refinement reaches what is finer.
 
     positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
     """
     d = positions.shape[1]
-    offsets = np.array(list(product((-1, 0, 1), repeat=d)))
+    # around a lattice point stand 3^d others: beyond three inputs only those along an input are walked to
+    around = product((-1, 0, 1), repeat=d) if d <= 3 else (*np.eye(d), *-np.eye(d), np.zeros(d))
+    offsets = np.array(list(around), dtype=np.int64)
     alpha: list[Float2D] = []
     beta: list[Float2D] = []
-    dilation = coarsest
-    while dilation <= finest:
+    left, dilation = max_candidates, coarsest
+    while dilation <= finest and left > 0:
         step = frame_step / dilation
-        nearest = np.unique(np.rint(positions / step).astype(np.int64), axis=0)
-        lattice = np.unique((nearest[:, None, :] + offsets).reshape(-1, d), axis=0)
-        if sum(len(level) for level in beta) + len(lattice) > max_candidates:
-            break
+        nearest, count = np.unique(np.rint(positions / step).astype(np.int64), axis=0, return_counts=True)
+        if len(nearest) <= left:
+            lattice = np.unique((nearest[:, None, :] + offsets).reshape(-1, d), axis=0)
+            if len(lattice) > left:
+                lattice = nearest
+        else:
+            lattice = nearest[np.argsort(-count, kind="stable")[:left]]
         beta.append(lattice * step)
         alpha.append(np.full((len(lattice), d), dilation))
+        left -= len(lattice)
         dilation *= frame_scale
     if not alpha:
         return Basis.empty(d)

@@ -10,11 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._typing import Float1D
+from ..errors import InputError
+from .fresh import FreshRows
 from .options import IdentifyOptions
 from .refinement import refine
-from .selection import Library, OrthogonalSelection
-from .separable import Basis, SeparableProblem, Solution
-from .stopping import CRITERIA, deviance
+from .selection import Library, OrthogonalSelection, residual_gains, select_backward
+from .separable import TINY, Basis, SeparableProblem, Solution
+from .stopping import CRITERIA, ON_FRESH_ROWS, choice, deviance, enough
 
 PRUNE_CANDIDATES = 3
 """Wavelets tried for removal before pruning gives up."""
@@ -53,7 +56,18 @@ class Grown:
 def judge(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
     """Criterion of a solution: the smaller the better."""
     p = problem.n_parameters(len(solution.basis))
-    return deviance(options.criterion, problem.total(solution.rss), problem.samples, p)
+    if options.criterion not in ON_FRESH_ROWS:
+        return deviance(options.criterion, problem.total(solution.rss), problem.samples, p)
+    if problem.fresh is None:
+        raise InputError(f"criterion is {options.criterion!r}, but no rows were kept back to judge on")
+    return fresh_deviance(options.criterion, problem.fresh, problem.fresh_errors(solution, problem.fresh))
+
+
+def fresh_deviance(criterion: str, fresh: FreshRows, errors: Float1D) -> float:
+    """Criterion of a network that leaves these errors on rows that were kept back."""
+    counted = fresh.felt(errors) if criterion == "perceptual" else errors
+    smallest = (1e-12 * float(np.ptp(fresh.force))) ** 2 * len(counted)
+    return deviance(criterion, max(float(counted @ counted), smallest, TINY), len(counted), 0)
 
 
 def grow(
@@ -62,30 +76,49 @@ def grow(
     """Grow from the wavelets of start until the criterion stops it, prune, refine to the end.
 
     Growth goes on for `patience` wavelets past the best size, and pruning starts from there: a few wavelets
-    too many let refinement find a better arrangement of those that stay.
+    too many let refinement find a better arrangement of those that stay. Where fresh rows judge, the size is
+    theirs to choose and nothing is pruned.
     """
     problem.set_prior(problem.solve(start).rss)
+    if options.selection == "backward":
+        start = _eliminated(problem, library, start, options)
     current = _improved(problem, problem.solve(start), options.refine_steps, options)
-    path = [_point(problem, current, rung, options)]
+    path, grown = [_point(problem, current, rung, options)], [current]
     best, since, stop_reason = path[0].criterion, 0, "max_wavelets"
     while len(current.basis) < options.max_wavelets:
-        added = _with_best_candidate(problem, library, current)
+        if enough(options.criterion, path[-1].criterion) or options.selection == "backward":
+            stop_reason = options.criterion
+            break
+        added = _with_best_candidate(problem, library, current, options)
         if added is None:
             stop_reason = "data"
             break
         current = _improved(problem, added, options.refine_steps, options)
         path.append(_point(problem, current, rung, options))
+        grown.append(current)
         since = 0 if path[-1].criterion < best else since + 1
         best = min(best, path[-1].criterion)
         if since >= options.patience:
             stop_reason = options.criterion
             break
-    pruned = prune(problem, current, options)
+    if problem.fresh is not None and options.criterion in ON_FRESH_ROWS:
+        values = [point.criterion for point in path]
+        pruned = grown[choice(options.criterion, values, len(problem.fresh.force))]
+    else:
+        pruned = prune(problem, current, options)
     final = _improved(problem, pruned, options.final_steps, options, tolerance=FINAL_TOLERANCE)
     path.append(_point(problem, final, rung, options))
     if len(final.basis) < options.max_wavelets and stop_reason == "max_wavelets":
         stop_reason = options.criterion
     return Grown(final, path[-1].criterion, stop_reason, tuple(path))
+
+
+def _eliminated(problem: SeparableProblem, library: Library, start: Basis, options: IdentifyOptions) -> Basis:
+    """The wavelets of start, and those that backward elimination leaves of the library."""
+    selected = select_backward(
+        problem, library, max_wavelets=options.max_wavelets, criterion=options.criterion
+    )
+    return start.joined(library.members(selected.order[: selected.best]))
 
 
 def prune(problem: SeparableProblem, start: Solution, options: IdentifyOptions) -> Solution:
@@ -114,16 +147,20 @@ def _price(problem: SeparableProblem, solution: Solution, options: IdentifyOptio
     )
 
 
-def _with_best_candidate(problem: SeparableProblem, library: Library, current: Solution) -> Solution | None:
+def _with_best_candidate(
+    problem: SeparableProblem, library: Library, current: Solution, options: IdentifyOptions
+) -> Solution | None:
     """The network with the frame member that helps most, or None where data allow no further wavelet."""
     if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.samples:
         return None
-    gains = OrthogonalSelection(library, current).gains()
+    if options.selection == "residual":
+        gains = residual_gains(library, current)
+    else:
+        gains = OrthogonalSelection(library, current).gains()
     index = int(np.argmax(gains))
     if gains[index] <= 0.0:
         return None
-    chosen = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
-    return problem.solve(current.basis.joined(chosen))
+    return problem.solve(current.basis.joined(library.members([index])))
 
 
 def _improved(

@@ -15,6 +15,8 @@ from .separable import Solution
 class IdentifiedNetwork:
     """An identified force law f = g(x) + s h(x), and how it came about."""
 
+    inputs: tuple[str, ...]
+    """(d,) names"""
     alpha: Float2D
     """(N, d) dilations [1/position]"""
     beta: Float2D
@@ -40,12 +42,16 @@ class IdentifiedNetwork:
     """"linear\""""
     play_radius: float | None
     """[position], where the play operator gave the hysteresis input"""
+    mass: float | None
+    """m of F = m a + B v + f, where it was fitted [force/position s^2]"""
+    damping: float | None
+    """B, where it was fitted [force/position s]"""
     rung: str
-    """constant, linear, position or hysteresis"""
+    """constant, linear, position, hysteresis, velocity, mass and damping; network over several inputs"""
     stop_reason: str
     """The criterion that stopped growth, "max_wavelets", or "data" where they allowed no further wavelet"""
     n_parameters: int
-    """Fitted numbers, the play radius included"""
+    """Fitted numbers, the play radius, mass and damping included"""
     rmse: float
     """On the samples of the identification [force]"""
     nrmse: float

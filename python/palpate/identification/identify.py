@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """identify: from recordings to a model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
 from ..recording import Recording, Source
+from .environment import VELOCITY_INPUTS, fit_environment
 from .identified import IdentifiedNetwork
-from .ladder import fit_environment
+from .inputs import observations
 from .options import IdentifyOptions, options_from
 
 
 def identify(recording: Recording | Sequence[Recording], **options: Any) -> Model:
     """Identify the environment behind recorded force over position.
 
-    Climbs the ladder constant, linear, position, hysteresis, as far as each rung earns its place.
+    Climbs the ladder constant, linear, position, hysteresis, as far as each rung earns its place. A recording
+    with further inputs gives a force of them all (constant, linear, network).
 
     Parameters
     ----------
@@ -48,28 +49,33 @@ def identify(recording: Recording | Sequence[Recording], **options: Any) -> Mode
             raise InputError(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify them apart"
             )
-    positions = np.concatenate([part.position for part in recordings])[:, None]
-    force = np.concatenate([part.force for part in recordings])
-    side, starts = None, None
-    if all(part.direction is not None for part in recordings):
-        side = np.concatenate([np.asarray(part.direction, dtype=float) for part in recordings])
-    elif all(part.time is not None for part in recordings):
-        starts = np.concatenate([[0], np.cumsum([len(part.position) for part in recordings])[:-1]]).tolist()
+    seen = observations(recordings, settings)
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
-        network = fit_environment(positions, force, side, settings, starts=starts)
-    return _model_of(network, recordings, settings)
+        network = fit_environment(
+            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
+        )
+    source = Source.merged(part.source for part in recordings)
+    return model_of(network, recordings[0].units, source, settings, seen.notes)
 
 
-def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> Model:
+def model_of(
+    network: IdentifiedNetwork,
+    units: Mapping[str, str],
+    source: Source,
+    options: IdentifyOptions,
+    notes: Sequence[str] = (),
+) -> Model:
+    """The model of an identified network."""
+    notes = [*notes, *network.notes]
     path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
     ]
     return Model(
-        kind="hysteresis" if network.weight_hysteresis is not None else "position",
-        inputs=("position",),
-        units=recordings[0].units,
+        kind=_kind(network),
+        inputs=network.inputs,
+        units=units,
         alpha=network.alpha,
         beta=network.beta,
         weight=network.weight,
@@ -84,6 +90,8 @@ def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], optio
         above=network.above,
         period=options.period,
         play_radius=network.play_radius,
+        mass=network.mass if options.filters == "matched" else options.assumed_mass,
+        damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
         fit=Fit(
             rung=network.rung,
             stop_reason=network.stop_reason,
@@ -92,6 +100,12 @@ def _model_of(network: IdentifiedNetwork, recordings: Sequence[Recording], optio
             n_parameters=network.n_parameters,
             path=path,
         ),
-        data=Source.merged(part.source for part in recordings),
-        notes={"identification": list(network.notes)} if network.notes else None,
+        data=source,
+        notes={"identification": notes} if notes else None,
     )
+
+
+def _kind(network: IdentifiedNetwork) -> str:
+    if len(network.inputs) == 1:
+        return "hysteresis" if network.weight_hysteresis is not None else "position"
+    return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

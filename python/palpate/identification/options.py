@@ -9,8 +9,16 @@ from typing import Any
 from ..errors import InputError
 from .stopping import CRITERIA
 
-LADDER_INPUTS = ("position", "hysteresis")
-"""What the ladder can take as inputs, in its order."""
+RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
+"""What `inputs` may hold beside the names of columns."""
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "criterion": tuple(CRITERIA),
+    "selection": ("orthogonal", "residual", "backward"),
+    "loss": ("squares", "huber"),
+    "filters": ("matched", "paper-implicit", "paper-explicit"),
+}
+"""Settings that are words, and what each may be."""
 
 COUPLING_SHARE = 0.9
 """Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
@@ -27,11 +35,14 @@ class IdentifyOptions:
     """
 
     inputs: str | tuple[str, ...] = "auto"
-    """"auto": the ladder decides. Or names, as a tuple or with commas between: the rung is then given."""
+    """"auto": the ladder decides, over the position and the recording's further inputs. Or names, as a tuple
+    or with commas between: position, then hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"
-    """Stopping rule: bic, aicc, gcv or fpe"""
+    """Stopping rule: bic, aicc, gcv, fpe, or on rows kept back: fresh, perceptual"""
+    selection: str = "orthogonal"
+    """How wavelets are taken from the frame: orthogonal, residual or backward"""
     rung_evidence: float = 10.0
     """Fall of the criterion that a more complex rung must show; 10 is called very strong evidence [-]"""
     patience: int = 3
@@ -51,11 +62,24 @@ class IdentifyOptions:
     resolved_by: int = 7
     """Distinct positions, on every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]"""
     max_positions: int = 1024
-    """Distinct positions that are kept apart; more of them are gathered in as many cells [-]"""
+    """Distinct positions that are kept apart, twice as many for each further input; more are gathered in as
+    many cells [-]"""
+    loss: str = "squares"
+    """squares, or huber: rows far from the others pull no more than the others do"""
+    filters: str = "matched"
+    """matched, or as published: paper-implicit (figure 11), paper-explicit (figure 13)"""
+    assumed_mass: float = 1e-3
+    """m of the paper's figures [force/position s^2]"""
+    assumed_damping: float = 0.5
+    """B_o of its figure 13 [force/position s]"""
     hysteresis_nonnegative: bool = True
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
     """(min, max) of df/dx, imposed over the domain [force/position]"""
+    monotone: bool = False
+    """Impose df/dx >= 0 over the domain"""
+    fixed_force: tuple[float, float] | None = None
+    """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
     coupling_stiffness: float | None = None
     """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
@@ -69,12 +93,14 @@ class IdentifyOptions:
         if self.inputs != "auto":
             names = self.inputs.split(",") if isinstance(self.inputs, str) else self.inputs
             object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
-            if "position" not in self.inputs or not set(self.inputs) <= set(LADDER_INPUTS):
+            if "position" not in self.inputs or "" in self.inputs or len(set(self.inputs)) < len(self.inputs):
                 raise InputError(
-                    f'inputs is {",".join(self.inputs)!r}; use "auto", "position" or "position,hysteresis"'
+                    f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
+                    "depends on: hysteresis, velocity, columns"
                 )
-        if self.criterion not in CRITERIA:
-            raise InputError(f"criterion is {self.criterion!r}; it must be one of {', '.join(CRITERIA)}")
+        for name, words in WORDS.items():
+            if getattr(self, name) not in words:
+                raise InputError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(words)}")
         for name, least in _WHOLE_NUMBERS.items():
             value = getattr(self, name)
             if not isinstance(value, int) or isinstance(value, bool) or value < least:
@@ -87,8 +113,10 @@ class IdentifyOptions:
 
     @property
     def slope_limits(self) -> tuple[float, float] | None:
-        """Both slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
+        """All slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
         low, high = self.slope_bounds or (-math.inf, math.inf)
+        if self.monotone:
+            low = max(low, 0.0)
         if self.coupling_stiffness is not None:
             high = min(high, COUPLING_SHARE * self.coupling_stiffness)
         return None if math.isinf(low) and math.isinf(high) else (low, high)
@@ -102,9 +130,12 @@ class IdentifyOptions:
         limits = self.slope_limits
         if limits is not None and not limits[0] < limits[1]:
             raise InputError(
-                f"slope_bounds asks for a slope of {limits[0]:g} or more, but coupling_stiffness "
-                f"{self.coupling_stiffness:g} allows no more than {limits[1]:g}"
+                f"slope_bounds, monotone and coupling_stiffness ask for a slope of {limits[0]:g} or more, "
+                f"but allow no more than {limits[1]:g}"
             )
+        fixed: tuple[float, ...] | None = self.fixed_force
+        if fixed is not None and not (len(fixed) == 2 and all(map(math.isfinite, fixed))):
+            raise InputError(f"fixed_force is {self.fixed_force!r}; it must be (position, force)")
 
 
 _WHOLE_NUMBERS = {
@@ -123,6 +154,8 @@ _NUMBERS = {
     "frame_scale": 1.0,
     "frame_step": 0.0,
     "contact_share": -math.inf,
+    "assumed_mass": 0.0,
+    "assumed_damping": 0.0,
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forward orthogonal least squares over a library of wavelets (Chen, Billings & Luo 1989; Zhang 1997).
+"""Selection from a library: forward orthogonal, residual-based, backward elimination (Zhang 1997).
+
+Forward orthogonal least squares (Chen, Billings & Luo 1989) asks what a candidate adds to those before it.
 
 Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates
 the projections of all others by one product with its orthonormalised columns. Linear and bias columns are
 always in. A candidate that the design already spans is never taken, so the factors stay well conditioned.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +38,11 @@ class Library:
 
     def __len__(self) -> int:
         return len(self.basis)
+
+    def members(self, order: Sequence[int]) -> Basis:
+        """The candidates of these numbers."""
+        chosen = list(order)
+        return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
 
 
 class OrthogonalSelection:
@@ -92,9 +100,22 @@ class OrthogonalSelection:
         return rss
 
 
+def residual_gains(library: Library, current: Solution) -> Float1D:
+    """(candidates,) fall of the residual sum of squares if a candidate were fitted to the residual alone.
+
+    What the candidate shares with the network is not taken out of it first: cheaper, and less sharp.
+    """
+    total = np.zeros(len(library))
+    for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
+        product = np.array([residual @ column for column in columns])
+        inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=DEPENDENT, hermitian=True)
+        total += np.einsum("kn,nkj,jn->n", product, inverse, product)
+    return total
+
+
 @dataclass(frozen=True)
 class SelectionPath:
-    """A whole forward selection: chosen candidates in their order, and the error and criterion after each."""
+    """A whole selection: candidates in their order, and the error and criterion of the first 0, 1, ..."""
 
     order: tuple[int, ...]
     rss: tuple[float, ...]
@@ -103,11 +124,21 @@ class SelectionPath:
     best: int
     """Number of wavelets with the smallest criterion"""
 
+    @staticmethod
+    def judged(
+        problem: SeparableProblem, order: Sequence[int], rss: Sequence[float], criterion: str
+    ) -> "SelectionPath":
+        values = [
+            deviance(criterion, total, problem.samples, problem.n_parameters(n))
+            for n, total in enumerate(rss)
+        ]
+        return SelectionPath(tuple(order), tuple(rss), tuple(values), int(np.argmin(values)))
+
 
 def select_forward(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
 ) -> SelectionPath:
-    """Select wavelets one by one from the library, up to max_wavelets; judge each size by the criterion."""
+    """Forward orthogonal: at every step the wavelet that lowers the error most, up to max_wavelets."""
     start = problem.solve(Basis.empty(problem.dimension))
     selection = OrthogonalSelection(library, start)
     order: list[int] = []
@@ -118,10 +149,44 @@ def select_forward(
             break
         order.append(int(np.argmax(gains)))
         errors.append(problem.total(selection.take(order[-1])))
-    judged = [
-        deviance(criterion, rss, problem.samples, problem.n_parameters(n)) for n, rss in enumerate(errors)
-    ]
-    return SelectionPath(tuple(order), tuple(errors), tuple(judged), int(np.argmin(judged)))
+    return SelectionPath.judged(problem, order, errors, criterion)
+
+
+def select_by_residual(
+    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
+) -> SelectionPath:
+    """Residual-based: at every step the wavelet that fits what is left best; then all weights anew."""
+    current = problem.solve(Basis.empty(problem.dimension))
+    order: list[int] = []
+    errors = [problem.total(current.rss)]
+    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.samples:
+        gains = residual_gains(library, current)
+        gains[order] = 0.0
+        if len(gains) == 0 or gains.max() <= 0.0:
+            break
+        order.append(int(np.argmax(gains)))
+        current = problem.solve(library.members(order))
+        errors.append(problem.total(current.rss))
+    return SelectionPath.judged(problem, order, errors, criterion)
+
+
+def select_backward(
+    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
+) -> SelectionPath:
+    """Backward elimination: from max_wavelets down, always the wavelet whose loss costs least.
+
+    A whole library has more members than data can tell apart, so it starts from what forward selection takes.
+    """
+    forward = select_forward(problem, library, max_wavelets=max_wavelets, criterion=criterion)
+    left = list(forward.order)
+    current = problem.solve(library.members(left))
+    order: list[int] = []
+    errors = [problem.total(current.rss)]
+    while left:
+        order.append(left.pop(int(np.argmin(problem.removal_costs(current)))))
+        current = problem.solve(library.members(left))
+        errors.append(problem.total(current.rss))
+    return SelectionPath.judged(problem, order[::-1], errors[::-1], criterion)
 
 
 def _projected_gram(shadows: list[Float2D]) -> Float2D:

@@ -21,9 +21,14 @@ from scipy.spatial import cKDTree
 from .. import _core
 from .._typing import Float1D, Float2D
 from .compression import Compressed
+from .fresh import FreshRows
 
 RIDGE = 1e-11
 """Relative ridge on unit-norm columns: keeps a nearly dependent basis solvable, far below any noise."""
+
+RESOLVED = 2.0**-16
+"""Share of the force's range below which no error counts: one step of a 16-bit converter. What was rendered
+and recorded has no noise at all, and a criterion would ask for wavelets down to the last digit of it."""
 
 CORE = float(np.sqrt(3.0))
 """|u| of a wavelet's side lobe: what lies within is the core that data must resolve."""
@@ -107,6 +112,8 @@ class SeparableProblem:
         Largest less smallest force, above 0.
     resolved_by : int
         Distinct positions of every block that a wavelet's core must hold.
+    fresh : FreshRows, optional
+        Rows kept back, for the criteria that judge on them.
     """
 
     def __init__(
@@ -114,11 +121,13 @@ class SeparableProblem:
         blocks: Sequence[Block],
         readout: Float2D,
         *,
-        samples: int,
+        samples: float,
         within: float,
         force_range: float,
         resolved_by: int,
+        fresh: FreshRows | None = None,
     ) -> None:
+        self.fresh = fresh
         self.blocks = tuple(blocks)
         self.readout = readout
         self.samples = samples
@@ -136,12 +145,20 @@ class SeparableProblem:
         return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
 
     def total(self, rss: float) -> float:
-        """Error over all samples [force^2]; never quite zero, so that noise-free data has a logarithm."""
-        return max(rss + self.within, (1e-12 * self.force_range) ** 2 * self.samples, TINY)
+        """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
+        return max(rss + self.within, (RESOLVED * self.force_range) ** 2 * self.samples, TINY)
 
     def rmse(self, solution: Solution) -> float:
         """Root mean square error over all samples [force]."""
+        return float(np.sqrt((solution.rss + self.within) / self.samples))
+
+    def resolved_rmse(self, solution: Solution) -> float:
+        """The same, but never less than a sensor resolves: what other errors are measured by."""
         return float(np.sqrt(self.total(solution.rss) / self.samples))
+
+    def fresh_errors(self, solution: Solution, fresh: FreshRows) -> Float1D:
+        """Force less the solution's at rows that the problem was not made of."""
+        return fresh.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
 
     def set_prior(self, rss: float) -> None:
         """Expect each weight within the force range, as firmly as one sample at this noise would say it.
@@ -228,7 +245,7 @@ class SeparableProblem:
         return np.asarray(gram)
 
 
-def problem_of(rows: Compressed, *, resolved_by: int) -> SeparableProblem:
+def problem_of(rows: Compressed, *, resolved_by: int, fresh: FreshRows | None = None) -> SeparableProblem:
     """The problem of compressed rows (positions in the unit box): one channel, two strokes, or 1 and s."""
     if rows.side is None:
         blocks = [Block.weighted(rows.positions, rows.force, rows.weight, np.ones((len(rows.force), 1)))]
@@ -250,6 +267,7 @@ def problem_of(rows: Compressed, *, resolved_by: int) -> SeparableProblem:
         within=rows.within,
         force_range=float(np.ptp(rows.force)) or float(np.abs(rows.force).max()) or 1.0,
         resolved_by=resolved_by,
+        fresh=fresh,
     )
 
 

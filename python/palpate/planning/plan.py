@@ -1,21 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plan: how a model is to be rendered."""
+"""Plan: how a model is rendered, and what is proved of that."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
-from .._core import DeviceProfile, Scheme
+from .. import _core
+from .._core import Certificate, DeviceProfile, Scheme
 from ..errors import InputError
 from ..model import Model
+from ..model.certified import certificate_record, checked_certificate, scheme_of
+from .slope_limit import Loss
+
+_FORCE_UNIT = {"rad": "N*m", "m": "N"}
 
 
 @dataclass(frozen=True)
 class Plan:
     """A model, and the structure and numbers with which it is rendered.
 
-    Nothing here is chosen or proved: a plan states what its author wants, and `certificate` is None until
-    something has certified it for a device.
+    Made by hand, a plan states what its author wants, and nothing is proved; :func:`palpate.plan` chooses one
+    for a device and certifies it.
 
     Raises
     ------
@@ -24,10 +30,14 @@ class Plan:
     """
 
     model: Model
+    """What is rendered: where the device is too weak, the identified model with its slopes limited"""
     scheme: Scheme
-    certificate: None = None
+    certificate: Certificate | None = None
+    """What was proved, and for which device; None where nothing was looked at"""
     refused: tuple[str, ...] = ()
-    """Simpler structures that were refused, each with its reason."""
+    """Simpler structures that were refused, each with the inequality that failed and by how much"""
+    loss: Loss | None = None
+    """How far `model` is from the identified one; None where it is the identified one"""
 
     def __post_init__(self) -> None:
         if self.model.units["force"] == "A":
@@ -38,23 +48,79 @@ class Plan:
 
     @property
     def structure(self) -> str:
-        """direct, massless, implicit or explicit."""
+        """direct, massless, implicit, explicit or energy-consistent."""
         return self.scheme.structure
 
     @property
     def solver(self) -> str | None:
-        """How the load line is solved; None where there is nothing to solve."""
-        return "newton" if self.structure in ("massless", "implicit") else None
+        """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
+        return _core.solver_name(self.model, self.scheme, DeviceProfile().period_s)
 
-    def check_for(self, device: DeviceProfile) -> None:
-        """Refuse what is sure to diverge on this device.
+    @classmethod
+    def of(cls, model: Model) -> Plan:
+        """The plan that stands in a model file, with its certificate.
 
         Raises
         ------
         InputError
-            The explicit structure's slope limit is not above the model's steepest slope.
+            There is none.
+        """
+        if model.plan is None:
+            raise InputError("the model has no plan; make one with palpate plan")
+        certificate = None
+        if model.certificate is not None:
+            certificate = checked_certificate(model, model.plan, model.certificate)
+        loss = model.plan["loss"]
+        return cls(
+            model,
+            scheme_of(model.plan),
+            certificate,
+            tuple(model.plan["refused"]),
+            None if loss is None else Loss(**loss),
+        )
+
+    def stored(self) -> Model:
+        """The model with this plan and its certificate in it, ready to be saved."""
+        content = self.model.to_dict()
+        content["plan"] = self.record()
+        content["certificate"] = None if self.certificate is None else certificate_record(self.certificate)
+        return Model.from_dict(content)
+
+    def record(self) -> dict[str, Any]:
+        """The plan as it stands in a model file."""
+        scheme = self.scheme
+        coupled, heavy = self.structure != "direct", self.structure not in ("direct", "massless")
+        return {
+            "structure": scheme.structure,
+            "solver": self.solver,
+            "coupling": {"stiffness": scheme.coupling_stiffness, "damping": scheme.coupling_damping}
+            if coupled
+            else None,
+            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if heavy else None,
+            "compensated": scheme.compensated,
+            "play_radius": scheme.play_radius or None,
+            "refused": list(self.refused),
+            "loss": None if self.loss is None else {"largest": self.loss.largest, "rms": self.loss.rms},
+        }
+
+    def certified_for(self, device: DeviceProfile) -> Plan:
+        """The same plan with what is proved of it on a device, whatever that is."""
+        return replace(self, certificate=_core.certify(self.model, self.scheme, device))
+
+    def check_for(self, device: DeviceProfile) -> None:
+        """Refuse what is sure to diverge on this device, and a device that the certificate is not for.
+
+        Raises
+        ------
+        InputError
+            The explicit structure's slope limit is not above the model's steepest slope, or the certificate
+            is for another device; the message names what differs.
         """
         self._validate(device.period_s)
+        if self.certificate is not None:
+            wrong = _core.device_difference(self.certificate.device, device)
+            if wrong:
+                raise InputError(wrong)
 
     def _validate(self, period_s: float | None) -> None:
         try:
@@ -63,3 +129,87 @@ class Plan:
             raise
         except ValueError as error:
             raise InputError(str(error)) from None
+
+
+def plan(
+    model: Model,
+    device: DeviceProfile,
+    *,
+    coupling: bool = False,
+    coupling_stiffness: float | None = None,
+    coupling_damping: float | None = None,
+    mass: float | None = None,
+    damping: float | None = None,
+    play_radius: float | None = None,
+) -> Plan:
+    """Choose the simplest structure that is certified for a model on a device.
+
+    Direct; direct with the slope limited to what the device can render; massless behind a coupling, when one
+    is asked for; implicit, when the object has mass or dynamics, energy-consistent where it falls too steeply
+    for that; explicit, which is stable at best. What is not given is chosen from the device.
+
+    Parameters
+    ----------
+    model : Model
+        A model of one position; a plan that stands in it is ignored.
+    device : DeviceProfile
+        In the model's unit.
+    coupling : bool
+        Render through a virtual coupling, also where that is not needed.
+    coupling_stiffness, coupling_damping : float, optional
+        K_c and B_c [force/position, force*s/position]; either asks for a coupling.
+    mass, damping : float, optional
+        Of the object [force*s^2/position, force*s/position]; the model's own where not given, and 0 leaves
+        them out.
+    play_radius : float, optional
+        r of a model with hysteresis [position].
+
+    Returns
+    -------
+    Plan
+        Its certificate says what was proved. Where no structure holds, it is the last that was tried, and
+        ``plan.certificate.refused`` is true.
+
+    Raises
+    ------
+    InputError
+        The model cannot be rendered at all, or not on a device of this unit.
+    """
+    from .rungs import RUNGS, Wishes
+
+    unit = model.units["position"]
+    if unit not in ("", device.position_unit):
+        raise InputError(
+            f"the device {device.id} moves in {device.position_unit}, the model in {unit}; "
+            f"a force over {unit} needs a device whose position_unit is {unit}"
+        )
+    if model.units["force"] not in ("", _FORCE_UNIT[device.position_unit], "A"):
+        raise InputError(
+            f"the device {device.id} makes {_FORCE_UNIT[device.position_unit]}, the model's force is in "
+            f"{model.units['force']}"
+        )
+    content = model.to_dict()
+    content.update(plan=None, certificate=None)
+    wishes = Wishes(
+        coupling=coupling or coupling_stiffness is not None or coupling_damping is not None,
+        coupling_stiffness=coupling_stiffness,
+        coupling_damping=coupling_damping,
+        mass=model.mass if mass is None else mass,
+        damping=model.damping if damping is None else damping,
+        play_radius=play_radius,
+    )
+    bare = Model.from_dict(content)
+    refused: list[str] = []
+    last: Plan | None = None
+    for name, rung in RUNGS.items():
+        outcome = rung(bare, device, wishes)
+        if isinstance(outcome, str):
+            refused.append(f"{name}: {outcome}")
+            continue
+        last = replace(outcome, refused=tuple(refused))
+        assert outcome.certificate is not None
+        if not outcome.certificate.refused:
+            return last
+        refused.append(f"{name}: {outcome.certificate.why}")
+    assert last is not None  # the explicit rung always proposes something
+    return replace(last, refused=tuple(refused))

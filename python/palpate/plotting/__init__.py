@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures: one function each, drawing on axes that the caller made. Only the command line needs them."""
 
+from .failure_maps import MeasuredLimit, draw_failure_map
 from .measured_and_modelled import draw_measured_and_modelled
 from .real_against_rendered import draw_real_against_rendered
 from .speed import RenderedForce, WorkPrecision, draw_rendered_force, draw_work_precision
@@ -8,8 +9,10 @@ from .structures import draw_structures
 from .two_models import draw_two_models
 
 __all__ = [
+    "MeasuredLimit",
     "RenderedForce",
     "WorkPrecision",
+    "draw_failure_map",
     "draw_measured_and_modelled",
     "draw_real_against_rendered",
     "draw_rendered_force",

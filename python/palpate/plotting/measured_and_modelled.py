@@ -23,6 +23,7 @@ def draw_measured_and_modelled(
     *,
     one_curve: bool = True,
     seen: str = "measured",
+    standard_error: Float1D | None = None,
 ) -> None:
     """Measured and modelled force over position, residuals beneath; press and release told apart.
 
@@ -39,6 +40,8 @@ def draw_measured_and_modelled(
         on the motion before, and is drawn in the order of the recording.
     seen : str
         What the recording's force is called.
+    standard_error : (n,) array, optional
+        Of the model's force at each row; drawn as a 95 % band about zero residual, in front of the dots.
     """
     residual = recording.force - modelled
     told_apart = strokes(recording.direction, len(recording))
@@ -65,8 +68,20 @@ def draw_measured_and_modelled(
             linestyle=_LINES[name],
             label=f"model{suffix}",
         )
+        if standard_error is not None:
+            _draw_band(residual_axes, recording.position[rows], 2.0 * standard_error[rows], _LINES[name])
     label_force(force_axes, recording.units)
     force_axes.legend(frameon=False)
     residual_axes.axhline(0.0, color="black", linewidth=0.6)
     label_position(residual_axes, recording.units)
     residual_axes.set_ylabel(label("residual", recording.units["force"]))
+    if standard_error is not None:
+        residual_axes.set_title("lines: 95 % band of the model", loc="right", color="0.3")
+
+
+def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
+    """The edges of a band about zero: lines stay visible in front of dots, in black and white too."""
+    order = np.argsort(position, kind="stable")
+    at, width = thinned(position[order], half[order])
+    for edge in (width, -width):
+        axes.plot(at, edge, color="black", linewidth=0.7, linestyle=line)

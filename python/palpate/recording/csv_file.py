@@ -8,6 +8,7 @@ import io
 import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
+from .file_bytes import FileBytes
 from .table import MISSING, Cells, parse_number, to_numbers
 
 _CHUNK_ROWS = 1_000_000
@@ -63,7 +65,7 @@ class CsvFile:
         self._size = end
 
     def _bytes(self) -> io.BufferedReader:
-        return io.BufferedReader(_Head(self._path, self._size), 1 << 20)
+        return io.BufferedReader(FileBytes(self._path, 0, self._size), 1 << 20)
 
     def _not_text(self) -> InputError:
         return InputError(f"{self._path} is not text in UTF-8; a recording is CSV or Parquet")
@@ -170,21 +172,91 @@ class CsvFile:
                     found.add(name)
         return found
 
-    def _chunks(self, dtypes: dict[str, str]) -> Iterator[Any]:
+    def parts(self, rows: int) -> list[tuple[int, int]]:
+        """See :class:`palpate.recording.table.TableFile`: ranges of bytes that end where a line does."""
+        with self._bytes() as stream:
+            for _ in range(self._header_line):
+                stream.readline()
+            start = stream.tell()
+            first = stream.readline()
+            edges = [start]
+            step = max(rows * max(len(first), 1), 1)
+            while (aim := edges[-1] + step) < self._size:
+                stream.seek(aim)
+                stream.readline()
+                edges.append(min(stream.tell(), self._size))
+        if edges[-1] < self._size:
+            edges.append(self._size)
+        return list(pairwise(edges))
+
+    def blocks(
+        self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
+    ) -> Iterator[tuple[int, dict[str, Cells]]]:
+        """See :class:`palpate.recording.table.TableFile`."""
+        wanted = [name for name in self.names if name in numbers or name in text]
+        # Most files hold nothing but numbers in number columns, and are read fast; at the first block that
+        # does not, the rest is read as text and becomes numbers one by one.
+        done = 0
+        for as_text in ({*text}, {*text, *numbers}):
+            types = {name: "str" if name in as_text else "float64" for name in wanted}
+            first, skipped = 0, 0
+            try:
+                for chunk in self._chunks(types, part=part, columns=wanted, rows=rows):
+                    if skipped < done:
+                        skipped += 1
+                    else:
+                        yield first, {name: self._block(chunk[name], name in text) for name in wanted}
+                        done += 1
+                    first += len(chunk)
+                return
+            except ValueError as error:
+                if isinstance(error, InputError) or set(numbers) <= as_text:
+                    raise
+
+    def _block(self, cells: Any, text: bool) -> Cells:
+        if text:
+            return np.asarray(cells.astype("category").to_numpy(dtype=object))
+        if cells.dtype == np.float64:
+            return np.asarray(cells.to_numpy(dtype=np.float64))
+        return to_numbers(cells.to_numpy(dtype=object))
+
+    def rows_before(self, part: tuple[int, int]) -> int:
+        """See :class:`palpate.recording.table.TableFile`; a file is not expected to have blank lines."""
+        rows, left = 0, part[0]
+        with self._bytes() as stream:
+            for _ in range(self._header_line):
+                left -= len(stream.readline())
+            while left > 0:
+                block = stream.read(min(1 << 20, left))
+                left -= len(block)
+                rows += block.count(b"\n")
+        return rows
+
+    def _chunks(
+        self,
+        dtypes: dict[str, str],
+        *,
+        part: tuple[int, int] | None = None,
+        columns: Collection[str] | None = None,
+        rows: int = _CHUNK_ROWS,
+    ) -> Iterator[Any]:
+        """Frames of so many rows of the whole file or a part of it."""
+        raw = FileBytes(self._path, *(part or (0, self._size)))
         try:
             with (
-                self._bytes() as stream,
+                io.BufferedReader(raw, 1 << 20) as stream,
                 pd.read_csv(
                     stream,
                     encoding="utf-8",
                     header=None,
                     names=list(self.names),
-                    skiprows=self._header_line,
+                    usecols=None if columns is None else list(columns),
+                    skiprows=self._header_line if part is None else 0,
                     dtype=dtypes,
                     keep_default_na=False,
                     na_values={name: MISSING for name, dtype in dtypes.items() if dtype == "float64"},
                     **_EXACT,
-                    chunksize=_CHUNK_ROWS,
+                    chunksize=rows,
                     engine="c",
                 ) as reader,
             ):
@@ -194,6 +266,9 @@ class CsvFile:
         except UnicodeDecodeError:
             raise self._not_text() from None
         except pd.errors.ParserError as error:
+            if "source failed" in str(error):
+                # What was raised while pandas read is lost in it: the disk's failure, or else Ctrl-C.
+                raise (raw.failure or KeyboardInterrupt()) from None
             if cells := re.search(r"in line (\d+), saw (\d+)", str(error)):
                 raise self._too_many_cells(int(cells[1]), int(cells[2])) from None
             raise InputError(f"{self._path} is not CSV: {str(error).strip()}") from None
@@ -218,24 +293,3 @@ class CsvFile:
 
 def _numeric(cell: str) -> bool:
     return cell.strip() in MISSING or parse_number(cell) is not None
-
-
-class _Head(io.RawIOBase):
-    """The first `size` bytes of a file: a recording without its torn last line."""
-
-    def __init__(self, path: Path, size: int) -> None:
-        self._stream = path.open("rb", buffering=0)
-        self._left = size
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        block = self._stream.read(min(len(buffer), self._left))
-        buffer[: len(block)] = block
-        self._left -= len(block)
-        return len(block)
-
-    def close(self) -> None:
-        self._stream.close()
-        super().close()

@@ -43,6 +43,7 @@ def read_recording(
     torque_constant: float | None = None,
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
+    zero: tuple[int | None, int | None] | None = None,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
     """Read a recording from CSV or Parquet.
@@ -73,6 +74,9 @@ def read_recording(
         "position", "force" or names of used columns whose sign is to be turned.
     rows : (start, stop), optional
         Half-open range of data rows to use, counted from 0; None for either end leaves it open.
+    zero : (start, stop), optional
+        Half-open range of data rows, counted as `rows`, in which the tool touches nothing: their mean force
+        is taken off all forces.
     invalid : {"refuse", "drop"}
         What to do with a row that has no number where one is needed, an infinite one, or a time that repeats
         or runs backward: refuse the file, naming the row, or drop the row and count it.
@@ -156,6 +160,15 @@ def read_recording(
                 f"{choice.force.name}, which is not in A"
             )
         f, force_unit = f * torque_constant, "N*m"
+    if zero is not None:
+        first, last = _row_range(file, zero, total)
+        numbers = np.arange(start, stop)[check.kept]
+        free = (numbers >= first) & (numbers < last)
+        if not free.any():
+            raise InputError(f"{file}: --zero {first}:{last} holds none of the rows that are used")
+        offset = float(np.mean(f[free]))
+        f = f - offset
+        notes.append(f"{offset:.6g} {force_unit}, the mean force of rows {first} to {last - 1}, is taken off")
     _require_enough(file, choice.position, x, check.notes)
     inputs_si = [_in_si(column, cells) for column in choice.inputs]
     used = {column.name for column in numeric} | {stroke}

@@ -103,6 +103,7 @@ class Recording:
         time: npt.ArrayLike | None = None,
         direction: npt.ArrayLike | None = None,
         *,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
         units: Mapping[str, str] | None = None,
         metadata: Mapping[str, str] | None = None,
     ) -> Recording:
@@ -118,6 +119,8 @@ class Recording:
             Time [s], strictly increasing.
         direction : (n,) array_like, optional
             +1 into the object, -1 out of it, 0 neither.
+        inputs : mapping of str to (n,) array_like, optional
+            What else the force depends on, by name, SI.
         units : mapping, optional
             {"position": "rad", "force": "N*m"}; without it the data is SI, but not said which.
         metadata : mapping, optional
@@ -130,7 +133,13 @@ class Recording:
             unit is not one that recordings carry.
         """
         arrays: dict[str, Float1D] = {}
-        for name, values in (("position", position), ("force", force), ("time", time)):
+        given_inputs = dict(inputs or {})
+        named: dict[str, npt.ArrayLike | None] = {"position": position, "force": force, "time": time}
+        if clash := sorted({*named, "direction", "hysteresis"} & set(given_inputs)):
+            raise InputError(
+                f"an input is called {clash[0]!r}, which a recording has already; name it otherwise"
+            )
+        for name, values in (*named.items(), *given_inputs.items()):
             if values is None:
                 continue
             array = np.array(values, dtype=np.float64)
@@ -159,6 +168,11 @@ class Recording:
                 raise InputError(
                     f"units[{role!r}] is {checked_units[role]!r}; use one of {', '.join(allowed)}"
                 )
+        for name in given_inputs:
+            if arrays[name].shape != arrays["position"].shape:
+                raise InputError(
+                    f"{name} has shape {arrays[name].shape}, but position has {arrays['position'].shape}"
+                )
         digest = hashlib.sha256()
         for array_or_none in (*arrays.values(), words):
             if array_or_none is not None:
@@ -169,8 +183,8 @@ class Recording:
             force=arrays["force"],
             time=arrays.get("time"),
             direction=words,
-            inputs=np.empty((n, 0)),
-            input_names=(),
+            inputs=np.array([arrays[name] for name in given_inputs]).reshape(-1, n).T.copy(),
+            input_names=tuple(given_inputs),
             columns={},
             metadata=dict(metadata or {}),
             units=checked_units,

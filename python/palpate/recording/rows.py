@@ -11,7 +11,7 @@ from .._core import Status
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .direction import DIRECTION_WORDS, direction_of
-from .table import Cells, TableFile
+from .table import Cells, Places
 
 
 class RowCheck:
@@ -21,7 +21,7 @@ class RowCheck:
     ----------
     file : str
         The file's name, for the sentences.
-    table : TableFile
+    table : Places
         Where lines and cells are looked up when something is wrong.
     first_row : int
         Data row of the file that the arrays begin with.
@@ -31,7 +31,7 @@ class RowCheck:
         Drop bad rows and count them; else refuse the file at the first one.
     """
 
-    def __init__(self, file: str, table: TableFile, first_row: int, rows: int, drop: bool) -> None:
+    def __init__(self, file: str, table: Places, first_row: int, rows: int, drop: bool) -> None:
         self._file, self._table, self._first_row, self._drop = file, table, first_row, drop
         self.kept: NDArray[np.bool_] = np.ones(rows, dtype=bool)
         self.notes: list[str] = []

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -13,7 +13,17 @@ Cells: TypeAlias = NDArray[Any]
 """(n,) float64 for numbers (NaN where a cell holds none), (n,) object of str for text"""
 
 
-class TableFile(Protocol):
+class Places(Protocol):
+    """Where the rows of a file stand."""
+
+    def place(self, row: int) -> str:
+        """Where a person finds a row: "line 12"."""
+
+    def cell(self, row: int, name: str) -> str:
+        """The text of one cell as it stands in the file."""
+
+
+class TableFile(Places, Protocol):
     """A file with a header, read in two steps so that only the header is needed to choose columns."""
 
     @property
@@ -32,11 +42,16 @@ class TableFile(Protocol):
         """All columns. Those in `numbers` become float64 whatever they hold, those in `text` become strings;
         any other is numeric if every cell of it is."""
 
-    def place(self, row: int) -> str:
-        """Where a person finds a row: "line 12"."""
+    def parts(self, rows: int) -> list[tuple[int, int]]:
+        """Places (start, stop) that divide the file into parts of about so many rows, or more."""
 
-    def cell(self, row: int, name: str) -> str:
-        """The text of one cell as it stands in the file."""
+    def blocks(
+        self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
+    ) -> Iterator[tuple[int, dict[str, Cells]]]:
+        """The first row's number within the part, and the columns named, of each block of so many rows."""
+
+    def rows_before(self, part: tuple[int, int]) -> int:
+        """Rows of the file that come before a part."""
 
 
 def parse_number(text: str) -> float | None:

@@ -3,6 +3,17 @@
 
 from .agreement import Stroke, compare
 from .closed_loop import ClosedLoop, force_driven, motion_driven
+from .uncertainty import Uncertainty, uncertainty
 from .verification import Verification, verify
 
-__all__ = ["ClosedLoop", "Stroke", "Verification", "compare", "force_driven", "motion_driven", "verify"]
+__all__ = [
+    "ClosedLoop",
+    "Stroke",
+    "Uncertainty",
+    "Verification",
+    "compare",
+    "force_driven",
+    "motion_driven",
+    "uncertainty",
+    "verify",
+]

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._typing import Float1D, Float2D
+from .._typing import Float1D
 from ..errors import InputError
+from ..identification.inputs import input_columns
 from ..model import Model
 from ..recording import Recording
+from ..recording.motion import acceleration, velocity
 
 _UNSTATED = ""
 
@@ -43,15 +45,42 @@ def predict(model: Model, recording: Recording) -> Prediction:
     """
     require_same_units(model, recording.units)
     if model.mass is not None or model.damping is not None:
+        return _moving(model, recording)
+    return _static(model, recording)
+
+
+def _moving(model: Model, recording: Recording) -> Prediction:
+    """With what mass and damping add: m a + B v, from the recording's own time."""
+    if recording.time is None:
         raise InputError(
             "the model has a mass or a damping, which act on acceleration and velocity: "
-            "it can be compared in closed loop, not row by row"
+            "the recording needs time (--time NAME)"
         )
+    static = _static(model, recording)
+    total, known = np.zeros(len(recording)), np.ones(len(recording), dtype=bool)
+    for value, derivative in ((model.damping, velocity), (model.mass, acceleration)):
+        if value is not None:
+            derived, here = derivative(recording)
+            total, known = total + value * derived, known & here
+    rows = static.rows & known
+    force = (static.force + total[static.rows])[known[static.rows]]
+    left_out = int(np.count_nonzero(static.rows & ~known))
+    notes = (f"{left_out} rows at the ends and at gaps of time have no velocity and are left out",)
+    outside = model.extrapolated(recording.position[rows])
+    return Prediction(rows, force, int(np.count_nonzero(outside)), static.notes + notes)
+
+
+def _static(model: Model, recording: Recording) -> Prediction:
     rows = np.ones(len(recording), dtype=bool)
     notes: tuple[str, ...] = ()
     if model.dimension > 1:
-        X = _inputs(model, recording)
+        X, rows = input_columns(recording, model.inputs)
+        if not rows.any():
+            raise InputError("no row of the recording has the velocity that the model needs")
+        X = X[rows]
         outside = ((model.lower > X) | (model.upper < X)).any(axis=1)
+        if left_out := int(np.count_nonzero(~rows)):
+            notes = (f"{left_out} rows at the ends and at gaps of time have no velocity and are left out",)
         return Prediction(rows, model.predict(X), int(np.count_nonzero(outside)), notes)
     if not model.hysteretic:
         force = model.force(recording.position)
@@ -81,15 +110,3 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
         if ours != theirs and _UNSTATED not in (ours, theirs):
             hint = "; give --torque-constant-Nm-per-A for the one in A" if "A" in (ours, theirs) else ""
             raise InputError(f"the model's {role} is in {ours}, the recording's in {theirs}{hint}")
-
-
-def _inputs(model: Model, recording: Recording) -> Float2D:
-    columns = []
-    for name in model.inputs:
-        if name == "position":
-            columns.append(recording.position)
-        elif name in recording.input_names:
-            columns.append(recording.inputs[:, recording.input_names.index(name)])
-        else:
-            raise InputError(f"the model needs the input {name}; read the recording with inputs=({name!r},)")
-    return np.column_stack(columns)

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 #include "palpate/device/hand.hpp"
 
@@ -15,9 +17,17 @@ struct Mechanics {
     double friction = 0.0;  ///< f_c [N or N*m]
 };
 
+/// What every way to move a handle shares where it has nothing to forget and no force transducer.
+struct PlainPlant {
+    void start() noexcept {}
+    [[nodiscard]] static double measured(const Motion& /*handle*/) noexcept {
+        return std::numeric_limits<double>::quiet_NaN();
+    }
+};
+
 /// Semi-implicit Euler, the usual integrator of a simulated device. Coulomb friction takes away at most the
 /// velocity there is: it can stop the handle but never turn it round.
-struct SemiImplicitEuler {
+struct SemiImplicitEuler : PlainPlant {
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) const noexcept {
         const double inertia = handle.inertia + grip.mass;
@@ -28,6 +38,27 @@ struct SemiImplicitEuler {
             motion.velocity = std::copysign(std::max(0.0, std::abs(free) - friction), free);
             motion.position += step * motion.velocity;
         }
+    }
+};
+
+/// Semi-implicit Euler with a real object mounted on the handle.
+struct MountedObject {
+    /// Over position, positive out of the object; none: nothing is mounted. It must neither throw nor allocate.
+    std::function<double(double)> force;
+    bool transducer = true;  ///< whether the device measures that force
+
+    void start() noexcept {}
+
+    void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
+              Motion& motion) const noexcept {
+        for (int k = 0; k < substeps; ++k) {
+            const double mounted = force ? force(motion.position) : 0.0;
+            SemiImplicitEuler{}.tick(handle, grip, applied + mounted, step, 1, motion);
+        }
+    }
+
+    [[nodiscard]] double measured(const Motion& handle) const noexcept {
+        return force && transducer ? force(handle.position) : PlainPlant::measured(handle);
     }
 };
 
@@ -48,8 +79,10 @@ struct EnergyAccount {
 ///
 /// force times way is exactly the work, whatever h. Where friction holds a handle that would turn round, it
 /// takes what speed is left.
-class Midpoint {
+class Midpoint : public PlainPlant {
   public:
+    void start() noexcept { account_ = {}; }
+
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) noexcept {
         const double momentum = 2.0 * (handle.inertia + grip.mass) / step;

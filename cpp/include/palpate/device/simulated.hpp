@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <utility>
 
 #include "palpate/device/device.hpp"
@@ -18,10 +17,11 @@ namespace palpate {
 
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
 /// friction, encoder, force step and limit, hold over the tick, whole samples of delay. `Plant` moves the
-/// handle: SemiImplicitEuler, or Midpoint where energy is accounted for.
+/// handle: SemiImplicitEuler, Midpoint where energy is accounted for, or MountedObject where the device is there
+/// to measure a real thing.
 ///
 /// It does not model: motor electrical dynamics, torque ripple, backlash, flexible parts, jitter of the
-/// sample time, the noise of a force transducer (it has none).
+/// sample time, the noise of a force transducer.
 template <SimulatedHand H, class Plant>
 class SimulatedHandle {
   public:
@@ -31,10 +31,13 @@ class SimulatedHandle {
         validate(profile_);
     }
 
+    /// Puts in what moves the handle, if it has anything to be told.
+    void mount(Plant plant) { plant_ = std::move(plant); }
+
     /// Puts the handle at its start, at rest unless it was given a velocity.
     Opened open() {
         handle_ = start_;
-        plant_ = {};
+        plant_.start();
         applied_ = 0.0;
         tick_ = 0;
         pending_.fill(0.0);
@@ -51,8 +54,7 @@ class SimulatedHandle {
         const double measured = encoded(handle_.position);
         const double velocity = (measured - last_reading_) / profile_.period_s;
         last_reading_ = measured;
-        return {measured, velocity, applied_,  std::numeric_limits<double>::quiet_NaN(),
-                time(),   tick_,    Status::Ok};
+        return {measured, velocity, applied_, plant_.measured(handle_), time(), tick_, Status::Ok};
     }
 
     void close() noexcept { applied_ = 0.0; }
@@ -104,7 +106,11 @@ class SimulatedHandle {
 /// The device of demonstrations, tests and examples, with a hand that sweeps.
 using SimulatedDevice = SimulatedHandle<Hand, SemiImplicitEuler>;
 
+/// The same with a real object on it: what a recording is made of.
+using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
+
 static_assert(Device<SimulatedDevice>);
+static_assert(Device<SimulatedRig>);
 
 /// Substeps of a tick that keep the inner step of the simulation at 1/20 ms, whatever the rate.
 [[nodiscard]] inline int simulated_substeps(double period_s) noexcept {

@@ -24,6 +24,7 @@ struct UsbOptions {
     std::chrono::microseconds wait{5'000};  ///< how long an exchange waits for the device's next packet
     std::uint16_t time_to_live_ms = 10;     ///< how long a torque outlives its packet
     double longest_delay_s = 0.0;           ///< from a sample to its force; 0 = any [s]
+    bool makes_force = true;                ///< else it is listened to: it is never enabled
 };
 
 /// What happened on the wire, packets and transfers.
@@ -57,7 +58,8 @@ class UsbDevice {
     UsbDevice& operator=(UsbDevice&&) = delete;
     ~UsbDevice() { close(); }
 
-    /// Finds the device, starts its packets and lets it make torque; the torque is zero until the first exchange.
+    /// Finds the device, starts its packets and, if it is to make force, lets it; the torque is zero until the first
+    /// exchange.
     Opened open() {
         close();
         open_ = std::make_unique<OpenDevice>();
@@ -195,6 +197,9 @@ class UsbDevice {
         if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
             return "reports " + fault_text(open_->stream.status_bits()) +
                    "; when its cause is gone, run 'palpate devices --clear', then try again";
+        }
+        if (!options_.makes_force) {
+            return "";
         }
         if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
             return "cannot be enabled: " + detail::usb_reason(code);

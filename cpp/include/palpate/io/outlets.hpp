@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <span>
+#include <vector>
 
 #include "palpate/io/recording_file.hpp"
 #include "palpate/io/telemetry.hpp"
@@ -9,17 +12,50 @@
 
 namespace palpate {
 
-/// Where the ticks of a rendering go besides the device: a file, a network, both or nowhere.
+/// Least and largest of what was seen; NaN before anything was.
+struct Range {
+    double lower = std::numeric_limits<double>::quiet_NaN();
+    double upper = std::numeric_limits<double>::quiet_NaN();
+
+    void add(double value) noexcept {
+        lower = std::fmin(lower, value);
+        upper = std::fmax(upper, value);
+    }
+};
+
+/// Where ticks go besides the device: a file, a network, memory, all of them or nowhere.
 struct Outlets {
     RecordingFile file;
     Telemetry telemetry;
+    std::vector<TickRecord> kept;
+    bool keeps = false;  ///< whether every tick is kept in memory
+    bool real_object =
+        false;  ///< whether the force to be told is that of a real object, not of a virtual one
 
     void take(std::span<const TickRecord> ticks) noexcept {
+        if (real_object) {
+            told_.assign(ticks.begin(), ticks.end());
+            for (TickRecord& tick : told_) {
+                tick.force = object_force(tick);
+                positions.add(tick.position);
+                forces.add(tick.force);
+            }
+            ticks = told_;
+        }
         if (file.is_open()) {
             file.take(ticks);
         }
         telemetry.take(ticks);
+        if (keeps) {
+            kept.insert(kept.end(), ticks.begin(), ticks.end());
+        }
     }
+
+    Range positions;  ///< of a real object, as told
+    Range forces;
+
+  private:
+    std::vector<TickRecord> told_;
 };
 
 }  // namespace palpate

@@ -33,9 +33,9 @@ class RecordingFile {
         for (const auto& [key, value] : metadata) {
             head += line(key, value);
         }
-        head +=
-            line("palpate-columns", R"({"time": "time_s", "position": "position)" + suffix(units_.position) +
-                                        R"(", "force": "force)" + suffix(units_.force) + R"(", "status": "status"})");
+        head += line("palpate-columns", R"({"time": "time_s", "position": "position)" +
+                                            suffix(units_.position) + R"(", "force": "force)" +
+                                            suffix(units_.force) + R"(", "status": "status"})");
         ending_at_ = static_cast<off_t>(head.size());
         head += padded(line("ended", "not yet: the recording was cut off, or is still growing"));
         timing_at_ = static_cast<off_t>(head.size());

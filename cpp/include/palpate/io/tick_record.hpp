@@ -15,19 +15,27 @@ namespace palpate {
 
 /// One tick as it is recorded and told: plain numbers, SI.
 struct TickRecord {
-    double time = 0.0;                  ///< of the wake-up, since the first [s]
-    double position = 0.0;              ///< measured [m or rad]
-    double force = 0.0;                 ///< sent after the guards, positive out of the object [N or N*m]
-    double applied = 0.0;               ///< by the device when the position was sampled, same sign
-    double environment_position = 0.0;  ///< y, where the object was evaluated [m or rad]
-    double velocity = 0.0;              ///< of the device [m/s or rad/s]
-    double device_time = 0.0;           ///< the device's clock [s]
-    double lateness = 0.0;              ///< of the wake-up [s]
-    std::uint64_t sequence = 0;         ///< of the device's sample
-    std::int32_t evaluations = 0;       ///< of the environment
+    double time = 0.0;      ///< of the wake-up, since the first [s]
+    double position = 0.0;  ///< measured [m or rad]
+    double force = 0.0;     ///< sent after the guards, positive out of the object [N or N*m]
+    double applied = 0.0;   ///< by the device when the position was sampled, same sign
+    double measured =
+        std::numeric_limits<double>::quiet_NaN();  ///< by the transducer, same sign; NaN without
+    double environment_position = 0.0;             ///< y, where the object was evaluated [m or rad]
+    double velocity = 0.0;                         ///< of the device [m/s or rad/s]
+    double device_time = 0.0;                      ///< the device's clock [s]
+    double lateness = 0.0;                         ///< of the wake-up [s]
+    std::uint64_t sequence = 0;                    ///< of the device's sample
+    std::int32_t evaluations = 0;                  ///< of the environment
     Status status = Status::Ok;
     bool extrapolated = false;  ///< the object was evaluated outside its data
 };
+
+/// The force of a real object against the handle: what the transducer says, or, without one, what the motor has
+/// to hold against it. The latter holds for slow motion; the friction of the device is in it.
+[[nodiscard]] inline double object_force(const TickRecord& tick) noexcept {
+    return std::isnan(tick.measured) ? -tick.applied : tick.measured;
+}
 
 /// The units that a model gives to the columns, as they stand at the end of a column name; empty: unstated.
 struct RecordUnits {

@@ -135,7 +135,7 @@ class CompiledCurve {
         // Beyond 2^40 cells from zero the position itself says little about its place in the cell.
         const double h = std::ldexp(1.0, -fineness);
         if (!((upper_ - lower_) / h + 4.0 <= static_cast<double>(options.largest_table) &&
-              reach / h < 0x1p40)) {
+              reach / h < 0x1p40 && PiecewiseSeptic::is_sound(h))) {
             return;
         }
         // One more cell on either side: rounding may take a position that was wrapped past an edge.
@@ -192,9 +192,13 @@ class CompiledCurve {
             slope_error_ += detail::hermite_slope[d] * rounding[d] * power / h;
             power *= h;
         }
-        const auto [value, slope] = table.rounding();
-        value_error_ += value;
-        slope_error_ += slope;
+        std::array<double, 2> worst{};
+        for (std::size_t k = 0; k < table.size(); ++k) {
+            const auto [value, slope] = table.rounding(k);
+            worst = {std::max(worst[0], value), std::max(worst[1], slope)};
+        }
+        value_error_ += worst[0];
+        slope_error_ += worst[1];
     }
 
     NetworkCurve curve_;

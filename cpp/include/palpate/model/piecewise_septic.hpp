@@ -17,24 +17,25 @@ namespace palpate {
 /// Value and first three derivatives of a function at one position.
 using Jet = std::array<double, 4>;
 
-/// A function as polynomials of degree 7 on cells of equal width h: one look-up, one cache line and a few
-/// multiplications, however the function came about. Value and first three derivatives are continuous.
+/// A function as polynomials of degree 7 on cells of equal width h, a power of two: one look-up, one cache line
+/// and a few multiplications, however the function came about. Value and first three derivatives are continuous.
 ///
-/// Cell k is centred at x = k h, its local coordinate is t = x/h - k in [-1/2, 1/2]; both are exact if h is a
-/// power of two.
+/// Cell k is centred at x = k h; its polynomial is one in u = x - k h, which is exact. Sums are written so that
+/// what depends on x longest enters last: a step waits for the depth of these trees.
 class PiecewiseSeptic {
   public:
     PiecewiseSeptic() = default;
 
-    /// Cells `first` to `last`; `jet(x)` gives the derivatives at their borders x = (k +- 1/2) h.
+    /// Cells `first` to `last`; `jet(x)` gives the derivatives at their borders x = (k +- 1/2) h, from the left
+    /// to the right.
     template <class Function>
     PiecewiseSeptic(std::int64_t first, std::int64_t last, double width, Function jet)
-        : scale_{1.0 / width}, width_{width}, origin_{std::bit_cast<std::int64_t>(rounder) + first} {
+        : width_{width}, rounder_{rounder * width}, origin_{std::bit_cast<std::int64_t>(rounder_) + first} {
         pieces_.reserve(static_cast<std::size_t>(last - first + 1));
-        Jet left = scaled(jet((static_cast<double>(first) - 0.5) * width_));
+        Jet left = by_t(jet((static_cast<double>(first) - 0.5) * width_));
         for (std::int64_t k = first; k <= last; ++k) {
-            const Jet right = scaled(jet((static_cast<double>(k) + 0.5) * width_));
-            pieces_.push_back(piece(left, right));
+            const Jet right = by_t(jet((static_cast<double>(k) + 0.5) * width_));
+            pieces_.push_back(by_x(piece(left, right)));
             left = right;
         }
     }
@@ -49,43 +50,57 @@ class PiecewiseSeptic {
     [[nodiscard]] double width() const noexcept { return width_; }
     [[nodiscard]] double middle(std::size_t k) const noexcept {
         return static_cast<double>(origin_ + static_cast<std::int64_t>(k) -
-                                   std::bit_cast<std::int64_t>(rounder)) *
+                                   std::bit_cast<std::int64_t>(rounder_)) *
                width_;
     }
-    /// Coefficients of the powers of t in cell k.
-    [[nodiscard]] const std::array<double, 8>& coefficients(std::size_t k) const noexcept {
-        return pieces_[k].c;
+    /// Coefficients of the powers of t = u / h, which runs from -1/2 to 1/2, in cell k.
+    [[nodiscard]] std::array<double, 8> coefficients(std::size_t k) const noexcept {
+        std::array<double, 8> c = pieces_[k].c;
+        double power = 1.0;
+        for (double& coefficient : c) {
+            coefficient *= power;
+            power *= width_;
+        }
+        return c;
+    }
+    /// Widths whose powers neither overflow nor lose digits.
+    [[nodiscard]] static bool is_sound(double width) noexcept { return width > 0x1p-100 && width < 0x1p100; }
+
+    /// Leaves only `count` cells from the one with index `first` on.
+    void keep(std::size_t first, std::size_t count) {
+        const auto begin = pieces_.begin() + static_cast<std::ptrdiff_t>(first);
+        pieces_ = std::vector<Piece>(begin, begin + static_cast<std::ptrdiff_t>(count));
+        origin_ += static_cast<std::int64_t>(first);
     }
 
     [[nodiscard, gnu::always_inline]] inline double value(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
-        const double t = at.t;
-        const double t2 = t * t;
-        return ((c[0] + c[1] * t) + (c[2] + c[3] * t) * t2) +
-               ((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) * (t2 * t2);
+        const double u = at.u;
+        const double u2 = u * u;
+        const double u4 = u2 * u2;
+        return ((c[0] + c[1] * u) + (c[2] + c[3] * u) * u2) +
+               ((c[4] + c[5] * u) * u4 + (c[6] + c[7] * u) * (u2 * u4));
     }
 
     /// Value, slope and both antiderivatives from one look-up, after `integrate`.
     [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
-        const double t = at.t;
-        const double t2 = t * t;
-        const double t4 = t2 * t2;
-        const double value =
-            ((c[0] + c[1] * t) + (c[2] + c[3] * t) * t2) + ((c[4] + c[5] * t) + (c[6] + c[7] * t) * t2) * t4;
+        const Pair both = value_and_slope(c, at.u);
+        const double u = at.u;
+        const double u2 = u * u;
+        const double u4 = u2 * u2;
         const auto [first, second] = integrals_[at.piece];
-        // Powers of t below: the antiderivatives of t^j are t^(j+1)/(j+1) and t^(j+2)/((j+1)(j+2)).
+        // The antiderivatives of u^j are u^(j+1)/(j+1) and u^(j+2)/((j+1)(j+2)).
         const double once =
-            ((c[0] + 1.0 / 2.0 * c[1] * t) + (1.0 / 3.0 * c[2] + 1.0 / 4.0 * c[3] * t) * t2) +
-            ((1.0 / 5.0 * c[4] + 1.0 / 6.0 * c[5] * t) + (1.0 / 7.0 * c[6] + 1.0 / 8.0 * c[7] * t) * t2) * t4;
+            ((c[0] + 1.0 / 2.0 * c[1] * u) + (1.0 / 3.0 * c[2] + 1.0 / 4.0 * c[3] * u) * u2) +
+            ((1.0 / 5.0 * c[4] + 1.0 / 6.0 * c[5] * u) + (1.0 / 7.0 * c[6] + 1.0 / 8.0 * c[7] * u) * u2) * u4;
         const double twice =
-            ((1.0 / 2.0 * c[0] + 1.0 / 6.0 * c[1] * t) + (1.0 / 12.0 * c[2] + 1.0 / 20.0 * c[3] * t) * t2) +
-            ((1.0 / 30.0 * c[4] + 1.0 / 42.0 * c[5] * t) + (1.0 / 56.0 * c[6] + 1.0 / 72.0 * c[7] * t) * t2) *
-                t4;
-        const double along = t * width_;
-        return {value, slope(c, t) * scale_, first + along * once, second + along * (first + along * twice)};
+            ((1.0 / 2.0 * c[0] + 1.0 / 6.0 * c[1] * u) + (1.0 / 12.0 * c[2] + 1.0 / 20.0 * c[3] * u) * u2) +
+            ((1.0 / 30.0 * c[4] + 1.0 / 42.0 * c[5] * u) + (1.0 / 56.0 * c[6] + 1.0 / 72.0 * c[7] * u) * u2) *
+                u4;
+        return {both[0], both[1], first + u * once, second + u * (first + u * twice)};
     }
 
     /// Takes the antiderivatives at the middle of every cell from `antiderivatives(x)`.
@@ -97,25 +112,21 @@ class PiecewiseSeptic {
         }
     }
 
-    /// What rounding may add to the value and to the slope in the making and the evaluation of the cells'
-    /// polynomials: sums of the absolute terms of `piece`, its derivatives bounded by the coefficients.
-    [[nodiscard]] std::array<double, 2> rounding() const noexcept {
-        double value = 0.0;
-        double slope = 0.0;
-        for (const Piece& one : pieces_) {
-            Jet by_t{std::abs(one.c[0]), 0.0, 0.0, 0.0};  // bounds of the derivatives by t
-            for (std::size_t j = 1; j < one.c.size(); ++j) {
-                double term = std::ldexp(std::abs(one.c[j]), -static_cast<int>(j));
-                for (std::size_t d = 1; d <= std::min<std::size_t>(j, 3); ++d) {
-                    term *= 2.0 * static_cast<double>(j + 1 - d);
-                    by_t[d] += term;
-                }
+    /// What rounding may add to the value and to the slope in the making and the evaluation of cell k: sums of
+    /// the absolute terms of `piece`, its derivatives bounded by the coefficients.
+    [[nodiscard]] std::array<double, 2> rounding(std::size_t k) const noexcept {
+        const auto c = coefficients(k);
+        Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};  // of the derivatives by t
+        for (std::size_t j = 1; j < c.size(); ++j) {
+            double term = std::ldexp(std::abs(c[j]), -static_cast<int>(j));
+            for (std::size_t d = 1; d <= std::min<std::size_t>(j, 3); ++d) {
+                term *= 2.0 * static_cast<double>(j + 1 - d);
+                bounds[d] += term;
             }
-            value = std::max(value, by_t[0] + 6.0 * by_t[1] + 1.5 * by_t[2] + 0.1 * by_t[3]);
-            slope = std::max(slope, 36.0 * by_t[1] + 6.0 * by_t[2] + by_t[3]);
         }
         constexpr double units = 8.0 * std::numeric_limits<double>::epsilon();
-        return {units * value, units * slope * scale_};
+        return {units * (bounds[0] + 6.0 * bounds[1] + 1.5 * bounds[2] + 0.1 * bounds[3]),
+                units / width_ * (36.0 * bounds[1] + 6.0 * bounds[2] + bounds[3])};
     }
 
   private:
@@ -123,29 +134,54 @@ class PiecewiseSeptic {
         std::array<double, 8> c;
     };
 
-    /// Adding this rounds a double to an integer, which then stands in its low bits.
+    /// Adding this rounds a double to an integer, which then stands in its low bits; times h, to a multiple of h.
     static constexpr double rounder = 0x1.8p52;
 
     struct Place {
         std::size_t piece;
-        double t;
+        double u;
     };
 
-    [[nodiscard]] Place place(double x) const noexcept {
-        const double z = x * scale_;
-        const double rounded = z + rounder;
+    [[nodiscard, gnu::always_inline]] inline Place place(double x) const noexcept {
+        const double rounded = x + rounder_;
         return {static_cast<std::size_t>(std::bit_cast<std::int64_t>(rounded) - origin_),
-                z - (rounded - rounder)};
+                x - (rounded - rounder_)};
     }
 
-    [[nodiscard]] static double slope(const std::array<double, 8>& c, double t) noexcept {
-        const double t2 = t * t;
-        return ((c[1] + 2.0 * c[2] * t) + (3.0 * c[3] + 4.0 * c[4] * t) * t2) +
-               ((5.0 * c[5] + 6.0 * c[6] * t) + 7.0 * c[7] * t2) * (t2 * t2);
+    /// Two lanes of one register, on every processor and compiler that this library knows.
+    using Pair = double __attribute__((vector_size(16)));
+
+    /// Value and slope: sums of the same form, with (j + 1) c[j + 1] in place of c[j], so that both cost what one
+    /// does. What goes with j goes into the powers of u, which are there before the coefficients.
+    [[nodiscard, gnu::always_inline]] static inline Pair value_and_slope(const std::array<double, 8>& c,
+                                                                         double u) noexcept {
+        const auto at = [&c](std::size_t j) {
+            Pair pair;
+            __builtin_memcpy(&pair, &c[j], sizeof(pair));
+            return pair;
+        };
+        const Pair u1 = {u, u};
+        const Pair u2 = u1 * u1;
+        const Pair u4 = u2 * u2;
+        return ((at(0) + at(1) * (u1 * Pair{1.0, 2.0})) +
+                (at(2) + at(3) * (u1 * Pair{1.0, 4.0 / 3.0})) * (u2 * Pair{1.0, 3.0})) +
+               ((at(4) + at(5) * (u1 * Pair{1.0, 6.0 / 5.0})) * (u4 * Pair{1.0, 5.0}) +
+                (at(6) + Pair{c[7], 0.0} * u1) * (u2 * Pair{1.0, 7.0} * u4));
+    }
+
+    /// From powers of t to powers of u.
+    [[nodiscard]] Piece by_x(const Piece& piece) const noexcept {
+        Piece scaled = piece;
+        double power = 1.0;
+        for (double& coefficient : scaled.c) {
+            coefficient *= power;
+            power /= width_;
+        }
+        return scaled;
     }
 
     /// Derivatives by t instead of x.
-    [[nodiscard]] Jet scaled(const Jet& jet) const noexcept {
+    [[nodiscard]] Jet by_t(const Jet& jet) const noexcept {
         return {jet[0], jet[1] * width_, jet[2] * (width_ * width_), jet[3] * (width_ * width_ * width_)};
     }
 
@@ -169,8 +205,8 @@ class PiecewiseSeptic {
                  -40.0 * o[0] + 20.0 * o[1] - 4.0 * o[2] + o[3] / 3.0}};
     }
 
-    double scale_ = 1.0;
     double width_ = 1.0;
+    double rounder_ = rounder;
     std::int64_t origin_ = 0;
     std::vector<Piece> pieces_;
     std::vector<std::array<double, 2>> integrals_;

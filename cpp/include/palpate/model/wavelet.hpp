@@ -49,6 +49,11 @@ struct MexicanHat {
 struct RadialMexicanHat {
     double value;            ///< (r^2 - d) E
     double gradient_over_u;  ///< (d + 2 - r^2) E; the gradient is this times u
+
+    /// d^2 psi / du_j^2 for a component u_j of u (2 E is the sum of the two above).
+    [[nodiscard]] double curvature(double u) const noexcept {
+        return gradient_over_u - u * u * (2.0 * gradient_over_u + value);
+    }
 };
 
 [[nodiscard]] inline RadialMexicanHat radial_mexican_hat(double square, double dimension) noexcept {

@@ -62,7 +62,7 @@ class Explicit {
     [[nodiscard]] Rendered drive(double force) noexcept {
         const EnvironmentSample sample = environment_.at(position_, state_);
         const double velocity =
-            velocity_ + period_ / inertia_.mass * (force - sample.force - inertia_.damping * velocity_);
+            velocity_ + period_ / inertia_.mass * ((force - inertia_.damping * velocity_) - sample.force);
         const double position = position_ + period_ * velocity;
         if (!std::isfinite(position)) {
             return detail::refused(position_);

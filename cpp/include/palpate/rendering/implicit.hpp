@@ -42,11 +42,13 @@ class Implicit {
                (inertia.mass / (period * period) + inertia.damping / period);
     }
 
+    [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
-        memory_ = {position};
+        memory_ = typename Solver::Memory{position};
         before_ = position;
     }
 
@@ -80,7 +82,6 @@ class Implicit {
             return detail::refused(position_);
         }
         environment_.advance(solution.position, state_);
-        memory_ = solver_.remember(line, solution);
         before_ = position_;
         position_ = solution.position;
         return {0.0, position_, solution.evaluations, solution.status, solution.environment.extrapolated};

@@ -30,23 +30,25 @@ class Massless {
         return coupling.stiffness + coupling.damping / period;
     }
 
+    [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
         position_ = position;
-        memory_ = {position};
+        memory_ = typename Solver::Memory{position};
     }
 
     [[nodiscard]] Rendered step(double device) noexcept {
         const double damping = coupling_.damping / period_;
-        const LoadLine line{coupling_.stiffness + damping,
-                            coupling_.stiffness * device + damping * (device - device_ + position_)};
+        const LoadLine line{
+            coupling_.stiffness + damping,
+            (coupling_.stiffness * device + damping * (device - device_)) + damping * position_};
         const Solution solution = solver_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
         environment_.advance(solution.position, state_);
-        memory_ = solver_.remember(line, solution);
         device_ = device;
         position_ = solution.position;
         return {solution.environment.force, position_, solution.evaluations, solution.status,

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
+#include "palpate/model/compiled_network.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/readable.hpp"
 #include "palpate/rendering/compensated.hpp"
@@ -21,6 +22,9 @@
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/solver/piecewise_force.hpp"
+#include "palpate/solver/resolvent.hpp"
+#include "palpate/solver/sliding_resolvent.hpp"
 
 namespace palpate {
 
@@ -107,55 +111,72 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
     if (scheme.structure == StructureKind::Explicit) {
         const double steepest = steepest_slope(scheme, model);
         const double limit = explicit_slope_limit(scheme.inertia, scheme.coupling, period_s);
-        detail::require(steepest < limit,
-                        "structure is explicit, which diverges: the model's steepest slope is " +
-                            readable(steepest) + ", must be below " + readable(limit) +
-                            " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
+        detail::require(
+            steepest < limit,
+            "structure is explicit, which diverges: the model's steepest slope is " + readable(steepest) +
+                ", must be below " + readable(limit) +
+                " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
     }
 }
 
-/// The numerical search of a structure's load line: where p + f' can vanish it must not step over a whole
-/// wavelet, or it could miss the branch that a slow motion follows.
-[[nodiscard]] inline LoadLineSolver solver_for(const ForceModel& model, double load_line_slope) {
-    LoadLineSolver solver;
-    if (load_line_slope + model.slope_bounds().lower <= 0.0) {
-        solver.longest_step = 0.25 * model.finest_width();
-    }
-    return solver;
-}
-
-/// Calls `visit` with the structure that the scheme asks for, built over the model's environment.
+/// Calls `visit` with the structure that the scheme asks for, built over the model's environment. The one place
+/// that prepares a model for the loop: curves become certified polynomials and load lines certified tables, each
+/// where that can be proved, in a few milliseconds.
 template <class Visitor>
 auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, Visitor visit) {
     validate(scheme, given);
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
-    const double coupling = scheme.coupling.stiffness + scheme.coupling.damping / period_s;
-    const double inertia = (scheme.inertia.mass / period_s + scheme.inertia.damping) / period_s;
-    const auto build = [&](const auto& environment, const LoadLineSolver& massless,
-                           const LoadLineSolver& implicit) {
+    const auto build = [&](auto environment, auto solver_of) {
+        using E = decltype(environment);
+        using Solver = decltype(solver_of(0.0));
         switch (scheme.structure) {
             case StructureKind::Direct:
-                return visit(Direct{environment});
-            case StructureKind::Massless:
-                return visit(Massless{environment, scheme.coupling, period_s, massless});
-            case StructureKind::Implicit:
-                return visit(Implicit{environment, scheme.inertia, scheme.coupling, period_s, implicit});
+                return visit(Direct{std::move(environment)});
+            case StructureKind::Massless: {
+                const double p = Massless<E>::load_line_slope(scheme.coupling, period_s);
+                return visit(
+                    Massless<E, Solver>{std::move(environment), scheme.coupling, period_s, solver_of(p)});
+            }
+            case StructureKind::Implicit: {
+                const double p = Implicit<E>::load_line_slope(scheme.inertia, scheme.coupling, period_s);
+                return visit(Implicit<E, Solver>{std::move(environment), scheme.inertia, scheme.coupling,
+                                                 period_s, solver_of(p)});
+            }
             case StructureKind::EnergyConsistent:
-                return visit(EnergyConsistent{environment, scheme.inertia, scheme.coupling, period_s,
-                                              1e-2 * model.finest_width()});
+                return visit(EnergyConsistent{std::move(environment), scheme.inertia, scheme.coupling,
+                                              period_s, 1e-2 * model.finest_width()});
             case StructureKind::Explicit:
                 break;
         }
-        return visit(Explicit{environment, scheme.inertia, scheme.coupling, period_s});
+        return visit(Explicit{std::move(environment), scheme.inertia, scheme.coupling, period_s});
     };
-    const auto render = [&](const auto& environment) {
-        if (scheme.compensated) {
-            // Its slope is above -K_c everywhere: the load line is unique.
-            return build(Compensated{environment, scheme.coupling.stiffness}, {}, {});
-        }
-        return build(environment, solver_for(model, coupling), solver_for(model, coupling + inertia));
-    };
-    return model.hysteresis() ? render(*model.hysteresis()) : render(*model.network());
+    if (const HysteresisNetwork* both = model.hysteresis()) {
+        return build(CompiledHysteresis{*both}, [&](double p) { return SlidingResolvent{*both, p}; });
+    }
+    const CompiledNetwork network{*model.network()};
+    const NetworkCurve& curve = network.curve().curve();
+    if (scheme.compensated) {
+        const double stiffness = scheme.coupling.stiffness;
+        return build(Compensated{network, stiffness},
+                     [&](double p) { return CompensatedResolvent{piecewise(curve), stiffness, p}; });
+    }
+    return build(network, [&](double p) { return Resolvent{curve, p}; });
+}
+
+/// How the load line of a rendering is solved: "table" where it is at least in part, else "newton"; nothing
+/// where there is none to solve.
+[[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
+                                                                 const Scheme& scheme, double period_s) {
+    return with_structure(model, scheme, period_s,
+                          [&](const auto& structure) -> std::optional<std::string_view> {
+                              if constexpr (requires { structure.solver(); }) {
+                                  return structure.solver().tabulated() ? "table" : "newton";
+                              } else if (scheme.structure == StructureKind::EnergyConsistent) {
+                                  return "newton";
+                              } else {
+                                  return std::nullopt;
+                              }
+                          });
 }
 
 }  // namespace palpate

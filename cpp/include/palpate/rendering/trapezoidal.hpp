@@ -33,7 +33,7 @@ class Trapezoidal {
 
     void reset(double position) noexcept {
         state_ = environment_.start(position);
-        memory_ = {position};
+        memory_ = typename Solver::Memory{position};
         device_ = position;
         position_ = position;
         velocity_ = 0.0;
@@ -79,7 +79,6 @@ class Trapezoidal {
         position_ = position;
         own_ = -inertia_.damping * velocity_ - solution.environment.force;
         environment_.advance(position, state_);
-        memory_ = solver_.remember(line, solution);
         return {0.0, position, solution.evaluations, solution.status, solution.environment.extrapolated};
     }
 

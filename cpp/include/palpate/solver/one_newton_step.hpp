@@ -13,23 +13,22 @@ namespace palpate {
 struct OneNewtonStep {
     using Memory = WarmStart;
 
-    [[nodiscard]] WarmStart remember(LoadLine /*line*/, const Solution& solution) const noexcept {
-        return {solution.position};
-    }
+    [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
 
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
-                                 const WarmStart& start) const noexcept {
-        const double y = start.position;
+                                 WarmStart& memory) const noexcept {
+        const double y = memory.position;
         const EnvironmentSample at = environment.at(y, state);
         const double slope = line.slope + at.slope;
         const double step = (line.intercept - line.slope * y - at.force) / slope;
         if (!std::isfinite(step)) {
             return {y, at, step, 1, Status::NonFinite};
         }
+        memory = WarmStart{y + step};
         EnvironmentSample there = at;
         there.force = at.force + at.slope * step;
-        return {y + step, there, 0.0, 1, slope > 0.0 ? Status::Ok : Status::NotUnique};
+        return {memory.position, there, 0.0, 1, slope > 0.0 ? Status::Ok : Status::NotUnique};
     }
 };
 

@@ -2,285 +2,346 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/model/network_curve.hpp"
-#include "palpate/model/piecewise_septic.hpp"
+#include "palpate/solver/inverse_table.hpp"
 #include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
+#include "palpate/solver/piecewise_force.hpp"
+#include "palpate/solver/rising.hpp"
 
 namespace palpate {
 
-/// How exact a tabulated resolvent must be, and how large it may become.
-struct ResolventOptions {
-    double relative_error = 1e-12;     ///< of the travel, rounding included
-    std::size_t largest_table = 8192;  ///< cells of 64 bytes
-};
-
-/// The certified bounds by which a numerical search may stop early, for load lines of slope p.
-[[nodiscard]] inline LoadLineSolver certified_solver(const NetworkCurve& curve, double p) {
+/// What is certified of a force so that a numerical search may stop early; where the solution is not unique, the
+/// search steps over no wavelet.
+[[nodiscard]] inline LoadLineSolver certified_solver(const PiecewiseForce& force) {
     LoadLineSolver solver;
-    const double edges = std::min(curve.below().at_edge.slope, curve.above().at_edge.slope);
-    const double least = p + std::min({curve.slope_bounds().lower, edges, 0.0});
-    if (!(least > 0.0)) {
-        return solver;
+    const double travel = force.upper - force.lower;
+    solver.longest_step = 0.25 * travel;
+    for (const double alpha : force.network.alpha) {
+        solver.longest_step = std::min(solver.longest_step, 0.25 / alpha);
     }
-    solver.least_slope = least;
-    if (!curve.periodic()) {
+    solver.least_slope = slope_bounds(force.network, force.lower, force.upper).lower;
+    for (const auto* side : {&force.below, &force.above}) {
+        for (const OuterLine& line : *side) {
+            solver.least_slope = std::min(solver.least_slope, line.slope);
+        }
+    }
+    if (!force.periodic) {
         constexpr int cuts = 256;
-        const double step = (curve.upper() - curve.lower()) / cuts;
         solver.curvature = 0.0;
         for (int k = 0; k < cuts; ++k) {
-            const double from = curve.lower() + k * step;
+            const double from = force.lower + travel * k / cuts;
             solver.curvature =
-                std::max(solver.curvature, derivative_bounds(curve.parameters(), from, from + step)[2]);
+                std::max(solver.curvature, derivative_bounds(force.network, from, from + travel / cuts)[2]);
         }
-        solver.smooth_from = curve.lower();
-        solver.smooth_to = curve.upper();
+        solver.smooth_from = force.lower;
+        solver.smooth_to = force.upper;
     }
     return solver;
 }
 
+/// A stretch over which F(y) = f(y) + p y rises from `values.lower` to `values.upper`: one solution for every q
+/// in between, by table, on a line, or else by Newton's method between its ends.
+struct Branch {
+    Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    InverseTable table;
+    double line_slope = 0.0;  ///< p + f' of a line; 0: a curve
+    double bend_low = 0.0;    ///< |f''| at an end that is a fold
+    double bend_high = 0.0;
+
+    /// The position on a line, from the end that is finite.
+    [[nodiscard]] double on_line(double q) const noexcept {
+        return std::isfinite(positions.upper) ? positions.upper + (q - values.upper) / line_slope
+                                              : positions.lower + (q - values.lower) / line_slope;
+    }
+
+    /// Near a fold F is a parabola; elsewhere the last position is as good a guess.
+    [[nodiscard]] double first_guess(double q, double last) const noexcept {
+        const double near = 0.1 * (values.upper - values.lower);
+        if (bend_high > 0.0 && values.upper - q < near) {
+            last = positions.upper - std::sqrt(2.0 * (values.upper - q) / bend_high);
+        } else if (bend_low > 0.0 && q - values.lower < near) {
+            last = positions.lower + std::sqrt(2.0 * (q - values.lower) / bend_low);
+        }
+        return last > positions.lower && last < positions.upper ? last
+                                                                : 0.5 * (positions.lower + positions.upper);
+    }
+};
+
 /// y = R(q), the solution of f(y) + p y = q as a function of q, for a fixed p: the implicit step without any
-/// iteration. Where p + f' > 0 is certified R is smooth between the edges of the domain and is tabulated there
-/// by polynomials of degree 7; beyond the edges f is a line and R is solved exactly.
+/// iteration.
 ///
-/// The error is certified on every cell by the residual of its polynomial P, r(q) = f(P(q)) + p P(q) - q. At
-/// both borders r and three derivatives vanish, so |r| <= max|r^(8)| h^8 / (256 * 8!), the composition's eighth
-/// derivative is bounded by the bounds of both factors' Taylor coefficients, and |P - R| <= |r| / min(p + f').
-/// Where this does not certify the error asked for, the load line is solved by `LoadLineSolver`.
+/// F = f + p y rises along its branches; between some of them it falls. A branch inside the domain has a table of
+/// its own, certified cell by cell (`inverse_tables`); beyond the edges f is a line, which is solved exactly; a
+/// knob repeats them all with every turn. Which branch a solution lies on is defined by the motion: from the last
+/// one the step walks in the direction of -residual to the first root. From a rising branch that is simple: while
+/// q is above its highest F, on to the next; while it is below its lowest, back.
+///
+/// Near a fold, and where the error asked for cannot be certified, a short branch has no table but a bracket for
+/// Newton's method; where not even the folds can be told, all is left to `LoadLineSolver`.
 class Resolvent {
   public:
-    Resolvent(const NetworkCurve& curve, double p, const ResolventOptions& options = {})
-        : solver_{certified_solver(curve, p)}, slope_{p}, below_{curve.below()}, above_{curve.above()} {
-        if (solver_.least_slope > 0.0 && std::isfinite(p) && !curve.periodic()) {
-            tabulate(curve, options);
+    /// What the last step leaves to the next: the branch it ended on.
+    struct Memory {
+        WarmStart newton;
+        std::size_t branch = 0;  ///< 0: not known
+        double turns = 0.0;      ///< of a knob
+
+        Memory() = default;
+        explicit Memory(double position) noexcept : newton{position} {}
+    };
+
+    Resolvent(const PiecewiseForce& force, double p, const ResolventOptions& options = {})
+        : solver_{certified_solver(force)}, slope_{p}, period_{force.upper - force.lower} {
+        if (std::isfinite(p)) {
+            branch_out(force, options);
         }
     }
+    Resolvent(const NetworkCurve& curve, double p, const ResolventOptions& options = {})
+        : Resolvent{piecewise(curve), p, options} {}
 
-    [[nodiscard]] bool tabulated() const noexcept { return !table_.empty(); }
-    [[nodiscard]] std::size_t cells() const noexcept { return table_.size(); }
-    /// Proved bound of |y - R(q)|; zero where nothing was tabulated.
-    [[nodiscard]] double position_error() const noexcept { return position_error_; }
-    [[nodiscard]] const LoadLineSolver& solver() const noexcept { return solver_; }
-
-    using Memory = WarmStart;
-
-    [[nodiscard]] WarmStart remember(LoadLine line, const Solution& solution) const noexcept {
-        return tabulated() ? WarmStart{solution.position} : solver_.remember(line, solution);
+    /// Whether at least one branch has a table.
+    [[nodiscard]] bool tabulated() const noexcept { return cells() > 0; }
+    [[nodiscard]] std::size_t cells() const noexcept {
+        std::size_t sum = 0;
+        for (const Branch& branch : branches_) {
+            sum += branch.table.table.size();
+        }
+        return sum;
     }
+    /// Proved bound of |y - R(q)| where a table answers; zero where there is none.
+    [[nodiscard]] double position_error() const noexcept {
+        double worst = 0.0;
+        for (const Branch& branch : branches_) {
+            worst = std::max(worst, branch.table.error);
+        }
+        return worst;
+    }
+    /// Those of one turn, from left to right. The first is none: it stands for not knowing.
+    [[nodiscard]] const std::vector<Branch>& branches() const noexcept { return branches_; }
+    [[nodiscard]] const LoadLineSolver& solver() const noexcept { return solver_; }
 
     /// Inlined, so that a step pays for what it uses of the answer.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
-                                                            const WarmStart& start) const noexcept {
+                                                            Memory& memory) const noexcept {
+        const Branch& branch = branches_[memory.branch];
         const double q = line.intercept;
-        if (q >= from_ && q <= to_ && line.slope == slope_) {
-            const double y = table_.value(q - origin_);
-            return {y, {q - slope_ * y, unknown, unknown, false}};
+        if (branch.table.covers(q) && memory.turns == 0.0 && line.slope == slope_) {
+            memory.newton.position = branch.table.at(q);
+            return answer(memory.newton.position, q, false);
         }
-        if (tabulated() && line.slope == slope_ && std::isfinite(q)) {
-            return beyond(q);
-        }
-        return solver_.solve(environment, state, line, start);
+        return elsewhere(environment, state, line, memory);
+    }
+
+    /// From a start, without memory.
+    template <Environment E>
+    [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
+                                 double start) const noexcept {
+        Memory memory{start};
+        return solve(environment, state, line, memory);
     }
 
   private:
     /// The table gives position and force. Slope and energy would cost as much again, and no structure asks.
-    static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-
-    /// The edge line, or nothing but p y = q where contact is lost.
-    [[nodiscard, gnu::noinline]] Solution beyond(double q) const noexcept {
-        const EdgeLine& line = q < from_ ? below_ : above_;
-        const double slope = slope_ + line.at_edge.slope;
-        const double distance = (q - (line.at_edge.value + slope_ * line.edge)) / slope;
-        if (std::abs(distance) < line.reach) {
-            const double y = line.edge + distance;
-            return {y, {q - slope_ * y, unknown, unknown, true}};
-        }
-        return {q / slope_, {0.0, unknown, unknown, true}};
+    [[nodiscard]] Solution answer(double y, double q, bool extrapolated) const noexcept {
+        constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+        return {y, {q - slope_ * y, unknown, unknown, extrapolated}};
     }
 
-    /// One attempt: a table of some number of cells, and what is certified about it.
-    struct Attempt {
-        PiecewiseSeptic table;
-        double origin;      ///< q in the middle of the first cell
-        double truncation;  ///< of the polynomials, in y
-        double rounding;
-    };
+    template <Environment E>
+    [[nodiscard, gnu::noinline]] Solution elsewhere(const E& environment, const typename E::State& state,
+                                                    LoadLine line, Memory& memory) const noexcept {
+        if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept) &&
+              std::isfinite(memory.newton.position))) {
+            const Solution solution = solver_.solve(environment, state, line, memory.newton);
+            if (solution.status != Status::NonFinite) {
+                memory.branch = 0;
+                memory.turns = 0.0;
+            }
+            return solution;
+        }
+        Memory next = memory;
+        if (next.branch == 0) {
+            place(environment, state, line, next);
+        }
+        walk(line.intercept, next);
+        const Branch& branch = branches_[next.branch];
+        const double turned = period_ * next.turns;
+        const double q =
+            std::clamp(line.intercept - slope_ * turned, branch.values.lower, branch.values.upper);
+        Solution solution;
+        if (branch.table.covers(q)) {
+            solution = answer(branch.table.at(q) + turned, line.intercept, false);
+        } else if (branch.line_slope > 0.0) {
+            solution = answer(branch.on_line(q), q, true);
+        } else {
+            solution = solver_.solve(environment, state, line,
+                                     branch.first_guess(q, next.newton.position - turned) + turned,
+                                     {branch.positions.lower + turned, branch.positions.upper + turned});
+        }
+        if (solution.status != Status::NonFinite) {
+            next.newton = WarmStart{solution.position};
+            memory = next;
+        }
+        return solution;
+    }
 
-    void tabulate(const NetworkCurve& curve, const ResolventOptions& options) {
-        const double asked = options.relative_error * (curve.upper() - curve.lower());
-        for (double cells = 128.0; cells <= static_cast<double>(options.largest_table);) {
-            Attempt attempt = tabulated(curve, static_cast<std::int64_t>(cells));
-            if (!(attempt.rounding <= 0.9 * asked)) {
-                return;
-            }
-            if (attempt.truncation <= 0.1 * asked) {
-                position_error_ = attempt.truncation + attempt.rounding;
-                table_ = std::move(attempt.table);
-                origin_ = attempt.origin;
-                from_ = curve.inside(curve.lower()).value + slope_ * curve.lower();
-                to_ = curve.inside(curve.upper()).value + slope_ * curve.upper();
-                return;
-            }
-            cells =
-                std::ceil(cells * std::fmax(1.1, 1.05 * std::pow(attempt.truncation / (0.1 * asked), 0.125)));
+    /// The branch that holds the last position; where F falls, the one that -residual leads to.
+    template <Environment E>
+    void place(const E& environment, const typename E::State& state, LoadLine line,
+               Memory& memory) const noexcept {
+        const double y = memory.newton.position;
+        memory.turns = repeats_ ? std::floor((y - branches_[1].positions.lower) / period_) : 0.0;
+        double along = y - memory.turns * period_;
+        memory.branch = 1;
+        while (memory.branch < branches_.size() && along > branches_[memory.branch].positions.upper) {
+            ++memory.branch;
+        }
+        if (memory.branch == branches_.size()) {
+            memory.branch = 1;
+            memory.turns += 1.0;
+            along -= period_;
+        }
+        if (along < branches_[memory.branch].positions.lower &&
+            environment.at(y, state).force + line.slope * y > line.intercept) {
+            retreat(memory);
         }
     }
 
-    [[nodiscard]] Attempt tabulated(const NetworkCurve& curve, std::int64_t cells) const {
-        const NetworkParameters& network = curve.parameters();
-        const double lower = curve.lower();
-        const double upper = curve.upper();
-        const double from = curve.inside(lower).value + slope_ * lower;
-        const double to = curve.inside(upper).value + slope_ * upper;
-        const double width = (to - from) / static_cast<double>(cells);
-        const double origin = from + 0.5 * width;
-        const double reach = std::max(std::abs(lower), std::abs(upper));
-        const Jet rounding = detail::jet_rounding(network, reach);
-        const double epsilon = std::numeric_limits<double>::epsilon();
-        const double argument = 4.0 * epsilon * (std::max(std::abs(from), std::abs(to)) + (to - from));
-        double data = 0.0;
-        Jet last{lower, 0.0, 0.0, 0.0};
-        const auto jet = [&](double x) noexcept {
-            const double q = std::clamp(origin + x, from, to);
-            const InverseJet inverse = invert(network, q, continued(last, width)[0], lower, upper);
-            last = inverse.jet;
-            data = std::max(data, inverse.rounding(rounding, argument, solver_.least_slope, width));
-            return continued(inverse.jet, origin + x - q);
+    void advance(Memory& memory) const noexcept {
+        if (++memory.branch == branches_.size()) {
+            memory.branch = 1;
+            memory.turns += 1.0;
+        }
+    }
+
+    void retreat(Memory& memory) const noexcept {
+        if (--memory.branch == 0) {
+            memory.branch = branches_.size() - 1;
+            memory.turns -= 1.0;
+        }
+    }
+
+    /// Over the branches to the first that q meets, in the one direction in which there is something to walk.
+    void walk(double q, Memory& memory) const noexcept {
+        const double turn = slope_ * period_;
+        if (repeats_) {
+            // Whole turns that hold no root on the way.
+            if (q > highest_ + memory.turns * turn) {
+                memory.branch = 1;
+                memory.turns = std::ceil((q - highest_) / turn);
+            } else if (q < lowest_ + memory.turns * turn) {
+                memory.branch = branches_.size() - 1;
+                memory.turns = std::floor((q - lowest_) / turn);
+            }
+        }
+        // Twice around is more than enough; so far out that a turn is below rounding there is no end.
+        std::size_t steps = 2 * branches_.size();
+        while (q - memory.turns * turn > branches_[memory.branch].values.upper && steps-- > 0) {
+            advance(memory);
+        }
+        while (q - memory.turns * turn < branches_[memory.branch].values.lower && steps-- > 0) {
+            retreat(memory);
+        }
+    }
+
+    void branch_out(const PiecewiseForce& force, const ResolventOptions& options) {
+        const auto stretches = rising_stretches(force.network, slope_, force.lower, force.upper);
+        const auto rises = [&](const std::vector<OuterLine>& side) {
+            return side.empty() || slope_ + side.back().slope > 0.0;
         };
-        Attempt attempt{{-1, cells, width, jet}, origin, 0.0, 0.0};
-        for (std::size_t k = 1; k + 1 < attempt.table.size(); ++k) {
-            attempt.truncation =
-                std::max(attempt.truncation, cell_error(network, attempt.table.coefficients(k)));
+        if (!stretches || !rises(force.below) || !rises(force.above) ||
+            (force.periodic && (stretches->empty() || !(slope_ > 0.0)))) {
+            return;
         }
-        attempt.rounding = data + attempt.table.rounding()[0];
-        return attempt;
+        add_lines(force.below, force.lower, total(force, force.lower), -1.0);
+        std::reverse(branches_.begin() + 1, branches_.end());
+        for (const Interval& positions : *stretches) {
+            add_stretch(force, positions, options);
+        }
+        add_lines(force.above, force.upper, total(force, force.upper), 1.0);
+        repeats_ = force.periodic;
     }
 
-    /// R and its derivatives at one q, with what they came from.
-    struct InverseJet {
-        Jet jet;
-        Jet forward;      ///< F = f + p y and its derivatives there
-        double residual;  ///< F(y) - q
-
-        /// How far rounding may take the value of a cell's polynomial, in y.
-        [[nodiscard]] double rounding(const Jet& of_f, double argument, double least_slope,
-                                      double width) const noexcept {
-            const double epsilon = std::numeric_limits<double>::epsilon();
-            const double off = (std::abs(residual) + of_f[0] + argument) / least_slope;
-            // An error in y moves every derivative by the next one; the fourth is below what rounding costs.
-            const double s = forward[1];
-            const double d1 = of_f[1] + std::abs(forward[2]) * off + 2.0 * epsilon * s;
-            const double d2 = of_f[2] + std::abs(forward[3]) * off;
-            const double d3 = 2.0 * of_f[3];
-            const double f2 = std::abs(forward[2]);
-            const double f3 = std::abs(forward[3]);
-            const Jet error{off, d1 / (s * s), d2 / (s * s * s) + 3.0 * f2 * d1 / (s * s * s * s),
-                            (6.0 * f2 * d2 + s * d3 + f3 * d1) / std::pow(s, 5) +
-                                5.0 * (3.0 * f2 * f2 + s * f3) * d1 / std::pow(s, 6)};
-            double sum = 0.0;
-            double power = 1.0;
-            for (std::size_t d = 0; d < error.size(); ++d) {
-                sum += detail::hermite_value[d] * (error[d] + 16.0 * epsilon * std::abs(jet[d])) * power;
-                power *= width;
-            }
-            return sum;
-        }
-    };
-
-    /// Newton's method in a bracket, to the last digit.
-    [[nodiscard]] InverseJet invert(const NetworkParameters& network, double q, double start, double low,
-                                    double high) const noexcept {
-        double y = start;
-        Jet forward{};
-        double residual = 0.0;
-        for (int evaluations = 0; evaluations < 100; ++evaluations) {
-            forward = detail::jet(network, y);
-            forward[0] += slope_ * y;
-            forward[1] += slope_;
-            residual = forward[0] - q;
-            (residual < 0.0 ? low : high) = y;
-            double next = y - residual / forward[1];
-            if (!(next >= low && next <= high)) {
-                next = 0.5 * (low + high);
-            }
-            if (std::abs(next - y) <= 2.0 * std::numeric_limits<double>::epsilon() * std::abs(y) ||
-                std::abs(residual) <= 4.0 * std::numeric_limits<double>::epsilon() * std::abs(q)) {
-                break;
-            }
-            y = next;
-        }
-        const double s = forward[1];
-        const double s3 = s * s * s;
-        return {
-            {y, 1.0 / s, -forward[2] / s3, (3.0 * forward[2] * forward[2] - s * forward[3]) / (s3 * s * s)},
-            forward,
-            residual};
+    [[nodiscard]] double total(const PiecewiseForce& force, double y) const noexcept {
+        return detail::jet(force.network, y)[0] + slope_ * y;
     }
 
-    /// The cubic that goes on from a jet: a first guess, and what rounding may meet beyond the edges.
-    [[nodiscard]] static Jet continued(const Jet& jet, double distance) noexcept {
-        const double d = distance;
-        return {jet[0] + d * (jet[1] + d * (0.5 * jet[2] + d * jet[3] / 6.0)),
-                jet[1] + d * (jet[2] + 0.5 * d * jet[3]), jet[2] + d * jet[3], jet[3]};
+    /// The tables of a rising stretch, and what they leave to Newton's method.
+    void add_stretch(const PiecewiseForce& force, Interval positions, const ResolventOptions& options) {
+        const Interval values{total(force, positions.lower), total(force, positions.upper)};
+        const bool folds_below = positions.lower > force.lower;
+        const bool folds_above = positions.upper < force.upper;
+        const auto bend = [&](double y) { return std::abs(detail::jet(force.network, y)[2]); };
+        Branch gap;
+        gap.values = values;
+        gap.positions = positions;
+        gap.bend_low = folds_below ? bend(positions.lower) : 0.0;
+        const auto close_gap = [&](double value, double position) {
+            gap.values.upper = value;
+            gap.positions.upper = position;
+            if (gap.values.upper > gap.values.lower) {
+                branches_.push_back(gap);
+            }
+        };
+        // Where F goes on rising a bracket may be a little wider than the gap: its ends are not exact.
+        const double margin = 1e-9 * period_;
+        for (InverseTable& table :
+             inverse_tables({force.network, slope_, positions, values, folds_below, folds_above},
+                            options.relative_error * period_, options.largest_table)) {
+            close_gap(table.values.lower, table.positions.lower + margin);
+            gap = Branch{};
+            gap.values.lower = table.values.upper;
+            gap.positions.lower = table.positions.upper - margin;
+            Branch branch;
+            branch.values = table.values;
+            branch.positions = table.positions;
+            branch.table = std::move(table);
+            branches_.push_back(std::move(branch));
+        }
+        gap.bend_high = folds_above ? bend(positions.upper) : 0.0;
+        close_gap(values.upper, positions.upper);
+        highest_ = std::max(highest_, values.upper);
+        lowest_ = std::min(lowest_, values.lower);
     }
 
-    /// |P - R| on one cell, P(t) of these coefficients.
-    [[nodiscard]] double cell_error(const NetworkParameters& network,
-                                    const std::array<double, 8>& c) const noexcept {
-        constexpr std::size_t order = highest_derivative;
-        // Bounds of |P^(j)| / j! over the cell, rounding included.
-        std::array<double, order + 1> inner{};
-        for (std::size_t j = 1; j < c.size(); ++j) {
-            double binomial = 1.0;
-            double power = 1.0;
-            for (std::size_t m = j; m < c.size(); ++m) {
-                inner[j] += binomial * std::abs(c[m]) * power;
-                binomial *= static_cast<double>(m + 1) / static_cast<double>(m + 1 - j);
-                power *= 0.5;
+    /// Lines one after the other, from an edge outward. Where one falls there is no branch.
+    void add_lines(const std::vector<OuterLine>& lines, double y, double q, double outward) {
+        for (const OuterLine& line : lines) {
+            const double y_end = y + outward * line.length;
+            const double q_end = q + outward * (slope_ + line.slope) * line.length;
+            if (slope_ + line.slope > 0.0) {
+                Branch branch;
+                branch.line_slope = slope_ + line.slope;
+                branch.positions = {std::min(y, y_end), std::max(y, y_end)};
+                branch.values = {std::min(q, q_end), std::max(q, q_end)};
+                branches_.push_back(std::move(branch));
             }
-            inner[j] *= 1.0 + 1e-9;
+            y = y_end;
+            q = q_end;
         }
-        const double spread = 0.5 * inner[1];
-        const DerivativeBounds outer = derivative_bounds(network, c[0] - spread, c[0] + spread);
-        // The coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j t^j)^k. k = 1 has none: P has degree 7.
-        std::array<double, order + 1> composed = inner;
-        double eighth = 0.0;
-        double factorial = 1.0;
-        for (std::size_t k = 2; k <= order; ++k) {
-            std::array<double, order + 1> product{};
-            for (std::size_t a = k - 1; a <= order; ++a) {
-                for (std::size_t b = 1; a + b <= order; ++b) {
-                    product[a + b] += composed[a] * inner[b];
-                }
-            }
-            composed = product;
-            factorial *= static_cast<double>(k);
-            eighth += outer[k] / factorial * composed[order];
-        }
-        const double steepness = slope_ + detail::jet(network, c[0])[1] - outer[2] * spread;
-        return (1.0 + 1e-9) * eighth / 256.0 / std::max(solver_.least_slope, steepness);
     }
 
     LoadLineSolver solver_;
     double slope_;
-    double from_ = std::numeric_limits<double>::infinity();  ///< q at the lower edge
-    double to_ = -std::numeric_limits<double>::infinity();   ///< q at the upper edge
-    double origin_ = 0.0;
-    PiecewiseSeptic table_;
-    EdgeLine below_;
-    EdgeLine above_;
-    double position_error_ = 0.0;
+    double period_;
+    bool repeats_ = false;
+    double highest_ = -std::numeric_limits<double>::infinity();  ///< F of any branch, in the first turn
+    double lowest_ = std::numeric_limits<double>::infinity();
+    std::vector<Branch> branches_ = std::vector<Branch>(1);
 };
 
 }  // namespace palpate

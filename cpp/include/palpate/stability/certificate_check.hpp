@@ -65,6 +65,34 @@ namespace detail {
 
 }  // namespace detail
 
+/// The first field in which a device is not the one that was certified, as a sentence; empty where it is that one.
+[[nodiscard]] inline std::string device_difference(const DeviceProfile& certified,
+                                                   const DeviceProfile& device) {
+    const std::string opening = "the certificate is for the device " + certified.id;
+    if (device.id != certified.id) {
+        return opening + ", and this is " + device.id + "; plan it again for this one";
+    }
+    if (device.position_unit != certified.position_unit) {
+        return opening + " in " + certified.position_unit + ", and here it moves in " + device.position_unit;
+    }
+    for (const auto& [name, before, now] :
+         {std::tuple{"period_s", certified.period_s, device.period_s},
+          {"jitter_s", certified.jitter_s, device.jitter_s},
+          {"inertia", certified.inertia, device.inertia},
+          {"viscous_damping", certified.viscous_damping, device.viscous_damping},
+          {"coulomb_friction", certified.coulomb_friction, device.coulomb_friction},
+          {"encoder_step", certified.encoder_step, device.encoder_step},
+          {"force_step", certified.force_step, device.force_step},
+          {"delay_samples", double(certified.delay_samples), double(device.delay_samples)},
+          {"force_limit", certified.force_limit, device.force_limit}}) {
+        if (!agree(before, now)) {
+            return opening + " with " + name + " = " + readable(before) + ", and here it is " +
+                   readable(now) + "; plan it again";
+        }
+    }
+    return "";
+}
+
 /// The first thing in a stored certificate that is not what the model gives today, as a sentence that begins with
 /// its field; empty where everything agrees. Everything is computed again: nothing that is stored is believed.
 [[nodiscard]] inline std::string disagreement(const Certificate& stored, const ForceModel& model) {

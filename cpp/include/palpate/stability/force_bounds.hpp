@@ -55,6 +55,10 @@ struct ForceBounds {
 
 namespace detail {
 
+/// How much wider than the true range the bounds of a slope may be [of the steepest]: what they are wider by is
+/// stiffness that is not rendered.
+inline constexpr double slope_slack = 0.002;
+
 /// Proved bounds over [from, to] of a g' + b h' + c h, where h shares the wavelets of g.
 struct SlopeReading {
     double of_force_slope = 1.0;  ///< a
@@ -64,7 +68,7 @@ struct SlopeReading {
 
 [[nodiscard]] inline Interval reading_bounds(const NetworkParameters& force, const NetworkParameters& loss,
                                              const SlopeReading& reading, double from, double to,
-                                             double relative = 0.01) {
+                                             double relative = slope_slack) {
     NetworkParameters slope_of = force;
     NetworkParameters value_of = loss;
     for (std::size_t i = 0; i < force.weight.size(); ++i) {
@@ -138,7 +142,7 @@ struct SlopeReading {
 
 [[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve) {
     ForceBounds bounds;
-    bounds.slope = curve.slope_bounds();
+    bounds.slope = slope_bounds(curve.parameters(), curve.lower(), curve.upper(), slope_slack);
     if (!curve.periodic()) {
         for (const EdgeLine& line : {curve.below(), curve.above()}) {
             const Interval slopes = line_slopes(line);

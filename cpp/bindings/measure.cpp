@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/measure.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include "bindings.hpp"
+#include "palpate/bench.hpp"
+#include "palpate/device/simulated.hpp"
+#include "palpate/rendering/free_motion.hpp"
+#include "palpate/rendering/probe.hpp"
+#include "palpate/rendering/pulses.hpp"
+#include "summary.hpp"
+
+#ifdef PALPATE_HAS_USB
+#include "palpate/device/usb.hpp"
+#endif
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+/// What somebody asked a probe for; the rest follows the device.
+struct ProbeWish {
+    bool wanted = false;
+    std::optional<double> lower, upper, speed, stiffness, force_limit;
+
+    [[nodiscard]] std::optional<ProbeSettings> granted(const Bench& bench, double lowest,
+                                                       double highest) const {
+        if (!wanted) {
+            return std::nullopt;
+        }
+        ProbeSettings probe = probe_for(bench, lower.value_or(lowest), upper.value_or(highest));
+        probe.speed = speed.value_or(probe.speed);
+        probe.stiffness = stiffness.value_or(probe.stiffness);
+        probe.force_limit = force_limit.value_or(probe.force_limit);
+        validate(probe);
+        detail::require(probe.force_limit <= bench.device.force_limit,
+                        "force_limit is " + readable(probe.force_limit) + ", the device makes " +
+                            readable(bench.device.force_limit));
+        return probe;
+    }
+};
+
+template <class Value>
+py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord::* field) {
+    py::array_t<Value> values(static_cast<py::ssize_t>(ticks.size()));
+    auto* out = values.mutable_data();
+    for (const TickRecord& tick : ticks) {
+        *out++ = tick.*field;
+    }
+    return values;
+}
+
+py::dict columns(const std::vector<TickRecord>& ticks) {
+    return py::dict(
+        "time"_a = column(ticks, &TickRecord::time), "position"_a = column(ticks, &TickRecord::position),
+        "velocity"_a = column(ticks, &TickRecord::velocity), "force"_a = column(ticks, &TickRecord::force),
+        "applied"_a = column(ticks, &TickRecord::applied),
+        "measured"_a = column(ticks, &TickRecord::measured),
+        "device_time"_a = column(ticks, &TickRecord::device_time),
+        "sequence"_a = column(ticks, &TickRecord::sequence));
+}
+
+/// What is measured, how long and by whom; `push` > 0: the device pushes the handle a little to either side.
+struct Measurement {
+    bool transducer = true;
+    RecordUnits units;
+    ProbeWish probe;
+    std::optional<double> push;
+    SessionSettings session;
+    std::string record;
+    bool keep = false;
+    std::optional<py::function> progress;
+};
+
+/// Tells Python how far it is; an exception from there ends the measurement and is thrown again afterwards.
+class Watcher {
+  public:
+    Watcher(const std::optional<py::function>& progress, std::atomic<bool>& asked)
+        : progress_{progress}, asked_{asked} {}
+
+    void operator()(const SessionView& view) {
+        ask_python(asked_);
+        if (!progress_ || error_ || views_++ % views_a_call != 0) {
+            return;
+        }
+        const py::gil_scoped_acquire locked;
+        try {
+            (*progress_)(view.progress.ticks.load(std::memory_order_relaxed),
+                         view.progress.position.load(std::memory_order_relaxed),
+                         view.progress.object_force.load(std::memory_order_relaxed));
+        } catch (const py::error_already_set&) {
+            error_ = std::current_exception();
+            asked_.store(true, std::memory_order_relaxed);
+        }
+    }
+
+    void rethrow() const {
+        if (error_) {
+            std::rethrow_exception(error_);
+        }
+    }
+
+  private:
+    static constexpr int views_a_call = 5;  ///< ten a second, so that a person sees a number change
+    const std::optional<py::function>& progress_;
+    std::atomic<bool>& asked_;
+    std::exception_ptr error_;
+    int views_ = 0;
+};
+
+/// A measurement on a device that is described by `bench`. The device is not open yet; `told` is added to the
+/// summary when it has been closed.
+template <Device D, class Told>
+py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSettings>& probe,
+                     Metadata metadata, Measurement& wanted, Told told) {
+    const double period_s = 1.0 / wanted.session.loop.rate_hz;
+    GuardSettings guards = bench.guards();
+    guards.force_limit = probe ? probe->force_limit : guards.force_limit;
+    Outlets outlets;
+    outlets.real_object = !wanted.push;
+    outlets.keeps = wanted.keep;
+    const Opened opened = device.open();
+    detail::require(static_cast<bool>(opened), opened.reason);
+    if (!wanted.record.empty()) {
+        const std::string reason = outlets.file.open(wanted.record, wanted.units, metadata);
+        if (!reason.empty()) {
+            device.close();
+            throw std::invalid_argument(reason);
+        }
+    }
+    std::atomic<bool> asked{false};
+    Watcher watcher{wanted.progress, asked};
+    const auto watch = [&](const SessionView& view) { watcher(view); };
+    const auto measured = [&](auto moves) {
+        const py::gil_scoped_release unlocked;
+        return measure_live(device, std::move(moves), guards, wanted.session, outlets, asked, watch);
+    };
+    const SessionReport report = probe         ? measured(Probe{*probe, period_s})
+                                 : wanted.push ? measured(Pulses{{*wanted.push}, period_s})
+                                               : measured(FreeMotion{});
+    const std::vector<std::string> notes =
+        close_record(outlets, report, wanted.session.loop, wanted.units, metadata, wanted.record);
+    watcher.rethrow();
+    py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes);
+    summary["device"] = bench.device.id;
+    summary["encoder_step"] = bench.device.encoder_step;
+    summary["force_limit"] = bench.device.force_limit;
+    summary["transducer"] = wanted.transducer;
+    summary["position_range"] = std::pair{outlets.positions.lower, outlets.positions.upper};
+    summary["force_range"] = std::pair{outlets.forces.lower, outlets.forces.upper};
+    if (wanted.keep) {
+        summary["profile"] = bench.device;
+        summary["kept"] = columns(outlets.kept);
+    }
+    told(summary);
+    return summary;
+}
+
+/// The bench on which a model is mounted; without one the default knob.
+Bench bench_with(const std::optional<ForceModel>& object, const RecordUnits& units, double period_s) {
+    if (object) {
+        return bench_for(*object, units.position == "rad", period_s);
+    }
+    Bench bench;
+    bench.device.period_s = period_s;
+    return bench;
+}
+
+py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measurement& wanted) {
+    validate(wanted.session.loop);
+    const double period_s = 1.0 / wanted.session.loop.rate_hz;
+    Bench bench = bench_with(object, wanted.units, period_s);
+    const ProbeSettings standard;
+    const std::optional<ProbeSettings> probe =
+        wanted.probe.granted(bench, object ? object->domain().lower[0] : standard.lower,
+                             object ? object->domain().upper[0] : standard.upper);
+    if (probe || wanted.push) {
+        bench.hand.stiffness = bench.hand.damping = 0.0;  // nobody holds a handle that moves by itself
+    }
+    SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
+    wanted.transducer = object && wanted.transducer;
+    if (object) {
+        device.mount({object_of(*object, 0.0), wanted.transducer});
+    }
+    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
+                                          wanted.transducer, wanted.session.loop.rate_hz);
+    metadata.insert(metadata.begin() + 1,
+                    {"simulated", "yes: device, hand and object; nothing here was measured"});
+    return measured_on(device, bench, probe, std::move(metadata), wanted, [](py::dict&) {});
+}
+
+#ifdef PALPATE_HAS_USB
+/// What a device says of itself: it is opened without force, and closed again.
+wire::Info identity_of(const std::string& serial, DeviceProfile& profile) {
+    UsbDevice device{{.serial = serial, .makes_force = false}};
+    const Opened opened = device.open();
+    detail::require(static_cast<bool>(opened), opened.reason);
+    profile = device.profile();
+    return device.info();
+}
+
+py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
+    Bench bench;
+    const wire::Info info = identity_of(serial, bench.device);
+    wanted.session.loop.rate_hz = info.rate_hz;
+    validate(wanted.session.loop);
+    wanted.transducer = (info.capabilities & wire::has_transducer) != 0;
+    detail::require(!wanted.probe.wanted || wanted.probe.upper,
+                    "a probe on a real device needs upper: how far it may go from the zero of its encoder");
+    const ProbeSettings standard;
+    wanted.probe.force_limit = wanted.probe.force_limit.value_or(standard.force_limit);
+    const std::optional<ProbeSettings> probe = wanted.probe.granted(bench, standard.lower, standard.upper);
+    UsbDevice device{{.serial = serial, .makes_force = probe || wanted.push}};
+    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
+                                          wanted.transducer, wanted.session.loop.rate_hz);
+    return measured_on(device, bench, probe, std::move(metadata), wanted, [&](py::dict& summary) {
+        const UsbHealth health = device.health();
+        summary["device"] = device.name().text();
+        summary["round_trip"] = microseconds(health.stream.round_trip);
+        summary["delay"] = microseconds(health.stream.delay);
+        summary["malformed"] = health.stream.malformed;
+        summary["stalls"] = health.stalls;
+        summary["bus_errors"] = health.bus_errors;
+        summary["watchdog_trips"] = health.stream.watchdog_trips;
+        summary["skipped_commands"] = health.skipped_commands;
+        summary["timeouts"] = health.timeouts;
+    });
+}
+#else
+py::dict measure_on_usb(const std::string& /*serial*/, Measurement& /*wanted*/) {
+    throw std::invalid_argument(
+        "palpate was built without libusb: install libusb-1.0-0-dev, then palpate again");
+}
+#endif
+
+}  // namespace
+
+void bind_measure(py::module_& module) {
+    const LoopSettings loop;
+    const RealTimeOptions real_time;
+    module.def(
+        "measure",
+        [](const std::string& device, const std::optional<ForceModel>& object, bool transducer,
+           const std::string& position_unit, const std::string& force_unit, bool probe,
+           std::optional<double> lower, std::optional<double> upper, std::optional<double> speed,
+           std::optional<double> stiffness, std::optional<double> force_limit, std::optional<double> push,
+           double rate_hz, double duration_s, const std::string& record, bool keep, int priority, int cpu,
+           double lowest_rate_share, const std::optional<py::function>& progress) {
+            Measurement wanted{transducer,
+                               {position_unit, force_unit == "N*m" ? "Nm" : force_unit},
+                               {probe, lower, upper, speed, stiffness, force_limit},
+                               push,
+                               {},
+                               record,
+                               keep,
+                               progress};
+            wanted.session.loop.rate_hz = rate_hz;
+            wanted.session.loop.duration_s = duration_s;
+            wanted.session.loop.lowest_rate_share = lowest_rate_share;
+            wanted.session.real_time = {priority, cpu};
+            if (device == "usb" || device.starts_with("usb:")) {
+                return measure_on_usb(device.substr(std::min<std::size_t>(device.size(), 4)), wanted);
+            }
+            detail::require(device == "simulated",
+                            "device is '" + device + "', must be simulated or usb[:SERIAL]");
+            return measure_on_simulated(object, wanted);
+        },
+        "device"_a = "simulated", py::kw_only(), "object"_a = py::none(), "transducer"_a = true,
+        "position_unit"_a = "rad", "force_unit"_a = "N*m", "probe"_a = false, "lower"_a = py::none(),
+        "upper"_a = py::none(), "speed"_a = py::none(), "stiffness"_a = py::none(),
+        "force_limit"_a = py::none(), "push"_a = py::none(), "rate_hz"_a = loop.rate_hz,
+        "duration_s"_a = loop.duration_s, "record"_a = "", "keep"_a = false,
+        "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
+        "lowest_rate_share"_a = loop.lowest_rate_share, "progress"_a = py::none(),
+        "A real object measured in real time; on the simulated device the model `object` is "
+        "mounted.\n\n"
+        "A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;\n"
+        "with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: "
+        "until\n"
+        "Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a\n"
+        "second. `record` names the recording, which grows as record.part; with `keep` the summary, "
+        "returned\n"
+        "by name, holds the ticks. ValueError where it is refused before anything moves.");
+}
+
+}  // namespace palpate::bindings

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <boost/asio/connect.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <nlohmann/json.hpp>
+
+#include "palpate/device/device.hpp"
+
+namespace palpate {
+
+/// Where an Inverse3 is found, and which of its directions is the handle's.
+struct Inverse3Settings {
+    std::string host = "127.0.0.1";
+    std::uint16_t port = 10001;
+    int axis = 2;                                    ///< 0 = x, 1 = y, 2 = z
+    double direction = 1.0;                          ///< +1 or -1: the way that goes into the object
+    std::chrono::milliseconds connect_within{2000};  ///< each step of opening
+    std::chrono::milliseconds answer_within{20};     ///< then the exchange is a Timeout
+};
+
+/// What the service said of the device when it was opened.
+struct Inverse3Info {
+    std::string id;           ///< short identifier, such as 049D
+    std::string type;         ///< inverse3, inverse3x, minverse
+    double force_gate = 0.0;  ///< the service's own weakening of forces where it sees oscillation: gain [-]
+    double damping = 0.0;     ///< the service's own added damping: scalar
+};
+
+/// One direction of a Haply Inverse3, Inverse3x or Minverse, through the Inverse Service of its maker: JSON over
+/// a local WebSocket. Never tried on hardware; tested against a server that speaks these messages.
+///
+/// What the documentation of version 3.5 fixes (docs.haply.co/inverseSDK/service: "WebSocket Protocol",
+/// "Control Commands", "Common Types", "JSON Conventions", "Filters", tutorials 01 and 05):
+/// - ws://localhost:10001; on connection the service sends every device with config, state and status; from
+///   then on exactly one message of states for each message that it receives, so that the host paces;
+/// - inverse3[].device_id; state.cursor_position in m, cursor_velocity in m/s, current_cursor_force in N, each
+///   {x, y, z} of a right-handed frame; status.calibrated;
+/// - inverse3[].commands.set_cursor_force.vector in N, applied once and forgotten: who falls silent gets an idle
+///   device; session.configure.profile.name in the first message only;
+/// - config.filters.force_gate.gain and .damping.scalar: forces pass both, and a global scale, on their way.
+/// Older versions call the vector `values` and ignore what they do not know. So a force of which the state never
+/// shows anything ends in a Fault: it would be rendered to nobody.
+///
+/// Position 0 is where the handle is when it is opened. The service tells no time: device_time is the host's, at
+/// the answer. An exchange parses JSON, and so allocates: that is the price of this service.
+class Inverse3Device {
+  public:
+    explicit Inverse3Device(Inverse3Settings settings = {}) : settings_{std::move(settings)} {}
+
+    Opened open() {
+        link_ = std::make_unique<Link>();
+        const std::string service = settings_.host + ":" + std::to_string(settings_.port);
+        try {
+            connect(service);
+            const Json inventory = Json::parse(received(service, "told of no device"));
+            read_inventory(inventory, service);
+            begin_session(service);
+        } catch (const Json::exception& error) {
+            link_.reset();
+            return {"what answers at " + service + " is no Haply Inverse Service: " + error.what()};
+        } catch (const std::exception& error) {
+            link_.reset();
+            return {error.what()};
+        }
+        return {};
+    }
+
+    /// Sends the command and waits for the state that answers it. An answer that comes too late is taken by the
+    /// next exchange, together with its own.
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        if (!link_ || link_->gone) {
+            last_.status = Status::Fault;
+            last_.applied = 0.0;
+            return last_;
+        }
+        try {
+            last_.status = exchanged(std::isfinite(command.force) ? command.force : 0.0);
+        } catch (const std::exception&) {
+            link_->gone = true;
+            last_.status = Status::Fault;
+        }
+        return last_;
+    }
+
+    void close() noexcept {
+        if (!link_) {
+            return;
+        }
+        try {
+            if (!link_->gone) {
+                bool closed = false;
+                link_->stream.async_close(boost::beast::websocket::close_code::normal,
+                                          [&closed](const Error& /*any*/) { closed = true; });
+                link_->run(std::chrono::milliseconds{200}, [&closed] { return closed; });
+            }
+        } catch (const std::exception&) {
+            link_->gone =
+                true;  // what matters was sent before: a service that hears nothing idles the device
+        }
+        link_.reset();
+    }
+
+    [[nodiscard]] const Inverse3Info& info() const noexcept { return info_; }
+    [[nodiscard]] const Inverse3Settings& settings() const noexcept { return settings_; }
+
+  private:
+    using Json = nlohmann::json;
+    using Error = boost::system::error_code;
+
+    /// A connection and what is on its way. Its address must not change: handlers hold it.
+    struct Link {
+        boost::asio::io_context context;
+        boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
+        boost::beast::flat_buffer buffer;
+        std::string message;       ///< being sent
+        std::string command_head;  ///< of every message but the first, up to the numbers
+        bool sending = false;
+        bool reading = false;
+        bool gone = false;
+        int unanswered = 0;     ///< messages whose state has not come
+        double position = 0.0;  ///< of the axis, as the service tells it [m]
+        double origin = 0.0;
+        double velocity = 0.0;
+        double echoed = 0.0;  ///< the service's current force along the axis [N]
+        std::uint64_t sequence = 0;
+        int unheeded = 0;  ///< states in a row without a trace of the force that was sent
+        std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+
+        /// Handlers run here and nowhere else. Whether `done` came true in time.
+        template <class Done>
+        bool run(std::chrono::milliseconds within, Done done) {
+            const auto until = std::chrono::steady_clock::now() + within;
+            context.restart();
+            while (!done() && context.run_one_until(until) > 0) {
+            }
+            return done();
+        }
+    };
+
+    static constexpr double noticed_force = 0.05;  ///< a service that heeds this shows something of it [N]
+    static constexpr int most_unheeded = 200;
+
+    void connect(const std::string& service) {
+        const auto refuse = [&](const std::string& why) {
+            throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + why +
+                                     "): start Haply Hub, or the service itself");
+        };
+        Error error;
+        const auto address = boost::asio::ip::make_address(settings_.host, error);
+        if (error) {
+            refuse("'" + settings_.host + "' is not an address");
+        }
+        bool done = false;
+        const auto finished = [&](const Error& how) {
+            error = how;
+            done = true;
+        };
+        const auto await = [&] {
+            if (!link_->run(settings_.connect_within, [&done] { return done; })) {
+                refuse("it is silent");
+            }
+            if (error) {
+                refuse(error.message());
+            }
+            done = false;
+        };
+        boost::beast::get_lowest_layer(link_->stream).async_connect({address, settings_.port}, finished);
+        await();
+        boost::beast::get_lowest_layer(link_->stream)
+            .socket()
+            .set_option(boost::asio::ip::tcp::no_delay{true});
+        link_->stream.async_handshake(service, "/", finished);
+        await();
+    }
+
+    /// The next message, while opening.
+    [[nodiscard]] std::string received(const std::string& service, const char* otherwise) {
+        bool done = false;
+        Error error;
+        link_->stream.async_read(link_->buffer, [&](const Error& how, std::size_t /*size*/) {
+            error = how;
+            done = true;
+        });
+        if (!link_->run(settings_.connect_within, [&done] { return done; }) || error) {
+            throw std::runtime_error("the Haply Inverse Service at " + service + " " + otherwise +
+                                     (error ? ": " + error.message() : ""));
+        }
+        std::string text = boost::beast::buffers_to_string(link_->buffer.data());
+        link_->buffer.clear();
+        return text;
+    }
+
+    void read_inventory(const Json& inventory, const std::string& service) {
+        const Json none = Json::array();
+        const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
+        if (devices.empty()) {
+            throw std::runtime_error("the Haply Inverse Service at " + service +
+                                     " sees no Inverse3: plug it in, and look whether Haply Hub shows it");
+        }
+        const Json& device = devices.at(0);
+        info_.id = device.at("device_id").get<std::string>();
+        const Json& config = device.at("config");
+        info_.type = config.value("type", "inverse3");
+        const Json filters = config.value("filters", Json::object());
+        info_.force_gate = filters.value(Json::json_pointer{"/force_gate/gain"}, 0.0);
+        info_.damping = filters.value(Json::json_pointer{"/damping/scalar"}, 0.0);
+        if (!device.value(Json::json_pointer{"/status/calibrated"}, true)) {
+            throw std::runtime_error("Inverse3 " + info_.id +
+                                     " is not calibrated: follow the light on it, or Haply Hub");
+        }
+        link_->command_head = R"("inverse3":[{"device_id":)" + Json(info_.id).dump() +
+                              R"(,"commands":{"set_cursor_force":{"vector":{)";
+    }
+
+    /// The first message names the program and sends no force; its answer tells where the handle is.
+    void begin_session(const std::string& service) {
+        write_message(0.0, R"({"session":{"configure":{"profile":{"name":"palpate"}}},)");
+        Error error;
+        link_->stream.write(boost::asio::buffer(link_->message), error);
+        take_state(received(service, "does not answer a command"));
+        link_->origin = link_->position;
+        last_ = {};
+        last_.sequence = link_->sequence;
+    }
+
+    void write_message(double force, const char* head) {
+        std::string& text = link_->message;
+        text.assign(head).append(link_->command_head);
+        for (int k = 0; k < 3; ++k) {
+            text += k > 0 ? "," : "";
+            text += axis_keys[static_cast<std::size_t>(k)];
+            std::array<char, 32> digits{};
+            const double along = k == settings_.axis ? -settings_.direction * force : 0.0;
+            text.append(digits.data(),
+                        std::to_chars(digits.data(), digits.data() + digits.size(), along).ptr);
+        }
+        text += "}}}}]}";
+    }
+
+    [[nodiscard]] Status exchanged(double force) {
+        Link& link = *link_;
+        if (!link.sending) {  // at most one command on its way
+            write_message(force, "{");
+            link.sending = true;
+            ++link.unanswered;
+            link.stream.async_write(boost::asio::buffer(link.message),
+                                    [&link](const Error& error, std::size_t /*size*/) {
+                                        link.sending = false;
+                                        link.gone = link.gone || error;
+                                    });
+        }
+        read_next();
+        const bool answered = link.run(settings_.answer_within, [&link] {
+            return link.gone || (!link.sending && link.unanswered == 0);
+        });
+        if (link.gone) {
+            return Status::Fault;
+        }
+        last_.position = settings_.direction * (link.position - link.origin);
+        last_.velocity = settings_.direction * link.velocity;
+        last_.applied = -settings_.direction * link.echoed;
+        last_.device_time =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - link.start).count();
+        last_.sequence = link.sequence;
+        link.unheeded = std::abs(force) > noticed_force && link.echoed == 0.0 ? link.unheeded + 1 : 0;
+        if (link.unheeded > most_unheeded) {
+            return Status::Fault;
+        }
+        return answered ? Status::Ok : Status::Timeout;
+    }
+
+    void read_next() {
+        Link& link = *link_;
+        if (link.reading || link.gone || link.unanswered == 0) {
+            return;
+        }
+        link.reading = true;
+        link.stream.async_read(link.buffer, [this, &link](const Error& error, std::size_t /*size*/) {
+            link.reading = false;
+            link.gone = link.gone || error;
+            if (link.gone) {
+                return;
+            }
+            take_state(boost::beast::buffers_to_string(link.buffer.data()));
+            link.buffer.clear();
+            --link.unanswered;
+            read_next();
+        });
+    }
+
+    /// Throws where the message is not what the documentation says, or speaks of our device no longer.
+    void take_state(const std::string& text) {
+        const Json message = Json::parse(text);
+        for (const Json& device : message.at("inverse3")) {
+            if (device.at("device_id").get_ref<const std::string&>() == info_.id) {
+                const Json& state = device.at("state");
+                const std::string key(1, axis_names[static_cast<std::size_t>(settings_.axis)]);
+                link_->position = state.at("cursor_position").at(key).get<double>();
+                link_->velocity = state.at("cursor_velocity").at(key).get<double>();
+                link_->echoed = state.at("current_cursor_force").at(key).get<double>();
+                ++link_->sequence;
+                return;
+            }
+        }
+        throw std::runtime_error("Inverse3 " + info_.id + " is gone");
+    }
+
+    static constexpr std::string_view axis_names = "xyz";
+    static constexpr std::array<const char*, 3> axis_keys{R"("x":)", R"("y":)", R"("z":)"};
+
+    Inverse3Settings settings_;
+    Inverse3Info info_;
+    std::unique_ptr<Link> link_;
+    Reading last_;
+};
+
+static_assert(Device<Inverse3Device>);
+
+/// Reads the part after "inverse3" of a device's name: nothing, or ":AXIS", or ":AXIS@PORT", with AXIS one of
+/// x, y, z, -x, -y, -z. Throws std::invalid_argument with what would be right.
+[[nodiscard]] inline Inverse3Settings inverse3_settings(const std::string& text) {
+    Inverse3Settings settings;
+    const std::size_t at = text.find('@');
+    const std::string axis = text.empty() ? "z" : text.substr(1, at == std::string::npos ? at : at - 1);
+    const std::string letter = axis.starts_with('-') ? axis.substr(1) : axis;
+    const std::size_t named = std::string_view{"xyz"}.find(letter);
+    int port = settings.port;
+    bool sound = (text.empty() || text.front() == ':') && letter.size() == 1 && named != std::string::npos;
+    if (sound && at != std::string::npos) {
+        const char* first = text.data() + at + 1;
+        const char* last = text.data() + text.size();
+        const auto [end, error] = std::from_chars(first, last, port);
+        sound = end == last && error == std::errc{} && port > 0 && port < 65536;
+    }
+    if (!sound) {
+        throw std::invalid_argument("device is 'inverse3" + text +
+                                    "', must be inverse3[:AXIS[@PORT]], AXIS of x, y, z, -x, -y, -z");
+    }
+    settings.axis = static_cast<int>(named);
+    settings.direction = axis.starts_with('-') ? -1.0 : 1.0;
+    settings.port = static_cast<std::uint16_t>(port);
+    return settings;
+}
+
+}  // namespace palpate

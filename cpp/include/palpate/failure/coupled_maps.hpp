@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "palpate/dynamics/coupling.hpp"
+#include "palpate/failure/failure_map.hpp"
+#include "palpate/failure/held_maps.hpp"
+#include "palpate/failure/objects.hpp"
+#include "palpate/failure/trials.hpp"
+#include "palpate/rendering/energy_consistent.hpp"
+#include "palpate/rendering/explicit.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "palpate/stability/coupling_need.hpp"
+
+namespace palpate {
+
+/// The stiffest spring of the explicit structure driven by a force, (4m - 2 B_o T) / T^2, over its mass.
+[[nodiscard]] inline FailureMap explicit_map(int points) {
+    constexpr double period = 1e-3;
+    constexpr std::size_t ticks = 40'000;
+    FailureMap map{"explicit", "mass m [kg*m^2]", "stiffness K [N*m/rad]", {}};
+    for (const double damping : {0.001, 0.01, 0.1}) {
+        map.lines.push_back(failure_line(
+            "B_o = " + readable(damping), logarithmic(1e-4, 1e-2, points),
+            [&](double mass) { return (4.0 * mass - 2.0 * damping * period) / (period * period); },
+            [&](double mass, double stiffness) {
+                return oscillates_force_driven(Explicit{LinearObject{stiffness}, {mass, damping}, {}, period},
+                                               ticks);
+            },
+            3.0));
+    }
+    return map;
+}
+
+namespace detail {
+
+/// Whether any of the objects that a coupling can have behind it gives energy for ever: what answers a swing of
+/// ticks t from turn to turn like a spring of some share of the coupling, or like a mass of -share.
+[[nodiscard]] inline bool coupling_loses_balance(VirtualCoupling coupling, const DeviceProfile& device) {
+    constexpr double reach = 0.01;  // [rad]
+    const double period = device.period_s;
+    for (const int pace : {1, 2, 3, 4, 6, 10}) {
+        const auto settled = static_cast<std::size_t>(400 * pace * pace);
+        const double tangent = std::tan(0.5 * std::numbers::pi / pace);
+        for (const double share :
+             {1e6, 3.0, 1.0, 0.3, -0.5, -0.8, -1.0, -1.1, -1.2, -1.4, -1.7, -2.0, -4.0}) {
+            const double stiffness = std::max(0.0, share) * coupling.stiffness;
+            const double mass =
+                std::max(0.0, -share) * coupling.stiffness * period * period / (4.0 * tangent * tangent);
+            const PacedWork work = work_of_pacing(
+                EnergyConsistent{LinearObject{stiffness}, {mass, 0.0}, coupling, period, 1e-4, false}, device,
+                {reach, pace, 1e6 * device.viscous_damping, period}, 0.0, share < 0.0 ? settled : 400);
+            if (work.negative()) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+}  // namespace detail
+
+/// The share of the coupling's stiffness that is its damping in the maps [s].
+inline constexpr double coupling_time = 0.2e-3;
+
+/// The stiffest coupling that a device bears whatever stands behind it: b > K_c T / 2 + B_c, and what it becomes
+/// with delay.
+[[nodiscard]] inline double coupling_limit(const DeviceProfile& device) noexcept {
+    const double need = coupling_need({1.0, coupling_time}, device.period_s, device.delay_samples);
+    return device.viscous_damping / (device.period_s * need);
+}
+
+/// The stiffest coupling, over the damping of the device.
+[[nodiscard]] inline FailureMap coupling_map(int points) {
+    FailureMap map{"coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]", {}};
+    for (int delay = 0; delay <= 2; ++delay) {
+        const auto device = [&](double damping) {
+            DeviceProfile knob = smooth_knob();
+            knob.viscous_damping = damping;
+            knob.delay_samples = delay;
+            return knob;
+        };
+        map.lines.push_back(failure_line(
+            "delay " + std::to_string(delay), logarithmic(0.005, 0.5, points),
+            [&](double damping) { return coupling_limit(device(damping)); },
+            [&](double damping, double stiffness) {
+                return detail::coupling_loses_balance({stiffness, coupling_time * stiffness},
+                                                      device(damping));
+            },
+            3.0));
+    }
+    return map;
+}
+
+/// How steeply an object may fall behind a coupling, over the coupling's stiffness, on a device that the
+/// coupling just suits. The bounds are sufficient: K_c + B_c/T without mass, K_c + (B_c + 2 B_o)/T with mass and
+/// backward Euler.
+[[nodiscard]] inline FailureMap falling_map(int points) {
+    constexpr double width = 0.1;  // of the snap [rad]
+    const double period = smooth_knob().period_s;
+    FailureMap map{"falling", "coupling stiffness K_c [N*m/rad]", "steepest fall s [N*m/rad]", {}};
+    const auto gives = [&](auto build, double stiffness, double falling) {
+        const VirtualCoupling coupling{stiffness, coupling_time * stiffness};
+        DeviceProfile device = smooth_knob();
+        device.viscous_damping = period * coupling_need(coupling, period, 0);
+        const SnappingObject object{falling, width};
+        const double deepest = 0.25 * falling * width * width;
+        for (const double reach : {0.02 * width, 0.2 * width, width, 2.0 * width}) {
+            for (const double middle : {0.0, 0.5 * width}) {
+                for (const int pace : paces) {
+                    const double start = middle - 0.5 * reach;
+                    const PacedWork work =
+                        work_of_pacing(build(object, coupling), device, {reach, pace, 1e6, period}, start);
+                    if (work.whole < -(object.at(start, {}).energy + deepest + work.rounding)) {
+                        return true;
+                    }
+                }
+            }
+        }
+        return false;
+    };
+    map.searched = 10.0;
+    const auto add = [&](const char* name, double damping, auto build) {
+        map.lines.push_back(failure_line(
+            name, logarithmic(10.0, 1000.0, points),
+            [&](double stiffness) {
+                return stiffness + (coupling_time * stiffness + 2.0 * damping) / period;
+            },
+            [&](double stiffness, double falling) { return gives(build, stiffness, falling); },
+            map.searched));
+    };
+    const LoadLineSolver solver{.longest_step = 0.1 * width};
+    add("massless", 0.0, [&](const auto& object, VirtualCoupling coupling) {
+        return Massless{object, coupling, period, solver};
+    });
+    add("implicit, B_o = 0.02", 0.02, [&](const auto& object, VirtualCoupling coupling) {
+        return Implicit{object, Inertia{0.001, 0.02}, coupling, period, solver};
+    });
+    return map;
+}
+
+}  // namespace palpate

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "palpate/closed_loop.hpp"
+#include "palpate/device/hands.hpp"
+#include "palpate/rendering/structure.hpp"
+
+namespace palpate {
+
+namespace detail {
+
+inline constexpr double not_finite = std::numeric_limits<double>::infinity();
+
+/// Whether a quantity that should die out grows: its largest in the last quarter of a motion above that of the
+/// second quarter.
+class Growth {
+  public:
+    explicit Growth(std::size_t ticks) noexcept : ticks_{ticks} {}
+
+    /// Whether it is worth going on.
+    [[nodiscard]] bool add(double quantity) noexcept {
+        const std::size_t quarter = std::min<std::size_t>(3, 4 * tick_ / ticks_);
+        ++tick_;
+        if (!std::isfinite(quantity)) {
+            broke_ = true;
+            return false;
+        }
+        largest_[quarter] = std::max(largest_[quarter], std::abs(quantity));
+        broke_ = quarter > 0 && largest_[quarter] > 1e6 * largest_[0];
+        return !broke_;
+    }
+
+    [[nodiscard]] bool grows() const noexcept { return broke_ || largest_[3] > largest_[1]; }
+
+  private:
+    std::size_t ticks_;
+    std::size_t tick_ = 0;
+    std::array<double, 4> largest_{};
+    bool broke_ = false;
+};
+
+}  // namespace detail
+
+/// Whether a structure that a force drives oscillates more and more after a push.
+template <Structure S>
+[[nodiscard]] bool oscillates_force_driven(S structure, std::size_t ticks) noexcept {
+    structure.reset(0.0);
+    detail::Growth growth{ticks};
+    (void)structure.drive(1.0);
+    for (std::size_t k = 0; k < ticks; ++k) {
+        const Rendered now = structure.drive(0.0);
+        if (!growth.add(now.status == Status::Ok ? now.environment_position : detail::not_finite)) {
+            break;
+        }
+    }
+    return growth.grows();
+}
+
+/// Whether it does behind its coupling while the device is held.
+template <Structure S>
+[[nodiscard]] bool oscillates_held(S structure, std::size_t ticks) noexcept {
+    structure.reset(0.0);
+    detail::Growth growth{ticks};
+    (void)structure.step(1.0);
+    for (std::size_t k = 0; k < ticks; ++k) {
+        const Rendered now = structure.step(0.0);
+        if (!growth.add(now.status == Status::Ok ? now.environment_position : detail::not_finite)) {
+            break;
+        }
+    }
+    return growth.grows();
+}
+
+inline constexpr Guards unguarded{.limit = {1e9}};
+
+/// Whether a hand that only takes energy swings more and more with the object, a spring of this stiffness at 0.
+template <Structure S>
+[[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
+                                   double stiffness, std::size_t ticks) {
+    device.force_limit = 1e9;
+    const double inertia = device.inertia + hand.mass;
+    detail::Growth growth{ticks};
+    (void)closed_loop(std::move(structure), device, hand, ticks, {8, 0.0, 1.0, unguarded},
+                      [&](const Tick& /*tick*/, const Motion& now, const EnergyAccount& /*account*/) {
+                          return growth.add(inertia * now.velocity * now.velocity +
+                                            (stiffness + hand.stiffness) * now.position * now.position);
+                      });
+    return growth.grows();
+}
+
+/// What a pacing hand has put in at the end of a few whole turns, and at half of them.
+struct PacedWork {
+    double half = 0.0;      ///< [J]
+    double whole = 0.0;     ///< [J]
+    double rounding = 0.0;  ///< what of it may be rounding [J]
+
+    /// Whether the hand gets energy out, turn after turn.
+    [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
+};
+
+template <Structure S>
+[[nodiscard]] PacedWork work_of_pacing(S structure, DeviceProfile device, const PacingHand& hand,
+                                       double start, std::size_t fewest_ticks = 2000) {
+    constexpr std::size_t fewest_turns = 16;
+    device.force_limit = 1e9;
+    const auto turn = 2 * static_cast<std::size_t>(hand.ticks);
+    const std::size_t ticks = 2 * turn * std::max(fewest_turns / 2, fewest_ticks / 2 / turn);
+    PacedWork work;
+    std::size_t tick = 0;
+    (void)closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
+                      [&](const Tick& /*now*/, const Motion& /*handle*/, const EnergyAccount& account) {
+                          work.whole = account.motor + account.loss;
+                          work.rounding = 1e-9 * account.throughput;
+                          if (++tick == ticks / 2) {
+                              work.half = work.whole;
+                          }
+                          return true;
+                      });
+    return work;
+}
+
+/// Ticks from turn to turn of pacing hands, from the Nyquist frequency down.
+inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
+
+/// Whether some pace gets energy out of an object in its steady swing.
+template <class Build>
+[[nodiscard]] bool loses_balance(Build build, const DeviceProfile& device, double reach) {
+    return std::any_of(paces.begin(), paces.end(), [&](int pace) {
+        const double firmness = 1e6 * (device.viscous_damping + 1e-6);
+        const PacedWork work = work_of_pacing(build(), device, {reach, pace, firmness, device.period_s}, 0.0);
+        return work.negative();
+    });
+}
+
+}  // namespace palpate

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "palpate/bench.hpp"
+#include "palpate/controller.hpp"
+#include "palpate/device/device.hpp"
+#include "palpate/device/simulated.hpp"
+#include "palpate/guard/guard_settings.hpp"
+#include "palpate/io/outlets.hpp"
+#include "palpate/io/recording_file.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/probe.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/rendering/structure.hpp"
+#include "palpate/session.hpp"
+#include "palpate/session_text.hpp"
+
+namespace palpate {
+
+/// A real object measured on an open device: somebody moves the handle (FreeMotion), or the device does so by
+/// itself (Probe, Pulses). Everything else is as in a rendering. Throws std::invalid_argument before anything moves.
+template <Device D, Structure S, class Watch>
+[[nodiscard]] SessionReport measure_live(D& device, S moves, const GuardSettings& guards,
+                                         const SessionSettings& settings, Outlets& outlets,
+                                         const std::atomic<bool>& asked, Watch watch) {
+    validate(settings.loop);
+    validate(guards);
+    const double period_s = 1.0 / settings.loop.rate_hz;
+    Controller controller{device, std::move(moves),
+                          Guards{force_limit(guards), slew_limit(guards, period_s),
+                                 force_ramp(guards, period_s), reading_guard(guards, period_s)}};
+    return run_session(controller, settings, outlets, asked, watch);
+}
+
+/// A probe that suits a bench: its size follows the bench's, its range is given, its limit is the device's.
+[[nodiscard]] inline ProbeSettings probe_for(const Bench& bench, double lower, double upper) {
+    ProbeSettings probe;
+    probe.lower = lower;
+    probe.upper = upper;
+    probe.speed *= bench.length;
+    probe.stiffness *= bench.stiffness;
+    probe.damping *= bench.stiffness;
+    probe.force_limit = bench.device.force_limit;
+    return probe;
+}
+
+/// The head of a recording of a real object.
+[[nodiscard]] inline Metadata measured_metadata(const std::string& created_by, const std::string& device,
+                                                const std::optional<ProbeSettings>& probe, bool transducer,
+                                                double rate_hz) {
+    return {
+        {"created_by", created_by},
+        {"device", device},
+        {"force", transducer ? "of the object against the handle, from the device's force transducer"
+                             : "what the motor held against the object: the friction of the device is in it"},
+        {"moved_by", probe ? "the device itself: a sweep from " + readable(probe->lower) + " to " +
+                                 readable(probe->upper) + " at " + readable(probe->speed) +
+                                 " a second, no force above " + readable(probe->force_limit)
+                           : "a hand"},
+        {"rate_hz", readable(rate_hz)}};
+}
+
+/// A model as a thing that can be mounted on a simulated device, at rest at `start`.
+[[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, double start) {
+    Scheme direct;
+    direct.structure = StructureKind::Direct;
+    return with_structure(model, direct, 1.0, [start](auto structure) -> std::function<double(double)> {
+        structure.reset(start);
+        return [structure](double position) mutable { return structure.step(position).force; };
+    });
+}
+
+}  // namespace palpate

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "palpate/model/bounds.hpp"
+#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/parameters.hpp"
+#include "palpate/model/piecewise_septic.hpp"
+
+namespace palpate {
+
+/// How exact a tabulated resolvent must be, and how large it may become.
+struct ResolventOptions {
+    double relative_error = 1e-12;     ///< of the travel, rounding included
+    std::size_t largest_table = 8192;  ///< cells of 64 bytes, for each branch
+};
+
+/// What is inverted: F(y) = f(y) + p y where it rises, f a network of one input without continuation.
+struct RisingForce {
+    const NetworkParameters& network;
+    double p;
+    Interval positions;
+    Interval values;           ///< F at both ends
+    bool folds_below = false;  ///< F has a fold at the lower end; else it goes on rising there
+    bool folds_above = false;
+};
+
+/// A stretch of the inverse of a rising F as polynomials of degree 7, with a proof of its error.
+struct InverseTable {
+    Interval values{std::numeric_limits<double>::infinity(),
+                    -std::numeric_limits<double>::infinity()};  ///< of F: what it answers for
+    Interval positions;                                         ///< the answers at both ends
+    double error = 0.0;                                         ///< proved bound of |y - F^-1(q)|
+    PiecewiseSeptic table;
+
+    [[nodiscard]] bool empty() const noexcept { return table.empty(); }
+    [[nodiscard, gnu::always_inline]] inline bool covers(double q) const noexcept {
+        return q >= values.lower && q <= values.upper;
+    }
+    [[nodiscard, gnu::always_inline]] inline double at(double q) const noexcept { return table.value(q); }
+};
+
+namespace detail {
+
+/// The inverse of F on cells of one width.
+///
+/// Every cell is certified for itself by the residual of its polynomial P, r(q) = F(P(q)) - q. At both borders r
+/// and three derivatives vanish, so |r| <= max|r^(8)| h^8 / (256 * 8!), the composition's eighth derivative is
+/// bounded by the bounds of both factors' Taylor coefficients, and the error is at most |r| / min F' over what
+/// the cell covers.
+class InverseCells {
+  public:
+    InverseCells(const RisingForce& force, double asked, double width) : force_{force}, asked_{asked} {
+        const auto jet = [&](double q) {
+            borders_.push_back(invert(q));
+            return borders_.back().inverse;
+        };
+        table_ = {PiecewiseSeptic::cell(force.values.lower, width),
+                  PiecewiseSeptic::cell(force.values.upper, width), width, jet};
+        const Jet rounding = jet_rounding(
+            force.network, std::max(std::abs(force.positions.lower), std::abs(force.positions.upper)));
+        for (std::size_t k = 0; k < table_.size(); ++k) {
+            errors_.push_back(cell_error(k, rounding));
+            certified_ += certified(k) ? 1 : 0;
+            curable_ += certified(k) || errors_[k] == by_rounding ? 0 : 1;
+        }
+    }
+
+    /// How many cells are certified, and how many of the others might be if they were narrower.
+    [[nodiscard]] std::size_t certified() const noexcept { return certified_; }
+    [[nodiscard]] std::size_t curable() const noexcept { return curable_; }
+    [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
+
+    /// The runs of certified cells, from left to right; not worth the while are those of a cell or two.
+    [[nodiscard]] std::vector<InverseTable> runs() const {
+        constexpr std::size_t shortest = 4;
+        std::vector<InverseTable> runs;
+        for (std::size_t first = 0; first < table_.size();) {
+            std::size_t past = first;
+            InverseTable run;
+            while (past < table_.size() && certified(past)) {
+                run.error = std::max(run.error, errors_[past++]);
+            }
+            if (past - first >= shortest) {
+                // A border itself may be rounded into the next cell.
+                const double low = table_.middle(first) - 0.5 * table_.width();
+                const double high = table_.middle(past - 1) + 0.5 * table_.width();
+                run.values = {std::max(force_.values.lower, std::nextafter(low, high)),
+                              std::min(force_.values.upper, std::nextafter(high, low))};
+                run.table = table_;
+                run.table.keep(first, past - first);
+                run.positions = {run.at(run.values.lower), run.at(run.values.upper)};
+                runs.push_back(std::move(run));
+            }
+            first = past + 1;
+        }
+        return runs;
+    }
+
+  private:
+    /// The inverse and its derivatives at one q, with what they came from.
+    struct InverseJet {
+        Jet inverse;
+        Jet forward;      ///< F and its derivatives there
+        double residual;  ///< F(y) - q
+    };
+
+    [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= asked_; }
+
+    /// Newton's method to the last digit: in a bracket between the ends, from the end beyond it.
+    [[nodiscard]] InverseJet invert(double q) const noexcept {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        constexpr double epsilon = std::numeric_limits<double>::epsilon();
+        const bool below = q < force_.values.lower;
+        const bool above = q > force_.values.upper;
+        constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+        InverseJet at{{nowhere, nowhere, nowhere, nowhere}, {}, nowhere};
+        if ((below && force_.folds_below) || (above && force_.folds_above)) {
+            return at;
+        }
+        double low = below ? -infinity : above ? force_.positions.upper : force_.positions.lower;
+        double high = above ? infinity : below ? force_.positions.lower : force_.positions.upper;
+        double y = first_guess(q, low, high);
+        for (int evaluations = 0; evaluations < 100; ++evaluations) {
+            at.forward = detail::jet(force_.network, y);
+            at.forward[0] += force_.p * y;
+            at.forward[1] += force_.p;
+            at.residual = at.forward[0] - q;
+            (at.residual < 0.0 ? low : high) = y;
+            double next = y - at.residual / at.forward[1];
+            if (!(next >= low && next <= high)) {
+                next = 0.5 * (low + high);
+            }
+            if (!(std::abs(next - y) > 2.0 * epsilon * std::abs(y)) ||
+                std::abs(at.residual) <= 4.0 * epsilon * std::abs(q)) {
+                break;
+            }
+            y = next;
+        }
+        const auto& f = at.forward;
+        const double s = f[1];
+        const double s3 = s * s * s;
+        at.inverse = {y, 1.0 / s, -f[2] / s3, (3.0 * f[2] * f[2] - s * f[3]) / (s3 * s * s)};
+        return at;
+    }
+
+    /// From the border before, where there is one, by its Taylor polynomial.
+    [[nodiscard]] double first_guess(double q, double low, double high) const noexcept {
+        if (!borders_.empty()) {
+            const InverseJet& last = borders_.back();
+            const auto& [y, first, second, third] = last.inverse;
+            const double d = q - (last.forward[0] - last.residual);
+            const double guess = y + d * (first + d * (0.5 * second + d * third / 6.0));
+            if (guess > low && guess < high) {
+                return guess;
+            }
+        }
+        return std::isfinite(low) ? (std::isfinite(high) ? 0.5 * (low + high) : low) : high;
+    }
+
+    /// The error of a cell that no narrower one would cure.
+    static constexpr double by_rounding = std::numeric_limits<double>::max();
+
+    /// |P - F^-1| on one cell; infinite where nothing is proved.
+    [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
+        constexpr std::size_t order = highest_derivative;
+        const auto c = table_.coefficients(k);
+        if (!std::all_of(c.begin(), c.end(), [](double one) { return std::isfinite(one); })) {
+            return std::numeric_limits<double>::infinity();
+        }
+        // Bounds of |P^(j)| / j! over the cell, rounding included.
+        std::array<double, order + 1> inner{};
+        for (std::size_t j = 1; j < c.size(); ++j) {
+            double binomial = 1.0;
+            double power = 1.0;
+            for (std::size_t m = j; m < c.size(); ++m) {
+                inner[j] += binomial * std::abs(c[m]) * power;
+                binomial *= static_cast<double>(m + 1) / static_cast<double>(m + 1 - j);
+                power *= 0.5;
+            }
+            inner[j] *= 1.0 + 1e-9;
+        }
+        const double spread = 0.5 * inner[1] + asked_;
+        const DerivativeBounds outer = derivative_bounds(force_.network, c[0] - spread, c[0] + spread);
+        const double least_slope =
+            force_.p + detail::jet(force_.network, c[0])[1] - of_f[1] - outer[2] * spread;
+        if (!(least_slope > 0.0)) {
+            return std::numeric_limits<double>::infinity();
+        }
+        // The coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j t^j)^k. k = 1 has none: P has degree 7.
+        std::array<double, order + 1> composed = inner;
+        double eighth = 0.0;
+        double factorial = 1.0;
+        for (std::size_t n = 2; n <= order; ++n) {
+            std::array<double, order + 1> product{};
+            for (std::size_t a = n - 1; a <= order; ++a) {
+                for (std::size_t b = 1; a + b <= order; ++b) {
+                    product[a + b] += composed[a] * inner[b];
+                }
+            }
+            composed = product;
+            factorial *= static_cast<double>(n);
+            eighth += outer[n] / factorial * composed[order];
+        }
+        const double truncation = (1.0 + 1e-9) * eighth / 256.0 / least_slope;
+        const double rounding =
+            table_.rounding(k)[0] + std::max(border_rounding(borders_[k], of_f, least_slope),
+                                             border_rounding(borders_[k + 1], of_f, least_slope));
+        return rounding < asked_ ? truncation + rounding : by_rounding;
+    }
+
+    /// How far rounding at a border may take the value of a cell's polynomial.
+    [[nodiscard]] double border_rounding(const InverseJet& at, const Jet& of_f,
+                                         double least_slope) const noexcept {
+        constexpr double epsilon = std::numeric_limits<double>::epsilon();
+        const auto& [y, s, second, third] = at.forward;
+        const double argument =
+            4.0 * epsilon * (std::abs(at.forward[0]) + std::abs(force_.p * at.inverse[0]));
+        const double off = (std::abs(at.residual) + of_f[0] + argument) / least_slope;
+        // An error in y moves every derivative by the next one; the fourth is below what rounding costs.
+        const double f2 = std::abs(second);
+        const double f3 = std::abs(third);
+        const double d1 = of_f[1] + f2 * off + 2.0 * epsilon * s;
+        const double d2 = of_f[2] + f3 * off;
+        const double d3 = 2.0 * of_f[3];
+        const Jet off_by{off, d1 / (s * s), d2 / (s * s * s) + 3.0 * f2 * d1 / (s * s * s * s),
+                         (6.0 * f2 * d2 + s * d3 + f3 * d1) / std::pow(s, 5) +
+                             5.0 * (3.0 * f2 * f2 + s * f3) * d1 / std::pow(s, 6)};
+        double sum = 0.0;
+        double power = 1.0;
+        for (std::size_t d = 0; d < off_by.size(); ++d) {
+            sum += detail::hermite_value[d] * (off_by[d] + 16.0 * epsilon * std::abs(at.inverse[d])) * power;
+            power *= table_.width();
+        }
+        return sum;
+    }
+
+    const RisingForce& force_;
+    double asked_;
+    PiecewiseSeptic table_;
+    std::vector<InverseJet> borders_;
+    std::vector<double> errors_;
+    std::size_t certified_ = 0;
+    std::size_t curable_ = 0;
+};
+
+}  // namespace detail
+
+/// The inverse of a rising F in tables, by the widest cells that cover all values, or all that any cells do.
+/// Near a fold the inverse is a square root, which no polynomial follows: a few cells are missing there, as they
+/// are where F is so flat that rounding alone is more than the error asked for.
+[[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double asked,
+                                                              std::size_t largest_table) {
+    const double range = force.values.upper - force.values.lower;
+    const double size = std::max(std::abs(force.values.lower), std::abs(force.values.upper));
+    const double left_out = force.folds_below || force.folds_above ? 1.0 / 32.0 : 0.0;
+    std::vector<InverseTable> best;
+    double covered = 0.0;
+    for (double width = std::exp2(std::floor(std::log2(range / 128.0)));
+         range / width + 2.0 <= static_cast<double>(largest_table) && size / width < 0x1p40 &&
+         PiecewiseSeptic::is_sound(width);
+         width *= 0.5) {
+        const detail::InverseCells cells{force, asked, width};
+        const auto share = [&](std::size_t count) {
+            return static_cast<double>(count) / static_cast<double>(cells.size());
+        };
+        if (share(cells.certified()) > covered) {
+            covered = share(cells.certified());
+            best = cells.runs();
+        }
+        if (share(cells.curable()) <= left_out) {
+            break;
+        }
+    }
+    return best;
+}
+
+}  // namespace palpate

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "palpate/model/hysteresis.hpp"
+#include "palpate/model/network_curve.hpp"
+#include "palpate/model/parameters.hpp"
+
+namespace palpate {
+
+/// A stretch beyond the domain over which a force is a line.
+struct OuterLine {
+    double length;  ///< infinity for the last
+    double slope;
+};
+
+/// A force over the whole line in its pieces: a network inside the domain, and either lines beyond its edges or
+/// the same period again and again.
+struct PiecewiseForce {
+    NetworkParameters network;
+    double lower = 0.0;
+    double upper = 0.0;
+    bool periodic = false;
+    std::vector<OuterLine> below;  ///< from the edge outward
+    std::vector<OuterLine> above;
+};
+
+namespace detail {
+
+/// The pieces of a sum of edge lines; `slope_at(x)` is that sum's slope, `reaches` where it may change.
+template <class Slope>
+[[nodiscard]] std::vector<OuterLine> outer_lines(double edge, double outward, std::vector<double> reaches,
+                                                 Slope slope_at) {
+    std::sort(reaches.begin(), reaches.end());
+    std::vector<OuterLine> lines;
+    double from = 0.0;
+    for (const double reach : reaches) {
+        if (reach > from && reach < std::numeric_limits<double>::infinity()) {
+            lines.push_back({reach - from, slope_at(edge + outward * 0.5 * (from + reach))});
+            from = reach;
+        }
+    }
+    lines.push_back({std::numeric_limits<double>::infinity(), slope_at(edge + outward * (2.0 * from + 1.0))});
+    return lines;
+}
+
+}  // namespace detail
+
+[[nodiscard]] inline PiecewiseForce piecewise(const NetworkCurve& curve) {
+    PiecewiseForce force{curve.parameters(), curve.lower(), curve.upper(), curve.periodic(), {}, {}};
+    if (!force.periodic) {
+        const auto lines = [](const EdgeLine& line, double outward) {
+            return detail::outer_lines(line.edge, outward, {line.reach},
+                                       [&](double x) { return line.at(x).slope; });
+        };
+        force.below = lines(curve.below(), -1.0);
+        force.above = lines(curve.above(), +1.0);
+    }
+    return force;
+}
+
+/// What a hysteresis pair is while it slides: g + s h, s = 1 pressing and -1 releasing.
+[[nodiscard]] inline PiecewiseForce piecewise(const HysteresisNetwork& pair, double s) {
+    const NetworkCurve& g = pair.force();
+    const NetworkCurve& h = pair.loss();
+    PiecewiseForce force{g.parameters(), g.lower(), g.upper(), g.periodic(), {}, {}};
+    for (std::size_t i = 0; i < force.network.weight.size(); ++i) {
+        force.network.weight[i] += s * h.parameters().weight[i];
+    }
+    force.network.linear[0] += s * h.parameters().linear[0];
+    force.network.bias += s * h.parameters().bias;
+    if (!force.periodic) {
+        const auto lines = [s](const EdgeLine& of_g, const EdgeLine& of_h, double outward) {
+            return detail::outer_lines(of_g.edge, outward, {of_g.reach, of_h.reach},
+                                       [&](double x) { return of_g.at(x).slope + s * of_h.at(x).slope; });
+        };
+        force.below = lines(g.below(), h.below(), -1.0);
+        force.above = lines(g.above(), h.above(), +1.0);
+    }
+    return force;
+}
+
+/// The force multiplied by a factor.
+[[nodiscard]] inline PiecewiseForce scaled(PiecewiseForce force, double factor) {
+    for (double& weight : force.network.weight) {
+        weight *= factor;
+    }
+    force.network.linear[0] *= factor;
+    force.network.bias *= factor;
+    for (auto* side : {&force.below, &force.above}) {
+        for (OuterLine& line : *side) {
+            line.slope *= factor;
+        }
+    }
+    return force;
+}
+
+}  // namespace palpate

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "palpate/model/bounds.hpp"
+#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/parameters.hpp"
+
+namespace palpate {
+
+/// The stretches of [lower, upper] over which F(y) = f(y) + p y rises, from left to right, f a network of one
+/// input without continuation. Between them lie the folds, where p + f' = 0, each enclosed to the last digit.
+///
+/// Proved on every cell of a bisection: either p + f' keeps its sign, or it is monotone and has one zero, by its
+/// value and slope in the middle of the cell and the bound of |f'''| over it. Nothing is returned where a fold is
+/// too flat to be told from none.
+[[nodiscard]] inline std::optional<std::vector<Interval>> rising_stretches(const NetworkParameters& network,
+                                                                           double p, double lower,
+                                                                           double upper) {
+    constexpr int first_cells = 61;
+    constexpr int budget = 20'000;
+    const Jet rounding = detail::jet_rounding(network, std::max(std::abs(lower), std::abs(upper)));
+    const double margin = rounding[1] + std::numeric_limits<double>::epsilon() * std::abs(p);
+    const auto slope = [&](double y) { return p + detail::jet(network, y)[1]; };
+
+    std::vector<Interval> cells;  // the leftmost last
+    for (int k = first_cells; k > 0; --k) {
+        const auto border = [&](int j) { return lower + (upper - lower) * j / first_cells; };
+        cells.push_back({k == 1 ? lower : border(k - 1), k == first_cells ? upper : border(k)});
+    }
+    std::vector<Interval> stretches;
+    const double first_slope = slope(lower);
+    if (!(std::abs(first_slope) > margin)) {
+        return std::nullopt;
+    }
+    bool rises = first_slope > 0.0;
+    double start = lower;  // of the stretch that is open
+    for (int looked_at = 0; !cells.empty(); ++looked_at) {
+        const Interval cell = cells.back();
+        cells.pop_back();
+        const double middle = 0.5 * (cell.lower + cell.upper);
+        const double radius = 0.5 * (cell.upper - cell.lower);
+        const Jet here = detail::jet(network, middle);
+        const double jerk = derivative_bounds(network, cell.lower, cell.upper)[3];
+        const double bend = std::abs(here[2]);
+        if (std::abs(p + here[1]) > (bend + rounding[2] + 0.5 * jerk * radius) * radius + margin) {
+            continue;
+        }
+        if (bend - rounding[2] > jerk * radius) {
+            double left = cell.lower;
+            double right = cell.upper;
+            const double at_left = slope(left);
+            const double at_right = slope(right);
+            if (std::abs(at_left) > margin && std::abs(at_right) > margin) {
+                if ((at_left > 0.0) == (at_right > 0.0)) {
+                    continue;
+                }
+                for (double fold = middle; fold > left && fold < right; fold = 0.5 * (left + right)) {
+                    ((slope(fold) > 0.0) == (at_left > 0.0) ? left : right) = fold;
+                }
+                rises = at_right > 0.0;
+                if (rises) {
+                    start = right;
+                } else {
+                    stretches.push_back({start, left});
+                }
+                continue;
+            }
+        }
+        if (looked_at >= budget || !(radius > 1e-12 * (upper - lower))) {
+            return std::nullopt;
+        }
+        cells.push_back({middle, cell.upper});
+        cells.push_back({cell.lower, middle});
+    }
+    if (rises) {
+        stretches.push_back({start, upper});
+    }
+    return stretches;
+}
+
+}  // namespace palpate

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What palpate is compared with: the methods of the paper's related work, and those of common practice.
+
+All have one face: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force, ``n_parameters_`` counts
+every fitted real number. X (n, 1 to 3) holds position and, where they are known, velocity and acceleration.
+"""
+
+from .comparison import Compared, baselines, compare
+from .hunt_crossley import HuntCrossley
+from .lookup_table import LookupTable
+from .per_stroke import PerStroke
+from .smoothing_spline import SmoothingSpline
+from .tissue import TissueParameters
+from .zones import LinearZones
+
+__all__ = [
+    "Compared",
+    "HuntCrossley",
+    "LinearZones",
+    "LookupTable",
+    "PerStroke",
+    "SmoothingSpline",
+    "TissueParameters",
+    "baselines",
+    "compare",
+]

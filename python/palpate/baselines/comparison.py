@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All baselines on one recording: fitted to the rows that a model was identified on, judged on the others."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D, Float2D
+from ..errors import InputError
+from ..recording import Recording
+from ..recording.motion import velocity
+from ..verification.metrics import normalised, root_mean_square
+from .estimator import Estimator
+from .hunt_crossley import HuntCrossley
+from .lookup_table import LookupTable
+from .per_stroke import PerStroke
+from .smoothing_spline import SmoothingSpline
+from .tissue import TissueParameters
+from .zones import LinearZones
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One baseline on held-out rows."""
+
+    name: str
+    nrmse: float
+    """RMSE over the standard deviation of the force on the held-out rows; NaN where it was refused"""
+    n_parameters: int
+    seconds: float
+    """Fit and choice of the setting"""
+    refused: str | None = None
+    """Why it could not be fitted"""
+
+
+def baselines(strokes: bool) -> dict[str, Estimator]:
+    """Every baseline under its name; with strokes, one for press and one for release."""
+    single: dict[str, Estimator] = {
+        "linear zones (Haptic Camera)": LinearZones(),
+        "tissue parameters": TissueParameters(),
+        "Hunt-Crossley": HuntCrossley(),
+        "lookup table": LookupTable(),
+        "smoothing spline": SmoothingSpline(),
+    }
+    return {f"{name}, two strokes": PerStroke(each) for name, each in single.items()} if strokes else single
+
+
+def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
+    """Fit each baseline to all rows but every `every`-th, and judge it on those.
+
+    Where the recordings tell strokes each baseline is fitted to press and release apart, which is two models
+    where an identified one is one; rows without a direction are left out.
+    """
+    strokes = all(part.direction is not None and _both(part.direction) for part in recordings)
+    tables = [_columns(part, strokes) for part in recordings]
+    width = min(X.shape[1] for X, _ in tables)
+    # the stroke stands last, velocity and acceleration where every recording has them
+    X = np.concatenate([table[:, [*range(width - strokes), *([-1] * strokes)]] for table, _ in tables])
+    y = np.concatenate([part.force for part in recordings])
+    used = np.concatenate([rows for _, rows in tables])
+    held_out = np.concatenate([np.arange(len(part)) % every == every - 1 for part in recordings])
+    train, test = used & ~held_out, used & held_out
+    return [
+        _compared(name, each, (X[train], y[train]), (X[test], y[test]))
+        for name, each in baselines(strokes).items()
+    ]
+
+
+def _compared(
+    name: str, estimator: Estimator, train: tuple[Float2D, Float1D], test: tuple[Float2D, Float1D]
+) -> Compared:
+    start = time.perf_counter()
+    try:
+        fitted = estimator.fit(*train)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        return Compared(name, float("nan"), 0, time.perf_counter() - start, str(error))
+    seconds = time.perf_counter() - start
+    rest = fitted.predict(test[0]) - test[1]
+    nrmse = normalised(root_mean_square(rest), test[1])
+    return Compared(name, nrmse, fitted.n_parameters_, seconds)
+
+
+def _both(direction: NDArray[np.int8]) -> bool:
+    return bool((direction > 0).any() and (direction < 0).any())
+
+
+def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:
+    """Position, velocity and acceleration where time gives them, the stroke last; which rows are usable."""
+    columns, rows = [recording.position], np.ones(len(recording), dtype=np.bool_)
+    if recording.time is not None:
+        try:
+            speed, known = velocity(recording)
+        except InputError:
+            pass
+        else:
+            columns += [speed, np.gradient(speed, recording.time)]
+            rows &= known
+    if strokes:
+        assert recording.direction is not None
+        columns.append(recording.direction.astype(np.float64))
+        rows &= recording.direction != 0
+    return np.column_stack(columns), rows

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate chart failures: where each method fails, measured and drawn beside its theory."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import platform
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from ..errors import InputError
+from ..recording.files import replacing
+from .arguments import PATH
+from .figures import figure_file
+from .output import number, talk
+from .verb import Verb
+
+if TYPE_CHECKING:
+    from ..analysis import FailureMap
+
+_PAGE = "where-each-method-fails.md"
+
+
+@click.command(cls=Verb, no_args_is_help=True, epilog="Example: palpate chart failures --to docs")
+@click.option(
+    "--to", metavar="FOLDER", type=PATH, required=True, help="Where figures/ goes, and the page is found."
+)
+@click.option("--points", type=click.IntRange(2, 100), default=9, help="Measured along each axis.")
+def chart_failures(to: Path, points: int) -> None:
+    """Measure where each method fails, and draw it beside its theory.
+
+    Every point is a bisection over closed loops with simulated devices and hands. Writes one picture for each
+    map and failure-maps.json, with all numbers, machine and date, to FOLDER/figures; where FOLDER holds
+    where-each-method-fails.md, its tables follow. Takes a few minutes.
+    """
+    from ..analysis import failure_map_names, measure_failure_map
+
+    page = to / _PAGE
+    text = page.read_text(encoding="utf-8") if page.exists() else None
+    figures = to / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    start = time.perf_counter()
+    maps = []
+    for name in failure_map_names:
+        before = time.perf_counter()
+        maps.append(measure_failure_map(name, points))
+        talk(f"{name}: measured in {time.perf_counter() - before:.1f} s")
+        _draw(figures / f"failure-{name}.png", maps[-1])
+    where = _where(time.perf_counter() - start)
+    written = where | {"maps": [each.as_json() for each in maps]}
+    _write(figures / "failure-maps.json", json.dumps(written, indent=1) + "\n")
+    talk(f"wrote {len(maps)} figures and failure-maps.json to {figures}")
+    if text is not None:
+        _write(page, _with_tables(text, page, maps, where))
+        talk(f"wrote the tables of {page}")
+
+
+def _write(path: Path, text: str) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _where(seconds: float) -> dict[str, Any]:
+    """Machine, date and version."""
+    from .._core import __version__
+
+    return {
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "palpate": __version__,
+        "seconds": round(seconds, 1),
+        "simulated": "device and hands are simulated; nothing here was measured on hardware",
+    }
+
+
+def _draw(path: Path, drawn: FailureMap) -> None:
+    from ..plotting import MeasuredLimit, draw_failure_map
+
+    lines = [MeasuredLimit(line.name, line.at, line.measured, line.theory) for line in drawn.lines]
+    with figure_file(path, height_inches=3.2) as (axes,):
+        draw_failure_map(axes, drawn.along, drawn.limit, lines, searched=drawn.searched, linear=drawn.linear)
+
+
+def _with_tables(text: str, page: Path, maps: list[FailureMap], where: dict[str, Any]) -> str:
+    """The page with new tables between its marks."""
+    tables = {each.name: _table(each) for each in maps}
+    tables["where"] = (
+        f"Measured by `palpate chart failures --to docs`: palpate {where['palpate']}, {where['date']}, "
+        f"{where['machine']}, {where['seconds']} s.\n"
+    )
+    for name, table in tables.items():
+        marked = re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->\n)", flags=re.DOTALL)
+        if len(marked.findall(text)) != 1:
+            raise InputError(
+                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line"
+            )
+        before, after = marked.split(text)
+        text = before + table + after
+    return text
+
+
+def _table(shown: FailureMap) -> str:
+    """Of each line, measured over theory; without theory, what was measured."""
+    if not shown.linear and any(np.isfinite(line.theory).any() for line in shown.lines):
+        rows = ["| | measured over theory |\n| --- | ---: |\n"]
+        for line in shown.lines:
+            ratio = line.ratio
+            spread = (
+                f"{ratio.min():.4f} to {ratio.max():.4f}"
+                if ratio.size
+                else f"nothing failed up to {number(shown.searched)}"
+            )
+            rows.append(f"| {line.name} | {spread} |\n")
+        return "".join(rows)
+    places = shown.lines[0].at
+    chosen = np.unique(np.linspace(0, len(places) - 1, 5).round().astype(int))
+    rows = [
+        "| " + " | ".join([shown.along, *(number(places[k]) for k in chosen)]) + " |\n",
+        "| --- |" + " ---: |" * len(chosen) + "\n",
+    ]
+    for line in shown.lines:
+        rows.append("| " + " | ".join([line.name, *(number(line.measured[k]) for k in chosen)]) + " |\n")
+    return "".join(rows)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate check-device: ten seconds, and a verdict that can be pasted into a bug report."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from pathlib import Path
+
+import click
+
+from .._core import __version__
+from ..devices import DeviceError
+from ..errors import InputError
+from .arguments import PATH
+from .device_options import device_options
+from .ending import FAILED
+from .live_line import LiveLine
+from .output import number, print_json, print_numbers, require_writable, talk
+from .verb import Verb
+
+_MARKS = {True: "ok", False: "WRONG", None: "-"}
+
+
+@click.command(cls=Verb, epilog="Example: palpate check-device --device usb --push")
+@device_options
+@click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
+@click.option("--duration-s", type=float, default=10.0, help="How long altogether.")
+@click.option(
+    "--push", is_flag=True, help="Also push the handle a little: sign of the force, delay, mechanics."
+)
+@click.option(
+    "--profile", type=PATH, metavar="DEVICE.toml", help="What the device is thought to be: does that hold?"
+)
+@click.option(
+    "--model", "model_file", type=PATH, metavar="MODEL.json", help="One with a certificate: does that hold?"
+)
+@click.option(
+    "--write-profile",
+    type=PATH,
+    metavar="OUT.toml",
+    help="Write the device as it was measured; needs --push.",
+)
+@click.option("--yes", is_flag=True, help="Push without asking.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.pass_context
+def check_device(
+    ctx: click.Context,
+    device: str,
+    object_file: Path | None,
+    transducer: bool,
+    rate_hz: float,
+    duration_s: float,
+    push: bool,
+    profile: Path | None,
+    model_file: Path | None,
+    write_profile: Path | None,
+    yes: bool,
+    as_json: bool,
+) -> None:
+    """Measure whether a device is fit to render force, and end in a verdict.
+
+    The device makes no force while it is looked at: rate, period, lost samples, encoder and, while you move
+    the handle against an object, the sign of its transducer. With --push, and only where that is right, it
+    then gives pushes of half a percent of its force to a handle that nobody holds. Exit code 1: not suitable.
+    """
+    from ..devices import check_device as check
+    from ..model import load_model
+    from ..planning import DeviceProfile
+
+    if write_profile is not None:
+        if not push:
+            raise InputError("--write-profile needs --push: inertia and damping show only in motion")
+        require_writable(write_profile)
+    mounted = None if object_file is None else load_model(object_file)
+    expected = None if profile is None else DeviceProfile.load(profile)
+    certified = None if model_file is None else load_model(model_file)
+    if push and not yes and device != "simulated":
+        if not sys.stdin.isatty():
+            raise InputError("--push moves the handle; at no terminal it needs --yes")
+        click.confirm("The handle will be pushed a little to either side. Is it free?", abort=True, err=True)
+    talk(f"checking {device} for {number(duration_s)} s; move the handle, and hold it still for a second")
+    line = LiveLine(rate_hz, ("rad", "Nm"))
+    try:
+        found = check(
+            device,
+            object=mounted,
+            transducer=transducer,
+            rate_hz=rate_hz,
+            duration_s=duration_s,
+            push=push,
+            profile=expected,
+            model=certified,
+            progress=line.show,
+        )
+    except DeviceError as error:
+        raise InputError(str(error)) from None
+    finally:
+        line.end()
+    if as_json:
+        print_json(
+            {
+                "device": found.device,
+                "suitable": found.suitable,
+                "verdict": found.verdict,
+                "findings": [
+                    {"name": finding.name, "told": finding.told, "right": finding.right}
+                    for finding in found.findings
+                ],
+                **found.numbers,
+            }
+        )
+    else:
+        print_numbers(
+            {
+                "palpate": f"{__version__}, Python {platform.python_version()}, {platform.platform()}, "
+                f"{os.cpu_count()} cores",
+                "device": found.device,
+                **{
+                    finding.name: f"{_MARKS[finding.right]:5} {finding.told}"
+                    + (f" ({finding.advice})" if finding.right is None and finding.advice else "")
+                    for finding in found.findings
+                },
+            }
+        )
+        click.echo(found.verdict)
+    if write_profile is not None:
+        found.profile().save(write_profile)
+        talk(f"wrote {write_profile}; its friction is 0, the safe side: fill in what you know")
+    if not found.suitable:
+        ctx.exit(FAILED)

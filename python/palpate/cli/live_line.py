@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One line that is alive while a recording grows, on a terminal only."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import click
+
+from .output import number
+
+
+class LiveLine:
+    """Rows, position and force as they come, and where the handle has been.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Rows a second.
+    units : tuple of str
+        Of position and force.
+    """
+
+    def __init__(self, rate_hz: float, units: tuple[str, str]) -> None:
+        self._rate_hz = rate_hz
+        self._units = units
+        self._terminal = sys.stderr.isatty()
+        self._lower, self._upper = math.inf, -math.inf
+
+    def show(self, rows: int, position: float, force: float) -> None:
+        """Take what is true now."""
+        self._lower, self._upper = min(self._lower, position), max(self._upper, position)
+        if self._terminal:
+            text = (
+                f"{rows / self._rate_hz:6.1f} s  {rows} rows  position {number(position)} {self._units[0]} "
+                f"(so far {number(self._lower)} to {number(self._upper)})  "
+                f"force {number(force)} {self._units[1]}"
+            )
+            click.echo(f"\r{text:<100.100}", nl=False, err=True)
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._terminal:
+            click.echo(err=True)

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate record: a real object becomes a recording."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..devices import DeviceError
+from ..errors import InputError
+from .arguments import PATH, json_option
+from .device_options import device_options
+from .ending import WorkError
+from .live_line import LiveLine
+from .output import number, print_json, print_numbers, require_writable, talk
+from .verb import Verb
+
+
+@click.command(
+    cls=Verb,
+    no_args_is_help=True,
+    epilog="Example: palpate record press.csv --device simulated --object press.json --probe",
+)
+@click.argument("recording", metavar="OUT.csv", type=PATH)
+@device_options
+@click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
+@click.option("--duration-s", type=float, default=10.0, help="How long; inf: until Ctrl-C.")
+@click.option("--probe", is_flag=True, help="The device moves the handle by itself, slowly to and fro.")
+@click.option("--lower", type=float, help="Where the sweep turns round, in the device's position unit.")
+@click.option("--upper", type=float, help="Where it turns at the other end.")
+@click.option("--speed", type=float, show_default="0.2 rad/s, scaled", help="Of the sweep, a second.")
+@click.option(
+    "--stiffness", type=float, show_default="50 N*m/rad, scaled", help="That draws the handle along."
+)
+@click.option(
+    "--force-limit",
+    type=float,
+    show_default="the device's",
+    help="Where the object holds this, it turns round.",
+)
+@json_option
+def record(
+    recording: Path,
+    device: str,
+    object_file: Path | None,
+    transducer: bool,
+    rate_hz: float,
+    duration_s: float,
+    probe: bool,
+    as_json: bool,
+    **sweep: Any,
+) -> None:
+    """Record position and force of a real object.
+
+    Somebody moves the handle, which is free; or with --probe the device does, and turns round where the
+    object holds the force limit. The force is the transducer's; without one it is what the motor holds, the
+    friction of the device included. Ctrl-C ends it in an orderly way.
+    """
+    from ..devices import record as record_object
+    from ..model import load_model
+
+    require_writable(recording, inputs=() if object_file is None else (object_file,))
+    given = [name for name, value in sweep.items() if value is not None]
+    if given and not probe:
+        raise InputError(f"--{given[0].replace('_', '-')} is for --probe, which was not given")
+    mounted = None if object_file is None else load_model(object_file)
+    units = ("rad", "Nm") if mounted is None else (mounted.units["position"], mounted.units["force"])
+    who = "the device moves the handle" if probe else "move the handle over the whole object, slowly"
+    talk(f"{device}: recording to {recording} for {number(duration_s)} s; {who}; Ctrl-C ends it")
+    line = LiveLine(rate_hz, units)
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        summary = record_object(
+            recording,
+            device=device,
+            object=mounted,
+            transducer=transducer,
+            probe=probe,
+            duration_s=duration_s,
+            rate_hz=rate_hz,
+            progress=line.show,
+            **sweep,
+        )
+    except DeviceError as error:
+        raise InputError(str(error)) from None
+    finally:
+        line.end()
+        signal.signal(signal.SIGTERM, before)
+    for note in summary["notes"]:
+        talk(f"  {note}")
+    if not summary["orderly"]:
+        raise WorkError(f"{summary['ended']}; zero force sent, device closed")
+    if as_json:
+        print_json(summary)
+        return
+    reached = {
+        name: f"{number(summary[f'{name}_range'][0])} to {number(summary[f'{name}_range'][1])} {unit}"
+        for name, unit in zip(("position", "force"), units, strict=True)
+    }
+    print_numbers(
+        {
+            "ended": summary["ended"],
+            "recorded": f"{summary['record']}: {summary['recorded']} rows, {summary['lost_records']} lost",
+            **reached,
+            "rate": f"{number(summary['rate_hz'])} Hz of {number(rate_hz)} Hz, "
+            f"{summary['lost_samples']} samples lost, {summary['repeated_samples']} repeated",
+        }
+    )

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A device as it was measured, beside the one that is counted on: a profile, or that of a certificate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from .._core import DeviceProfile as CoreProfile
+from ..errors import InputError
+from ..planning import DeviceProfile
+from .finding import Finding
+
+_CLOCK_TOLERANCE = 0.005
+_STEP_TOLERANCE = 0.01
+_DAMPING_TOLERANCE = 0.1
+"""A measured damping may be below the one counted on by so much: friction and noise are in it."""
+
+Numbers = Mapping[str, float | None]
+
+
+def compare(expected: CoreProfile, measured: Numbers, *, name: str) -> Finding:
+    """Judge whether a device is at least as good as the one that is counted on.
+
+    Parameters
+    ----------
+    expected : DeviceProfile
+        The profile, or the device of a certificate.
+    measured : mapping
+        ``period_s``, ``jitter_s``, ``delay_samples``, ``encoder_step``, ``force_limit``,
+        ``viscous_damping``; None where it was not measured.
+    name : str
+        Of the finding.
+    """
+    period, jitter = measured["period_s"], measured["jitter_s"]
+    delay, damping = measured["delay_samples"], measured["viscous_damping"]
+    step, limit = measured["encoder_step"], measured["force_limit"]
+    assert period is not None
+    assert jitter is not None
+    assert step is not None
+    assert limit is not None
+    longest = expected.period_s + expected.jitter_s
+    wrong = []
+    if period > expected.period_s * (1.0 + _CLOCK_TOLERANCE) or period + jitter > longest * (
+        1.0 + _CLOCK_TOLERANCE
+    ):
+        wrong.append(
+            f"its period gets {1e6 * (period + jitter):.0f} us long, {1e6 * longest:.0f} us are counted on"
+        )
+    if delay is not None and delay > expected.delay_samples:
+        wrong.append(f"its delay is {delay:g} samples, {expected.delay_samples} are counted on")
+    if not math.isclose(step, expected.encoder_step, rel_tol=_STEP_TOLERANCE):
+        wrong.append(f"its encoder step is {step:.4g}, {expected.encoder_step:.4g} is counted on")
+    if limit < expected.force_limit * (1.0 - _STEP_TOLERANCE):
+        wrong.append(f"its largest force is {limit:.4g}, {expected.force_limit:.4g} is counted on")
+    if damping is not None and damping < expected.viscous_damping * (1.0 - _DAMPING_TOLERANCE):
+        wrong.append(f"its damping is {damping:.3g}, {expected.viscous_damping:.3g} is counted on")
+    unseen = [word for word, value in (("delay", delay), ("damping", damping)) if value is None]
+    held = "holds" + (f" as far as it was seen (not: {', '.join(unseen)})" if unseen else "")
+    return Finding(
+        name,
+        "; ".join(wrong) if wrong else f"{expected.id}: {held}",
+        not wrong,
+        "plan the model again with the profile that check-device --push --write-profile writes",
+    )
+
+
+def profile_of(base: CoreProfile, measured: Numbers) -> DeviceProfile:
+    """The profile of a device as it was measured.
+
+    Friction is 0, the lower bound that a certificate may count on; the force step is what the device says.
+
+    Raises
+    ------
+    InputError
+        Inertia and damping were not measured.
+    """
+    inertia, damping = measured["inertia"], measured["viscous_damping"]
+    if inertia is None or damping is None:
+        raise InputError(
+            "a profile needs inertia and damping: push a handle that nobody holds and that nothing is mounted on"
+        )
+    period, jitter, delay = measured["period_s"], measured["jitter_s"], measured["delay_samples"]
+    assert period is not None
+    assert jitter is not None
+    return DeviceProfile(
+        id=base.id,
+        position_unit=base.position_unit,
+        period_s=base.period_s,
+        jitter_s=max(0.0, period + jitter - base.period_s),
+        inertia=inertia,
+        viscous_damping=damping,
+        coulomb_friction=0.0,
+        encoder_step=base.encoder_step,
+        force_step=base.force_step,
+        delay_samples=int(delay or 0),
+        force_limit=base.force_limit,
+    )

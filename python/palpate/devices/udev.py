@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The udev rule that lets somebody who is not root use a device: shipped here, installed on request."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+
+from .errors import DeviceError
+
+RULE = "60-palpate.rules"
+FOLDER = Path("/etc/udev/rules.d")
+
+_RELOAD = (("udevadm", "control", "--reload-rules"), ("udevadm", "trigger", "--subsystem-match=usb"))
+
+
+def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
+    """Write the rule and ask udev to read it.
+
+    Parameters
+    ----------
+    tell : callable
+        Is told of each step.
+    folder : Path
+        Where the rules of this machine live.
+
+    Raises
+    ------
+    DeviceError
+        Without root, or where the system refuses: what to do instead.
+    """
+    target = folder / RULE
+    if not folder.is_dir():
+        raise DeviceError(
+            f"this machine has no folder {folder}: udev, which gives users their rights, is not here"
+        )
+    if not os.access(folder, os.W_OK):
+        again = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
+        raise DeviceError(f"writing {target} needs root; run: {again}")
+    text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
+    beside = target.with_suffix(".new")
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(target)
+    tell(f"wrote {target}:")
+    tell(text.splitlines()[-1])
+    for command in _RELOAD:
+        if shutil.which(command[0]) is None:
+            tell(f"there is no {command[0]} here: plug the device in again, or restart the machine")
+            return
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            tell(f"{' '.join(command)}: {done.stderr.strip() or 'failed'}; restart the machine instead")
+            return
+        tell(f"ran {' '.join(command)}")
+    tell("plug the device in again")

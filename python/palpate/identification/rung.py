@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rung of the ladder: one solution of a problem over compressed rows, and what it costs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _core
+from .._typing import Float1D, Float2D
+from .compression import Compressed, binning_error
+from .fresh import FreshRows
+from .growth import fresh_deviance
+from .options import IdentifyOptions
+from .separable import SeparableProblem, Solution
+from .stopping import ON_FRESH_ROWS, deviance
+
+BINNING_SHARE = 0.05
+"""Error that cells of positions may add, as a share of the RMS error; above it the cells are halved."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A candidate model."""
+
+    name: str
+    rows: Compressed
+    problem: SeparableProblem
+    solution: Solution
+    n_parameters: int
+    stop_reason: str
+    side: Float1D | None = None
+    """(n,) hysteresis input of every row of the recording, where the rung has one"""
+    play_radius: float | None = None
+    """[box]"""
+
+    @property
+    def rmse(self) -> float:
+        return self.problem.rmse(self.solution)
+
+    def criterion(self, options: IdentifyOptions) -> float:
+        """What the stopping rule says of it: the smaller the better."""
+        fresh = self.problem.fresh
+        if fresh is not None and options.criterion in ON_FRESH_ROWS:
+            return fresh_deviance(options.criterion, fresh, self.problem.fresh_errors(self.solution, fresh))
+        total = self.problem.total(self.solution.rss)
+        return deviance(options.criterion, total, self.problem.samples, self.n_parameters)
+
+    def fresh_errors(self, kept: SeparableProblem, fresh: FreshRows) -> Float1D:
+        """Errors (k,) on fresh rows once the linear unknowns are those of the kept rows."""
+        if self.name == "constant":
+            (block,) = kept.blocks
+            root = block.channels[:, 0]
+            return np.asarray(fresh.force - block.target @ root / (root @ root))
+        kept.prior = self.problem.prior
+        return kept.fresh_errors(kept.solve(self.solution.basis), fresh)
+
+    def cells_too_wide(self) -> bool:
+        """Whether gathering positions in cells may have moved the fit by more than it should."""
+        if not self.rows.spread.any():
+            return False
+        basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
+        bends = _core.wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
+        curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
+        return binning_error(self.rows, curvature) > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
+
+    def modelled(self, positions: Float2D) -> Float1D:
+        """The rung's force at every row (n,), positions in the unit box."""
+        readings = self.problem.readout @ self.solution.coefficients
+        rows = FreshRows(positions, np.zeros(len(positions)), self.side)
+        return -rows.errors(readings, self.solution.basis.alpha, self.solution.basis.beta)

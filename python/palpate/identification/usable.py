@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which data give a force law at all; the others are refused in one sentence."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._typing import Float1D, Float2D
+from ..errors import InputError
+
+LEAST_ROWS = 10
+"""Rows below which nothing is identified."""
+
+LEAST_POSITIONS = 3
+"""Distinct positions below which nothing is identified."""
+
+
+def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> None:
+    """Refuse what cannot be identified.
+
+    Raises
+    ------
+    InputError
+        Too few rows or distinct positions, a value that is not finite, an input that never changes.
+    """
+    if positions.ndim != 2 or force.shape != (len(positions),):
+        raise InputError(
+            f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
+        )
+    if len(force) < LEAST_ROWS:
+        raise InputError(f"the recording has {len(force)} rows; {LEAST_ROWS} or more are needed")
+    for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            raise InputError(
+                f"{name} in row {bad[0]} is {column[bad[0]]}; every value must be a finite number"
+            )
+    for name, column in zip(names, positions.T, strict=True):
+        if column.min() == column.max():
+            raise InputError(f"every {name} is {column[0]:g}; identifying needs one that moves")
+        if len(np.unique(column)) < LEAST_POSITIONS:
+            raise InputError(
+                f"{name} takes only {len(np.unique(column))} distinct values; "
+                f"{LEAST_POSITIONS} or more are needed"
+            )

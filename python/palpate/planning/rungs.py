@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rungs of the plan, the simplest first. Each proposes a certified plan, or says why it does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from .. import _core
+from .._core import DeviceProfile, Scheme
+from ..model import Model
+from .choices import (
+    LONGEST_PLAY,
+    SPARE,
+    coupling_for,
+    explicit_scheme,
+    play_radius_for,
+    renderable_slopes,
+    usual_play_radius,
+)
+from .plan import Plan
+from .slope_limit import changed_network, limit_slopes, loss_between, scale_loss, sliding_slopes
+
+_TAKEN_OUT = 0.9
+"""Behind a coupling K_c a force can be compensated while its slope stays below this share of K_c [-]"""
+
+_COUPLING_DAMPING = 0.2
+"""Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""
+
+_LEAST_LOSS = 1.0 / 64.0
+"""Smallest share of the loss h that is still worth rendering [-]"""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What was asked for, in the model's units."""
+
+    coupling: bool = False
+    coupling_stiffness: float | None = None
+    coupling_damping: float | None = None
+    mass: float | None = None
+    damping: float | None = None
+    play_radius: float | None = None
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether the object has mass or damping besides its force."""
+        return bool(self.mass) or bool(self.damping)
+
+    def why_not_static(self) -> str:
+        parts = [
+            f"a {word} of {value:.4g}"
+            for word, value in (("mass", self.mass), ("damping", self.damping))
+            if value
+        ]
+        return f"the object has {' and '.join(parts)}, which it would leave out"
+
+
+Outcome = Plan | str
+
+
+def direct(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    """The model as it was identified."""
+    if wishes.dynamic:
+        return wishes.why_not_static()
+    if wishes.coupling:
+        return "a coupling was asked for"
+    return Plan(model, _direct_scheme(model, device, wishes)).certified_for(device)
+
+
+def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    """The nearest force that the device can render."""
+    if wishes.dynamic:
+        return wishes.why_not_static()
+    if wishes.coupling:
+        return "a coupling was asked for"
+    low, high = renderable_slopes(device)
+    if high <= 0.0:
+        return _no_slope(device)
+    rendered = _balanced(model)
+    if model.hysteretic:
+        limited = _hysteresis_limited(rendered, device, wishes, low, high)
+    else:
+        limited = _within(rendered, low, high)
+    if limited is None:
+        return f"no network was found whose slopes lie between {low:.4g} and {high:.4g}"
+    plan = Plan(limited, _direct_scheme(limited, device, wishes), loss=loss_between(model, limited))
+    return plan.certified_for(device)
+
+
+def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    """The model behind a coupling whose spring has been taken out of it, slopes limited as that asks."""
+    if wishes.dynamic:
+        return wishes.why_not_static()
+    if not wishes.coupling:
+        return "no coupling was asked for, and none makes a steeper slope possible"
+    damping = wishes.coupling_damping or 0.0
+    stiffness = wishes.coupling_stiffness
+    low, high = renderable_slopes(device)
+    if stiffness is None:
+        stiffness = coupling_for(device, damping)
+        if damping == 0.0 and not model.hysteretic:
+            stiffness = min(stiffness, SPARE * high)
+    if stiffness <= 0.0:
+        return _no_slope(device)
+    scheme = Scheme(
+        structure="massless",
+        coupling_stiffness=stiffness,
+        coupling_damping=damping,
+        compensated=not model.hysteretic,
+        play_radius=wishes.play_radius or usual_play_radius(model, device),
+    )
+    if model.hysteretic:
+        return Plan(model, scheme).certified_for(device)
+    highest = _TAKEN_OUT * stiffness
+    balanced = _balanced(model)
+    limited = _within(balanced, low if damping == 0.0 else -math.inf, min(highest, high))
+    if limited is None:
+        return f"no network was found whose slopes lie below {highest:.4g} = {_TAKEN_OUT} K_c"
+    loss = None if limited is model else loss_between(model, limited)
+    return Plan(limited, scheme, loss=loss).certified_for(device)
+
+
+def implicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    """The model with its mass behind a coupling, backward Euler."""
+    return _with_mass("implicit", model, device, wishes)
+
+
+def energy_consistent(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    """The same, stepped so that it stores exactly what it is given: for forces that fall steeply."""
+    return _with_mass("energy-consistent", model, device, wishes)
+
+
+def explicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    """The paper's structure: stable at best."""
+    radius = wishes.play_radius or usual_play_radius(model, device)
+    scheme = explicit_scheme(
+        _core.force_bounds(model, radius),
+        device,
+        mass=wishes.mass,
+        damping=wishes.damping,
+        coupling_stiffness=wishes.coupling_stiffness,
+        coupling_damping=wishes.coupling_damping,
+        play_radius=radius,
+    )
+    return Plan(model, scheme).certified_for(device)
+
+
+RUNGS: Mapping[str, Callable[[Model, DeviceProfile, Wishes], Outcome]] = {
+    "direct": direct,
+    "direct, slope limited": direct_limited,
+    "massless": massless,
+    "implicit": implicit,
+    "energy-consistent": energy_consistent,
+    "explicit": explicit,
+}
+
+
+def _no_slope(device: DeviceProfile) -> str:
+    return (
+        f"the device can hold no slope at all: friction {device.coulomb_friction:.4g}, damping "
+        f"{device.viscous_damping:.4g}, encoder step {device.encoder_step:.4g}, "
+        f"force step {device.force_step:.4g}"
+    )
+
+
+def _direct_scheme(model: Model, device: DeviceProfile, wishes: Wishes) -> Scheme:
+    radius = wishes.play_radius or 0.0
+    if model.hysteretic and not radius and model.play_radius is None:
+        travel = float(model.upper[0] - model.lower[0])
+        radius = min(play_radius_for(model, device), LONGEST_PLAY * travel)
+    return Scheme(structure="direct", play_radius=radius)
+
+
+def _within(model: Model, low: float, high: float) -> Model | None:
+    """The model itself where its slopes lie within limits, else the nearest that does."""
+    found = sliding_slopes(model)
+    return model if found[0] >= low and found[1] <= high else limit_slopes(model, low, high)
+
+
+def _balanced(model: Model) -> Model:
+    """A model that repeats must not push on average, or it is a motor: its mean force is taken off."""
+    if model.period is None:
+        return model
+    lower = float(model.lower[0])
+    side = {"direction": 1.0} if model.hysteretic else {}
+    turn = model.energy(lower + model.period, **side) - model.energy(lower, **side)
+    if _core.force_bounds(model, model.period if model.hysteretic else 0.0).mean_force == 0.0:
+        return model
+    return changed_network(model, bias=model.bias - turn / model.period)
+
+
+def _hysteresis_limited(
+    model: Model, device: DeviceProfile, wishes: Wishes, low: float, high: float
+) -> Model | None:
+    """Slopes limited so that a stick has room, then as much of the loss h as the widest play can carry."""
+
+    def holds(candidate: Model) -> bool:
+        scheme = _direct_scheme(candidate, device, wishes)
+        return not _core.certify(candidate, scheme, device).refused
+
+    travel = float(model.upper[0] - model.lower[0])
+    widest = _core.force_bounds(model, LONGEST_PLAY * travel)
+    room = max(0.5 * high, high - 2.0 * widest.loss_per_play)
+    limited = model
+    if not holds(scale_loss(model, _LEAST_LOSS)):
+        nearest = _within(model, max(low, -room) if low > -math.inf else low, room)
+        if nearest is None:
+            return None
+        limited = nearest
+    if holds(limited):
+        return limited
+    kept, refused = 0.0, 1.0
+    for _ in range(10):
+        share = 0.5 * (kept + refused)
+        kept, refused = (share, refused) if holds(scale_loss(limited, share)) else (kept, share)
+    return scale_loss(limited, max(kept, _LEAST_LOSS))
+
+
+def _with_mass(structure: str, model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+    if not wishes.dynamic:
+        return "the object has no mass or damping of its own"
+    if not wishes.mass:
+        return "the object has damping but no mass; give one with mass"
+    damping = wishes.coupling_damping
+    if damping is None:
+        damping = _COUPLING_DAMPING * device.viscous_damping
+    stiffness = wishes.coupling_stiffness
+    if stiffness is None:
+        stiffness = coupling_for(device, damping)
+    if stiffness <= 0.0:
+        return f"the device's damping {device.viscous_damping:.4g} holds no coupling"
+    scheme = Scheme(
+        structure=structure,
+        coupling_stiffness=stiffness,
+        coupling_damping=damping,
+        mass=wishes.mass,
+        damping=wishes.damping or 0.0,
+        play_radius=wishes.play_radius or usual_play_radius(model, device),
+    )
+    return Plan(model, scheme).certified_for(device)

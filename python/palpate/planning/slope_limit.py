@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The nearest force that a device can render: slopes limited, everything else left as it was identified.
+
+The nearest force with slopes between two limits is an isotonic regression; it differs from the model on whole
+stretches around what is too steep, and has kinks at their ends. Smoothing by a narrow positive kernel rounds
+the kinks and keeps the limits. The change alone is then given to further wavelets, chosen one by one
+(orthogonal least squares, values and slopes), and the limits are imposed in a last least squares over all
+wavelets, so that elsewhere the model stays what it was and the limits are certified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from .. import _core
+from .._typing import Float1D, Float2D
+from ..identification.constraints import domain_bounds, impose, slope_limited
+from ..identification.identified import Readings
+from ..identification.separable import Basis, Block, SeparableProblem
+from ..model import Model
+
+_SAMPLES = 1001
+"""Positions over the domain [-]"""
+
+_ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
+"""Standard deviation of the kernel [share of the travel], and whether the force has to begin where contact
+does: a free end whose force begins at once needs a steep way there."""
+
+_RESERVE = 0.985
+"""Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""
+
+_CERTIFIED = 0.997
+"""Share of a limit that is imposed: the rest is for bounds that are wider than what they bound [-]"""
+
+_CLOSE = 5e-5
+"""RMS error at which no further wavelets are taken [share of the force's range]"""
+
+_CLOSE_SLOPE = 0.01
+"""The same of the slope [share of the smaller limit]"""
+
+_MOST = 64
+"""Further wavelets at most [-]"""
+
+_NEW = 1e-5
+"""Share of a candidate's squared norm that must stand outside what was chosen for it to be taken [-]"""
+
+_SCALE_RATIO = 1.6
+_SCALE_STEP = 0.75
+"""Frame of the candidates: ratio of neighbouring dilations, translation step over width [-]"""
+
+_WIDE = 1e9
+"""A play of so many travels adds no slope while it sticks [-]"""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How far the rendered force is from the identified one, over the domain and both strokes [force]."""
+
+    largest: float
+    rms: float
+
+
+def sliding_slopes(model: Model) -> tuple[float, float]:
+    """Proved (smallest, largest) slope while sliding, continuations included."""
+    travel = float(model.upper[0] - model.lower[0])
+    bounds = _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0)
+    return bounds.slope_min, bounds.slope_max
+
+
+def limit_slopes(model: Model, low: float, high: float) -> Model | None:
+    """The model with every slope proved to lie within limits; None where no such network was found.
+
+    Parameters
+    ----------
+    model : Model
+        A model of one position.
+    low, high : float
+        Slopes of either stroke [force/position]; may be infinite.
+    """
+    travel = float(model.upper[0] - model.lower[0])
+    for smoothing, from_contact in _ATTEMPTS:
+        limited = _limited_once(model, low, high, smoothing * travel, from_contact)
+        found = sliding_slopes(limited)
+        if found[0] >= low and found[1] <= high:
+            return limited
+    return None
+
+
+def scale_loss(model: Model, share: float) -> Model:
+    """The model with h multiplied by a share: less of what press and release differ by."""
+    network = model.to_dict()["network"]
+    return changed_network(
+        model,
+        weight_hysteresis=[share * weight for weight in network["weight_hysteresis"]],
+        linear_hysteresis=[share * slope for slope in network["linear_hysteresis"]],
+        bias_hysteresis=share * network["bias_hysteresis"],
+    )
+
+
+def loss_between(identified: Model, rendered: Model) -> Loss:
+    """What is lost where `rendered` stands in for `identified`."""
+    x = np.linspace(identified.lower[0], identified.upper[0], _SAMPLES)
+    difference = _strokes(rendered, x) - _strokes(identified, x)
+    return Loss(float(np.abs(difference).max()), float(np.sqrt(np.mean(difference**2))))
+
+
+def changed_network(model: Model, **network: Any) -> Model:
+    """The model with other numbers in its network, and without plan, certificate and slope bounds."""
+    content = model.to_dict()
+    content["network"].update(network)
+    added = len(content["network"]["weight"]) - content["fit"]["n_wavelets"]
+    content["fit"]["n_wavelets"] += added
+    content["fit"]["n_parameters"] += added * (4 if model.hysteretic else 3)
+    content.update(plan=None, certificate=None, slope_bounds=None)
+    return Model.from_dict(content)
+
+
+def _strokes(model: Model, x: Float1D) -> Float2D:
+    """(1, n) the force, or (2, n) pressing and releasing."""
+    sides = (1.0, -1.0) if model.hysteretic else (None,)
+    return np.array([model.force(x, direction=side) for side in sides])
+
+
+def _limited_once(model: Model, low: float, high: float, sigma: float, from_contact: bool) -> Model:
+    x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
+    strokes = _strokes(model, x)
+    changes = [
+        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, from_contact) for stroke in strokes
+    ]
+    if len(changes) == 2:  # of g and h
+        changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
+    alpha, beta = _candidates(x, np.any(np.array(changes) != 0.0, axis=0), sigma)
+    close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
+    before = model.alpha[:, 0], model.beta[:, 0]
+    chosen = _chosen(x, np.array(changes), before, (alpha, beta), sigma, close)
+    wanted = strokes + _strokes_of(np.array(changes))
+    return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
+
+
+def _strokes_of(readings: Float2D) -> Float2D:
+    """Pressing and releasing from g and h."""
+    return (
+        readings if len(readings) == 1 else np.array([readings[0] + readings[1], readings[0] - readings[1]])
+    )
+
+
+def _fitted(
+    model: Model, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
+) -> Model:
+    """Least squares on the wavelets that there were and further ones, the slope limits and h >= 0 imposed."""
+    lower, travel = model.lower, model.upper - model.lower
+    box = ((x - lower) / travel)[:, None]
+    ones = np.ones_like(x)
+    hysteretic = len(wanted) == 2
+    problem = SeparableProblem(
+        [Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted],
+        np.array([[0.5, 0.5], [0.5, -0.5]]) if hysteretic else np.array([[1.0]]),
+        samples=wanted.size,
+        within=0.0,
+        force_range=float(np.ptp(wanted)) or 1.0,
+        resolved_by=1,
+    )
+    basis = Basis(model.alpha * travel, (model.beta - lower) / travel).joined(
+        Basis(alpha[:, None] * travel, (beta[:, None] - lower) / travel)
+    )
+    slopes = (low * float(travel[0]), high * float(travel[0]))
+    bounds = domain_bounds(problem, hysteresis=hysteretic and _least_loss(model) >= 0.0, slopes=slopes)
+    found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
+    new: dict[str, Any] = {"alpha": found.alpha.tolist(), "beta": found.beta.tolist()}
+    for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
+        new[f"bias{suffix}"] = float(found.bias[k])
+        new[f"linear{suffix}"] = found.linear[k].tolist()
+        new[f"weight{suffix}"] = found.weights[k].tolist()
+    return changed_network(model, **new)
+
+
+def _least_loss(model: Model) -> float:
+    return float(_core.force_bounds(model, float(model.upper[0] - model.lower[0])).loss_min)
+
+
+def _change(
+    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, from_contact: bool
+) -> Float1D:
+    """What has to be added to a force for its slopes to lie within limits, kinks rounded; zero elsewhere."""
+    n, step = len(x), x[1] - x[0]
+    margin = int(np.ceil(6.0 * sigma / step))
+    before = after = 0
+    wide = force
+    if model.period is not None:
+        before = after = n - 1
+        wide = np.concatenate([force[:-1] - force[-1] + force[0], force, force[1:] + force[-1] - force[0]])
+    else:
+        # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
+        before, after = (n if side == "free" else 0 for side in (model.below, model.above))
+        wide = np.pad(force, (before, after))
+    grid = x[0] + step * (np.arange(len(wide)) - before)
+    nearest = slope_limited(grid, wide, low, high)
+    if from_contact and model.below == "free":
+        nearest = np.minimum(nearest, high * np.maximum(grid - x[0], 0.0))
+    nearest = _extended(nearest, margin)
+    inside = slice(margin + before, margin + before + n)
+    smooth = gaussian_filter1d(nearest, sigma / step, mode="nearest")[inside]
+    touched = np.abs(nearest[inside] - force) > 1e-9 * np.ptp(force)
+    near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
+    return np.where(near, smooth - force, 0.0)
+
+
+def _extended(force: Float1D, margin: int) -> Float1D:
+    """A force and its straight continuations."""
+    steps = np.arange(1, margin + 1)
+    before = force[0] - steps[::-1] * (force[1] - force[0])
+    after = force[-1] + steps * (force[-1] - force[-2])
+    return np.concatenate([before, force, after])
+
+
+def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:
+    """Dilations and translations (k,) of wavelets from the finest width to the travel, near a change."""
+    travel = x[-1] - x[0]
+    at = x[changed][::4] if changed.any() else x[:1]
+    alpha, beta = [], []
+    width = finest
+    while width < travel:
+        centres = np.arange(x[0] - 3.0 * width, x[-1] + 3.0 * width, _SCALE_STEP * width)
+        centres = centres[np.abs(centres[:, None] - at).min(axis=1) < 3.0 * width]
+        alpha.append(np.full(len(centres), 1.0 / width))
+        beta.append(centres)
+        width *= _SCALE_RATIO
+    return np.concatenate(alpha), np.concatenate(beta)
+
+
+def _chosen(
+    x: Float1D,
+    changes: Float2D,
+    before: tuple[Float1D, Float1D],
+    candidates: tuple[Float1D, Float1D],
+    sigma: float,
+    close: float,
+) -> Sequence[int]:
+    """Candidates chosen one by one for changes (outputs, n), beside a line and the wavelets that there were.
+
+    Slopes are fitted beside the values, sigma times a slope weighing as much as a value.
+    """
+
+    def both(values: Float2D, slopes: Float2D) -> Float2D:
+        return np.concatenate([values, sigma * slopes])
+
+    rates = np.gradient(changes, x, axis=1)
+    targets = both(changes.T, rates.T)
+    ones, zeros = np.ones_like(x), np.zeros_like(x)
+
+    def wavelets(alpha: Float1D, beta: Float1D) -> Float2D:
+        values = _core.wavelet_columns(x[:, None], alpha[:, None], beta[:, None])
+        return both(values, _core.wavelet_slope_columns(x, alpha[:, None], beta[:, None]))
+
+    line = both(np.column_stack([ones, x]), np.column_stack([zeros, ones]))
+    always = np.concatenate([line, wavelets(*before)], axis=1)
+    columns = wavelets(*candidates)
+    basis = np.linalg.qr(always)[0]
+    residual = targets - basis @ (basis.T @ targets)
+    left = columns - basis @ (basis.T @ columns)
+    norms = np.square(columns).sum(axis=0)
+    # Everything from here on is in products: a pivoted Cholesky factor of the candidates' Gram matrix.
+    gram, products = left.T @ left, left.T @ residual
+    size = np.diag(gram).copy()
+    rest = float(np.square(residual).sum())
+    factor = np.empty((_MOST, len(size)))
+    chosen: list[int] = []
+    while len(chosen) < _MOST and rest > residual.size * close**2:
+        new = size > _NEW * norms
+        gains = np.where(new, np.square(products).sum(axis=1) / np.where(new, size, 1.0), 0.0)
+        best = int(np.argmax(gains))
+        if gains[best] <= 0.0:
+            break
+        k, root = len(chosen), np.sqrt(size[best])
+        factor[k] = (gram[best] - factor[:k, best] @ factor[:k]) / root
+        products = products - np.outer(factor[k], products[best] / root)
+        size = size - np.square(factor[k])
+        rest -= float(gains[best])
+        chosen.append(best)
+    return chosen

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motion of a recording: even pieces between gaps, zero-phase derivatives, and the filter they need.
+
+Velocity and acceleration come from central differences, which have no phase, followed by one low-pass L run
+forward and backward, which has none either. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core import TransferFunction
+from .._typing import Float1D
+from ..errors import InputError
+from .recording import Recording
+
+GAP = 2.5
+"""Steps of time above this many median ones are gaps: nothing is differentiated or filtered across them."""
+
+UNEVEN = 0.01
+"""Share of the period by which the steps of a piece may differ from it before it is resampled."""
+
+MARGIN = 3.0
+"""Time constants of L, 2/w_c for its two poles, that are left out at both ends of a piece."""
+
+FINEST = 0.25
+"""Highest cutoff tried [1/period]: above it L would be no filter."""
+
+NOISE_SHARE = 0.01
+"""Noise of the position that L may let into the variance of a derivative."""
+
+STEP = 0.85
+"""Ratio of the cutoffs that are tried one after the other."""
+
+LEAST_CONSTANTS = 200.0
+"""1/w_c that the recording must last: what is slower is no motion."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Rows without a gap, on an even grid of time."""
+
+    rows: slice
+    """Of the recording"""
+    time: Float1D
+    """(k,) [s]"""
+    position: Float1D
+    force: Float1D
+    row_time: Float1D
+    """(rows,) [s]"""
+    period: float
+    """Of the grid [s]"""
+    even: bool
+    """The grid is the recording's own rows; else it was interpolated between them."""
+
+    def on_grid(self, values: Float1D) -> Float1D:
+        """Values at the piece's rows, at the times of the grid."""
+        return values if self.even else np.interp(self.time, self.row_time, values)
+
+    def at_rows(self, values: Float1D) -> Float1D:
+        """Values on the grid, at the piece's rows."""
+        return values if self.even else np.interp(self.row_time, self.time, values)
+
+    @property
+    def velocity(self) -> Float1D:
+        """Central difference (k,) [position/s]"""
+        return velocity_of(self.position, self.period)
+
+    @property
+    def acceleration(self) -> Float1D:
+        """Second central difference (k,) [position/s^2]"""
+        return acceleration_of(self.position, self.period)
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """L, forward and backward."""
+
+    cutoff: float
+    """w_c [rad/s]"""
+
+    def margin(self, period: float) -> int:
+        """Samples at each end that the ends of a signal disturb."""
+        return math.ceil(2.0 * MARGIN / (self.cutoff * period))
+
+    def __call__(self, signal: Float1D, period: float) -> Float1D:
+        """The signal (k,) without what lies above the cutoff, and without delay; its ends are mirrored."""
+        pole = math.exp(-self.cutoff * period)
+        response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
+        mirrored = min(len(signal) - 1, self.margin(period))
+        wide = np.concatenate([signal[mirrored:0:-1], signal, signal[-2 : -mirrored - 2 : -1]])
+        for _ in range(2):
+            start = wide[0]
+            wide = (start + response.filter(np.ascontiguousarray(wide - start)))[::-1]
+        return wide[mirrored : mirrored + len(signal)]
+
+
+def pieces(recording: Recording) -> list[Piece]:
+    """The recording between its gaps, each piece on an even grid of the recording's median step of time.
+
+    Raises
+    ------
+    InputError
+        The recording has no time.
+    """
+    period = recording.sample_period
+    if recording.time is None or period is None:
+        raise InputError("velocity needs time: the recording has none (--time NAME)")
+    steps = np.diff(recording.time)
+    edges = [0, *(np.flatnonzero(steps > GAP * period) + 1), len(recording)]
+    found = []
+    for start, stop in pairwise(edges):
+        rows = slice(int(start), int(stop))
+        at, position, force = recording.time[rows], recording.position[rows], recording.force[rows]
+        even = bool(np.all(np.abs(np.diff(at) - period) <= UNEVEN * period))
+        grid = at
+        if not even:
+            grid = at[0] + period * np.arange(int((at[-1] - at[0]) / period + 1e-9) + 1)
+            position, force = np.interp(grid, at, position), np.interp(grid, at, force)
+        found.append(Piece(rows, grid, position, force, at, period, even))
+    return found
+
+
+def velocity_of(position: Float1D, period: float) -> Float1D:
+    """Central difference (k,), one-sided at the ends."""
+    return np.gradient(position, period) if len(position) > 1 else np.zeros_like(position)
+
+
+def acceleration_of(position: Float1D, period: float) -> Float1D:
+    """Second central difference (k,), held at the ends."""
+    if len(position) < 3:
+        return np.zeros_like(position)
+    inner = np.diff(position, 2) / period**2
+    return np.concatenate([inner[:1], inner, inner[-1:]])
+
+
+def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
+    """The highest L whose derivative of that order holds at most NOISE_SHARE of noise; None: there is none.
+
+    The position's noise is what sixth differences leave of it, as white noise would; a hand's motion leaves
+    next to nothing there. Noise of the derivative is that through the impulse response of both filters.
+    """
+    sixth = [np.diff(part.position, 6) for part in parts if len(part.position) > 6]
+    if not sixth:
+        return None
+    noise = float(np.mean(np.concatenate(sixth) ** 2)) / math.comb(12, 6)
+    derive = (velocity_of, acceleration_of)[order - 1]
+    duration = sum(part.period * len(part.time) for part in parts)
+    low_pass = LowPass(FINEST / parts[0].period)
+    while low_pass.cutoff * duration > LEAST_CONSTANTS:
+        moving = [
+            low_pass(derive(part.position, part.period), part.period)[low_pass.margin(part.period) :][
+                : -low_pass.margin(part.period)
+            ]
+            for part in long_enough(parts, low_pass)
+        ]
+        if not moving:
+            return None
+        period = parts[0].period
+        impulse = np.zeros(2 * low_pass.margin(period) + 5)
+        impulse[len(impulse) // 2] = 1.0
+        passed = float(np.sum(low_pass(derive(impulse, period), period) ** 2))
+        if noise * passed <= NOISE_SHARE * float(np.mean(np.concatenate(moving) ** 2)):
+            return low_pass
+        low_pass = LowPass(STEP * low_pass.cutoff)
+    return None
+
+
+def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
+    """Pieces of which something is left without their margins."""
+    return [part for part in parts if len(part.time) > 2 * low_pass.margin(part.period) + 2]
+
+
+def at_rows(
+    parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
+) -> tuple[Float1D, NDArray[np.bool_]]:
+    """A derivative behind L at the n rows that the pieces are of (n,), and the rows that have one (n,)."""
+    result, known = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    for part in long_enough(parts, low_pass):
+        margin = low_pass.margin(part.period)
+        result[part.rows] = part.at_rows(low_pass(derive(part), part.period))
+        first, last = part.time[margin], part.time[len(part.time) - 1 - margin]
+        known[part.rows] = (part.row_time >= first) & (part.row_time <= last)
+    return result, known
+
+
+def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
+    """Velocity [position unit per second] at the rows of a recording (n,), and which rows have one (n,).
+
+    Raises
+    ------
+    InputError
+        The recording has no time, or its position is too noisy or too short to be differentiated.
+    """
+    return _derivative(recording, 1)
+
+
+def acceleration(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
+    """Acceleration [position unit per second squared], as :func:`velocity`."""
+    return _derivative(recording, 2)
+
+
+def _derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.bool_]]:
+    parts = pieces(recording)
+    low_pass = quiet_low_pass(parts, order=order)
+    if low_pass is None:
+        raise InputError(
+            f"no {('velocity', 'acceleration')[order - 1]} can be had from {len(recording)} rows: the pieces "
+            "between gaps of time are too short, or the position is all noise"
+        )
+    derive = (lambda part: part.velocity) if order == 1 else (lambda part: part.acceleration)
+    return at_rows(parts, low_pass, derive, len(recording))

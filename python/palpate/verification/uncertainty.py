@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well the data determine a model: standard errors of force and slope.
+
+With theta all fitted numbers of the network, dilations and translations included, and J = df/dtheta at the
+rows, the covariance is sigma^2 (J'J)^-1 and the standard error of f at x is sqrt(j(x)' Cov j(x)) (delta
+method; Seber and Wild, Nonlinear Regression, 1989, section 5.1). sigma^2 = RSS / (n - p). Residuals that
+resemble their neighbours in time say less than as many independent ones: with lag-1 autocorrelation rho > 0
+the variance is (1 + rho)/(1 - rho) times that.
+
+It is the error that noise makes. What a model of this form cannot follow, and outside the domain its
+continuation, are not in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _core
+from .._typing import Float1D, Float2D
+from ..errors import InputError
+from ..model import Model
+from ..recording import Recording
+from .verification import verify
+
+BLOCK_ROWS = 50_000
+"""Rows whose Jacobian is in memory at a time."""
+
+SLOPE_STEP = 1e-5
+"""Half the distance of two Jacobians whose difference is that of the slope [domain]."""
+
+SMALLEST = 1e-12
+"""Eigenvalues of J'J on unit columns below this share of the largest say nothing that rounding would not."""
+
+LARGEST_RHO = 0.999
+"""Autocorrelation that is believed at most: one independent residual in two thousand."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard errors of a model with one input, from :func:`uncertainty`."""
+
+    model: Model
+    covariance: Float2D
+    """(p, p) of bias, slope and weights of g (and of h), dilations, translations"""
+    sigma: float
+    """Standard deviation of the residuals [force]"""
+    autocorrelation: float
+    """Lag-1, of the residuals in recorded order"""
+
+    def force(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
+        """Standard error of the force (n,); twice it is a 95 % band. Outside the domain: that at its edge."""
+        inside = np.clip(position, self.model.lower[0], self.model.upper[0])
+        return self._error(_jacobian(self.model, inside, direction))
+
+    def slope(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
+        """Standard error of the slope (n,) [force/position]."""
+        step = SLOPE_STEP * float(self.model.upper[0] - self.model.lower[0])
+        inside = np.clip(position, self.model.lower[0], self.model.upper[0])
+        ahead = _jacobian(self.model, inside + step, direction)
+        return self._error((ahead - _jacobian(self.model, inside - step, direction)) / (2.0 * step))
+
+    def _error(self, jacobian: Float2D) -> Float1D:
+        variance = np.einsum("np,pq,nq->n", jacobian, self.covariance, jacobian, optimize=True)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Uncertainty:
+    """Standard errors of a model, from the recordings that it was identified on.
+
+    Raises
+    ------
+    InputError
+        The model has several inputs, a mass or a damping, or hysteresis where a recording has no direction;
+        or there are no more rows than parameters.
+    """
+    if model.dimension != 1 or model.mass is not None or model.damping is not None:
+        raise InputError(
+            "standard errors are known for models of position and stroke; this one has more inputs"
+        )
+    parts = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if model.hysteretic and any(part.direction is None for part in parts):
+        raise InputError("standard errors of a hysteresis model need recordings with directions")
+    gram, squares, lagged, n = None, 0.0, 0.0, 0
+    for part in parts:
+        found = verify(model, part)
+        directed = model.hysteretic and part.direction is not None
+        side = part.direction[found.rows].astype(float) if directed and part.direction is not None else None
+        for block, stroke in _blocks(part.position[found.rows], side):
+            jacobian = _jacobian(model, block, stroke)
+            gram = jacobian.T @ jacobian if gram is None else gram + jacobian.T @ jacobian
+        squares += float(found.residual @ found.residual)
+        lagged += float(found.residual[:-1] @ found.residual[1:])
+        n += len(found.residual)
+    if gram is None or n <= len(gram):
+        raise InputError(f"there are {n} rows; standard errors of the model's parameters need more")
+    variance = squares / (n - len(gram))
+    rho = min(max(lagged / squares, 0.0), LARGEST_RHO) if squares > 0 else 0.0
+    covariance = variance * (1.0 + rho) / (1.0 - rho) * _inverse(gram)
+    return Uncertainty(model, covariance, float(np.sqrt(variance)), rho)
+
+
+def _blocks(position: Float1D, direction: Float1D | None) -> Iterator[tuple[Float1D, Float1D | None]]:
+    for start in range(0, len(position), BLOCK_ROWS):
+        part = slice(start, start + BLOCK_ROWS)
+        yield position[part], None if direction is None else direction[part]
+
+
+def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Float2D:
+    """df/dtheta (n, p); weights of h stand beside those of g with the stroke as a factor."""
+    x = np.ascontiguousarray(position, dtype=np.float64)[:, None]
+    value, (by_alpha,), (by_beta,) = _core.wavelet_jacobian(x, model.alpha, model.beta)
+    linear = np.concatenate([np.ones_like(x), x - model.lower, value], axis=1)
+    weight = np.broadcast_to(model.weight, value.shape)
+    if model.weight_hysteresis is not None:
+        side = np.asarray(direction, dtype=np.float64)[:, None]
+        linear = np.concatenate([linear, side * linear], axis=1)
+        weight = weight + side * model.weight_hysteresis
+    return np.concatenate([linear, weight * by_alpha, weight * by_beta], axis=1)
+
+
+def _inverse(gram: Float2D) -> Float2D:
+    """Pseudo-inverse of J'J, on columns of unit norm."""
+    norm = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    value, vector = np.linalg.eigh(gram / np.outer(norm, norm))
+    kept = value > SMALLEST * value.max()
+    scaled = vector[:, kept] / norm[:, None]
+    return np.asarray((scaled / value[kept]) @ scaled.T)

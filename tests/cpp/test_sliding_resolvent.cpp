@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/solver/sliding_resolvent.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::cases;
+using test::Random;
+using test::uniform;
+
+/// A random pair over [0, 1] whose loss is a bump or two above a floor.
+HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_radius,
+                              Continuation continuation = Continuation::Free) {
+    const NetworkParameters network = test::random_network(random, wavelets);
+    LossParameters loss{std::vector<double>(wavelets, 0.0), 0.0, uniform(random, 0.3, 1.0)};
+    for (double& weight : loss.weight) {
+        weight = uniform(random, -0.2, 0.2) / static_cast<double>(wavelets);
+    }
+    return {network, loss, test::unit_domain(continuation, continuation), play_radius};
+}
+
+/// A p for which every slide is unique, by little or by much.
+double unique_slope(Random& random, const HysteresisNetwork& pair) {
+    const double common = pair.force().slope_bounds().lower;
+    const double loss = pair.loss().slope_bounds().largest();
+    const double edges =
+        4.0 * pair.force().value_bounds().largest() + 50.0 * pair.loss().value_bounds().largest();
+    return std::max(loss - common, edges) * std::exp(uniform(random, 0.1, 2.0));
+}
+
+// A motion that presses, lets go and turns anywhere, through sticking and sliding and past both edges.
+TEST(SlidingResolvent, SolvesWhatNewtonSolves) {
+    Random random{71};
+    int steps = 0;
+    int by_table = 0;
+    for (int k = 0; k < cases(30); ++k) {
+        const HysteresisNetwork pair = random_pair(random, static_cast<std::size_t>(1 + k % 12), 0.01,
+                                                   k % 2 == 0 ? Continuation::Free : Continuation::Linear);
+        const double p = unique_slope(random, pair);
+        const SlidingResolvent resolvent{pair, p};
+        ASSERT_TRUE(resolvent.tabulated()) << k;
+        EXPECT_LE(resolvent.position_error(), 1e-12);
+        const CompiledHysteresis compiled{pair};
+        auto state = compiled.start(0.5);
+        SlidingResolvent::Memory memory{0.5};
+        double wanted = 0.5;
+        double speed = 0.0;
+        for (int j = 0; j < 1000; ++j) {
+            speed = 0.95 * speed + uniform(random, -0.002, 0.002);
+            wanted = std::clamp(wanted + speed, -0.2, 1.2);
+            const LoadLine line{p, compiled.at(wanted, state).force + p * wanted};
+            const Solution solution = resolvent.solve(compiled, state, line, memory);
+            const Solution expected = LoadLineSolver{}.solve(pair, {state.play}, line, wanted + 0.003);
+            ASSERT_EQ(solution.status, Status::Ok) << k << " " << j;
+            ASSERT_EQ(expected.status, Status::Ok) << k << " " << j;
+            ASSERT_NEAR(solution.position, expected.position, 5e-12 + 1e-12 * p) << k << " " << j;
+            ASSERT_NEAR(solution.environment.force, expected.environment.force, 1e-11 * p * (1.0 + p))
+                << k << " " << j;
+            ASSERT_LE(solution.evaluations, 16);
+            ++steps;
+            by_table += solution.evaluations == 0 ? 1 : 0;
+            compiled.advance(solution.position, state);
+        }
+    }
+    EXPECT_GT(by_table, steps / 2);
+}
+
+TEST(SlidingResolvent, NeedsTwoEvaluationsOrFewerWhereItSticks) {
+    Random random{72};
+    const HysteresisNetwork pair = random_pair(random, 8, 0.02);
+    const double p = unique_slope(random, pair);
+    const SlidingResolvent resolvent{pair, p};
+    ASSERT_TRUE(resolvent.tabulated());
+    auto state = pair.start(0.5);
+    SlidingResolvent::Memory memory{0.5};
+    int evaluations = 0;
+    constexpr int steps = 400;
+    for (int j = 0; j < steps; ++j) {
+        const double wanted = 0.5 + 0.015 * std::sin(0.05 * j);
+        const Solution solution =
+            resolvent.solve(pair, state, {p, pair.at(wanted, state).force + p * wanted}, memory);
+        ASSERT_NEAR(solution.position, wanted, 1e-12);
+        pair.advance(solution.position, state);
+        evaluations += solution.evaluations;
+    }
+    EXPECT_LE(evaluations, 2 * steps);
+    EXPECT_GT(evaluations, 0);
+}
+
+TEST(SlidingResolvent, LeavesToNewtonWhatIsNotUnique) {
+    Random random{73};
+    const HysteresisNetwork pair = random_pair(random, 8, 0.01);
+    const double p = -0.5 * pair.force().slope_bounds().lower;
+    ASSERT_GT(p, 0.0);
+    const SlidingResolvent resolvent{pair, p};
+    EXPECT_FALSE(resolvent.tabulated());
+    SlidingResolvent::Memory memory{0.4};
+    const auto state = pair.start(0.4);
+    const double q = 1.1 * p;
+    const Solution solution = resolvent.solve(pair, state, {p, q}, memory);
+    EXPECT_NEAR(pair.at(solution.position, state).force + p * solution.position, q, 1e-9 * (1.0 + p));
+    const SlidingResolvent::Memory before = memory;
+    EXPECT_EQ(resolvent.solve(pair, state, {p, std::nan("")}, memory).status, Status::NonFinite);
+    EXPECT_EQ(memory.newton.position, before.newton.position);
+}
+
+/// Steps both structures along one motion.
+template <class S, class T>
+void expect_same_rendering(Random& random, S structure, T reference, double tolerance) {
+    structure.reset(0.4);
+    reference.reset(0.4);
+    double x = 0.4;
+    double speed = 0.0;
+    for (int k = 0; k < 500; ++k) {
+        speed = 0.97 * speed + uniform(random, -0.001, 0.001);
+        x = std::clamp(x + speed, -0.1, 1.1);
+        const Rendered rendered = structure.step(x);
+        const Rendered expected = reference.step(x);
+        ASSERT_EQ(rendered.status, expected.status) << k;
+        ASSERT_NEAR(rendered.force, expected.force, tolerance) << k;
+        ASSERT_NEAR(rendered.environment_position, expected.environment_position, tolerance) << k;
+    }
+}
+
+TEST(CompensatedResolvent, RendersWhatNewtonRenders) {
+    Random random{74};
+    for (int k = 0; k < cases(10); ++k) {
+        const WaveletNetwork network{test::random_network(random, static_cast<std::size_t>(1 + k % 9)),
+                                     test::unit_domain()};
+        const double stiffness = 1.3 * std::max(1.0, network.curve().slope_bounds().largest());
+        const VirtualCoupling coupling{stiffness, k % 3 == 0 ? 0.0 : 2e-4 * stiffness};
+        const Compensated plain{network, stiffness};
+        const CompiledNetwork network_compiled{network};
+        const Compensated compiled{network_compiled, stiffness};
+        const Inertia inertia{1e-5 * stiffness, 2e-3 * stiffness};
+        using S = Compensated<CompiledNetwork>;
+        const auto resolvent = [&](double p) {
+            CompensatedResolvent solver{piecewise(network.curve()), stiffness, p};
+            EXPECT_TRUE(solver.tabulated());
+            return solver;
+        };
+        const double massless = Massless<S>::load_line_slope(coupling, 1e-3);
+        const double implicit = Implicit<S>::load_line_slope(inertia, coupling, 1e-3);
+        expect_same_rendering(random, Massless{compiled, coupling, 1e-3, resolvent(massless)},
+                              Massless{plain, coupling, 1e-3}, 1e-10 * stiffness);
+        expect_same_rendering(random, Implicit{compiled, inertia, coupling, 1e-3, resolvent(implicit)},
+                              Implicit{plain, inertia, coupling, 1e-3}, 1e-9 * stiffness);
+    }
+}
+
+TEST(Scheme, RendersWithTablesWhatTheNetworkItselfWould) {
+    Random random{75};
+    for (int k = 0; k < cases(10); ++k) {
+        const NetworkParameters network = test::random_network(random, static_cast<std::size_t>(2 + k));
+        const Domain domain = test::unit_domain(Continuation::Free);
+        const WaveletNetwork plain{network, domain};
+        const double steepest = plain.curve().slope_bounds().largest();
+        Scheme scheme;
+        scheme.coupling = {1.5 * steepest, 3e-4 * steepest};
+        scheme.inertia = {1e-4 * steepest, 2e-2 * steepest};
+        const ForceModel model{network, domain};
+        const auto compare = [&](const auto& reference, const char* solver) {
+            ASSERT_EQ(solver_name(model, scheme, 1e-3).value_or("none"), solver);
+            with_structure(model, scheme, 1e-3, [&](auto structure) {
+                expect_same_rendering(random, std::move(structure), reference, 1e-8 * steepest);
+            });
+        };
+        scheme.structure = StructureKind::Direct;
+        compare(Direct{plain}, "none");
+        scheme.structure = StructureKind::Massless;
+        compare(Massless{plain, scheme.coupling, 1e-3}, "table");
+        scheme.structure = StructureKind::Implicit;
+        compare(Implicit{plain, scheme.inertia, scheme.coupling, 1e-3}, "table");
+    }
+}
+
+}  // namespace
+}  // namespace palpate
