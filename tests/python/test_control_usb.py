@@ -25,7 +25,7 @@ SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 
 # The transfers are the clock: how fast this machine is does not matter, and the rate is nobody's business.
 LOCK_STEP = ["--lock-step"]
-PATIENT = ["--wait-ms", "500", "--lowest-rate-share", "0", "--priority", "0"]
+PATIENT = ["--wait-ms", "10000", "--lowest-rate-share", "0", "--priority", "0"]
 
 pytestmark = [
     needs_emulation,

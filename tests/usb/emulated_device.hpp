@@ -157,6 +157,11 @@ class EmulatedDevice {
         latch();
     }
 
+    /// Whether an IN packet is one of this protocol, which a host can make sense of.
+    [[nodiscard]] static bool is_whole(const Bytes& packet) {
+        return packet.size() == 32 && packet[0] == 'H' && packet[1] == 1;
+    }
+
     /// The IN endpoint is polled.
     Handshake in(Bytes& packet) {
         if (naks_ || mute_ || !fresh_) {
@@ -204,8 +209,9 @@ class EmulatedDevice {
 
     void inject(FaultKind kind, std::uint32_t count) { remaining_.at(number(kind)) = std::max(count, 1U); }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
-    /// Refuses transfers for now: such frames take their time, since the host's timeouts do.
-    [[nodiscard]] bool takes_its_time() const { return naks_ || mute_ || halted_in_ || halted_out_; }
+    /// Refuses transfers for now: such frames take their time, since the host's timeouts do. One that
+    /// halted is no such device: the host is told, and clears it when it comes to it.
+    [[nodiscard]] bool takes_its_time() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
     // ----------------------------------------------------------------------------- what a test wants to know

@@ -20,7 +20,7 @@ struct Settings {
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds patience{250};  ///< how long lock-step waits for a host that stopped writing
+    std::chrono::milliseconds patience{3000};  ///< how long lock-step waits for a host that does not do its part
     std::string trace;                        ///< CSV, one row a frame
     std::string preload_first;                ///< a sanitizer's library
     bool denied = false;                      ///< the node can be opened by nobody
@@ -30,7 +30,7 @@ struct Settings {
 inline constexpr const char* options_text =
     "  --lock-step            the host's transfers are the clock; else frames begin every 1/rate\n"
     "  --rate-hz RATE         frames a second [1000]\n"
-    "  --patience-ms MS       lock-step waits so long for a host that stopped writing [250]\n"
+    "  --patience-ms MS       lock-step waits so long for the host to do its part [3000]\n"
     "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
     "  --no-device            nothing is plugged in\n"
     "  --says-rate-hz RATE    what GET_INFO says [1000]\n"

@@ -10,6 +10,8 @@ serial line.
 from __future__ import annotations
 
 import io
+import lzma
+import platform
 import re
 import shutil
 import subprocess
@@ -33,6 +35,8 @@ LONGEST_S = 600
 
 def missing() -> str:
     """What the guest lacks, as the reason of a skipped test; empty where it can be run."""
+    if platform.machine() != "x86_64":
+        return f"needs a machine that is x86_64, not {platform.machine()}"
     lacking = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
     if lacking:
         return f"needs {' '.join(sorted(lacking))}"
@@ -66,6 +70,13 @@ def libraries(program: Path) -> list[Path]:
     """The shared libraries of a program, where it looks for them."""
     told = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
     return [Path(path) for path in re.findall(r"(/\S+) \(0x", told)]
+
+
+def install_module(driver: Path, folder: Path) -> None:
+    """Copy a driver, which newer kernels bring compressed."""
+    packed = Path(f"{driver}.xz")
+    content = driver.read_bytes() if driver.exists() else lzma.decompress(packed.read_bytes())
+    (folder / driver.name).write_bytes(content)
 
 
 @dataclass
@@ -104,7 +115,7 @@ def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Left:
         shutil.copy(path, tree / "in" / name)
     drivers = next((unpacked / "lib" / "modules").iterdir()) / "kernel" / "drivers" / "usb"
     for module in MODULES:
-        shutil.copy(drivers / f"{module}.ko", tree / "modules")
+        install_module(drivers / f"{module}.ko", tree / "modules")
     loading = "\n".join(f"insmod /modules/{Path(module).name}.ko" for module in MODULES)
     (tree / "etc" / "passwd").write_text("root:x:0:0::/:/bin/sh\nnobody:x:65534:65534::/:/bin/sh\n")
     init = tree / "init"

@@ -58,7 +58,7 @@ double state(const std::string& field) {
 UsbDevice patient(const std::string& serial = "") {
     UsbOptions options;
     options.serial = serial;
-    options.wait = std::chrono::seconds{5};
+    options.wait = std::chrono::seconds{20};
     return UsbDevice{options};
 }
 
@@ -142,7 +142,8 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     }
     const UsbHealth health = device.health();
     EXPECT_EQ(health.stream.packets, before.stream.packets + static_cast<std::uint64_t>(samples));
-    EXPECT_EQ(health.stream.lost + health.stream.repeated + health.stream.malformed, 0U);
+    EXPECT_EQ(health.stream.lost, before.stream.lost);
+    EXPECT_EQ(health.stream.repeated + health.stream.malformed, 0U);
     EXPECT_EQ(health.skipped_commands, before.skipped_commands);
     EXPECT_EQ(health.timeouts, 0U);
     EXPECT_EQ(health.stalls, 0U);
@@ -177,12 +178,13 @@ TEST(UsbDevice, PacketsThatAreNotOfThisProtocolAreCountedAndNeverBelieved) {
     std::uint64_t malformed = 0;
     for (const char* fault : {"short", "magic", "version", "long"}) {
         const Reading before = settled(device);
+        const std::uint64_t lost = device.health().stream.lost;
         tell(std::string("fault ") + fault + " 1");
         const Reading after = device.exchange({0.0});  // the one behind it
         EXPECT_EQ(after.status, Status::Ok) << fault;
         EXPECT_EQ(after.sequence, before.sequence + 2) << fault;
         EXPECT_EQ(device.health().stream.malformed, ++malformed) << fault;
-        EXPECT_EQ(device.health().stream.lost, malformed) << fault;
+        EXPECT_EQ(device.health().stream.lost, lost + 1) << fault;
     }
 }
 
@@ -220,7 +222,7 @@ TEST(UsbDevice, ADeviceThatDoesNotAnswerIsATimeoutAndNoMore) {
     EXPECT_GE(timeouts, 1);
     EXPECT_GE(device.health().timeouts, 1U);
     Status status = Status::Timeout;
-    for (int k = 0; k < 200 && status == Status::Timeout; ++k) {
+    for (int k = 0; k < 10'000 && status == Status::Timeout; ++k) {
         status = device.exchange({0.0}).status;
     }
     EXPECT_EQ(status, Status::Ok);
@@ -230,9 +232,10 @@ TEST(UsbDevice, SamplesLeftOutShowInTheSequence) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     const Reading before = settled(device);
+    const std::uint64_t lost = device.health().stream.lost;
     tell("fault skip 5");
     EXPECT_EQ(device.exchange({0.0}).sequence, before.sequence + 6);
-    EXPECT_EQ(device.health().stream.lost, 5U);
+    EXPECT_EQ(device.health().stream.lost, lost + 5);
     tell("fault repeat 1");
     const Reading again = device.exchange({0.0});
     EXPECT_EQ(again.sequence, before.sequence + 6);
@@ -433,7 +436,7 @@ struct Machine {
 
 /// This program again, under the emulator; the exit code.
 int run_under_emulator(const std::string& self, const Machine& machine, std::vector<std::string> words) {
-    std::vector<std::string> command{PALPATE_USB_EMULATOR, "--lock-step", "--patience-ms", "200"};
+    std::vector<std::string> command{PALPATE_USB_EMULATOR, "--lock-step"};
     command.insert(command.end(), machine.options.begin(), machine.options.end());
     if (const std::string first = PALPATE_PRELOAD_FIRST; !first.empty()) {
         command.insert(command.end(), {"--preload-first", first});

@@ -157,7 +157,7 @@ class UsbfsNode {
         const std::lock_guard locked{self->mutex_};
         self->port_.forget(client);
         if (self->claimed_by_ == client) {
-            self->claimed_by_ = nullptr;
+            self->let_go();
         }
         for (auto urb = self->urbs_.begin(); urb != self->urbs_.end();) {
             if (urb->first.first == client) {
@@ -168,6 +168,12 @@ class UsbfsNode {
             }
         }
         self->show_readiness();
+    }
+
+    void let_go() {
+        claimed_by_ = nullptr;
+        port_.let_go();
+        clock_->host_left();
     }
 
     /// The argument of an ioctl, copied from the client; changes reach the client when the ioctl is completed.
@@ -224,8 +230,7 @@ class UsbfsNode {
                 if (claimed_by_ != client) {
                     return -EINVAL;
                 }
-                claimed_by_ = nullptr;
-                clock_->host_left();
+                let_go();
                 return 0;
             case USBDEVFS_GETDRIVER:
             case USBDEVFS_IOCTL:
