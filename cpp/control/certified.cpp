@@ -18,8 +18,9 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 
 [[nodiscard]] bool chooses_rendering(const Options& options) {
     const SchemeChoices& scheme = options.scheme;
-    return options.structure || scheme.compensated || scheme.coupling_stiffness || scheme.coupling_damping ||
-           scheme.mass || scheme.damping || scheme.play_radius;
+    // The parser writes a flag that was not given, too.
+    return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
+           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius;
 }
 
 }  // namespace

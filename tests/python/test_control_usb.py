@@ -16,7 +16,9 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from palpate import read_recording
+from palpate import load_model, read_recording
+from palpate._core import Scheme
+from palpate.planning import DeviceProfile, Plan
 from usb_emulation import RUNNER, emulated, frames, needs_emulation
 
 PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
@@ -59,17 +61,32 @@ def test_a_model_without_certificate_is_refused_unless_the_risk_is_typed_in_full
     assert "type --uncertified to render without" in control(device=LOCK_STEP).stderr
 
 
-@pytest.mark.parametrize(
-    ("certified", "reason"),
-    [
-        ("certificate_massless.json", "is certified for the device "),
-        ("certificate_stable.json", "is not certified: "),
-    ],
-)
-def test_a_certificate_of_something_else_is_refused(certified: str, reason: str) -> None:
-    answer = control(device=LOCK_STEP, model=SPRING.parent / certified)
-    assert answer.returncode == 2
-    assert reason in answer.stderr
+def certified_for(folder: Path, **known: Any) -> Path:
+    plan = Plan(load_model(SPRING), Scheme(structure="direct"))
+    return plan.certified_for(DeviceProfile(**known)).stored().save(folder / "certified.json")
+
+
+def test_a_certificate_of_something_else_is_refused(tmp_path: Path) -> None:
+    friction = 1e-3
+    for known, reason in (
+        ({"id": "EMU-2", "coulomb_friction": friction}, "is certified for the device EMU-2, not for EMU-1"),
+        ({"id": "EMU-1"}, "is not certified: Coulomb friction"),
+        ({"id": "EMU-1", "coulomb_friction": friction, "period_s": 2e-3}, "is certified for a period of 2 ms"),
+        ({"id": "EMU-1", "coulomb_friction": friction, "encoder_step": 1e-6}, "an encoder step of 1e-06 rad"),
+    ):
+        answer = control(device=LOCK_STEP, model=certified_for(tmp_path, **known))
+        assert answer.returncode == 2
+        assert reason in answer.stderr
+
+
+def test_a_model_that_is_certified_for_this_device_needs_no_more_words(tmp_path: Path) -> None:
+    certified = certified_for(tmp_path, id="EMU-1", delay_samples=1, coulomb_friction=1e-3)
+    answer = control("--wait-ms", "10000", "--duration-s", 0.2, "--json", device=LOCK_STEP, model=certified)
+    assert answer.returncode in (0, 1), answer.stderr  # a busy machine may end it
+    assert json.loads(answer.stdout)["ticks"] > 0
+    refused = control("--structure", "massless", device=LOCK_STEP, model=certified)
+    assert refused.returncode == 2
+    assert "is certified as it was planned: leave --structure and its numbers out" in refused.stderr
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from palpate._core import Hand, Scheme
 ROOT = Path(__file__).resolve().parents[2]
 CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
 MODEL = ROOT / "bench" / "click_and_wall.json"
+SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) >= 100
 SWEEP_S = 2.0
 DURATION_S = 60.0 if LONG else 6.0
@@ -33,12 +34,16 @@ UNPLUGGED_AT = 500
 SLOW_FROM = 2000
 
 # What GET_INFO and the echoes say of the emulated device; its mechanics and its hand are the defaults of both.
-DEVICE = DeviceProfile(id="EMU-1", delay_samples=1, force_step=1e-6)
+KNOWN: dict[str, Any] = {"id": "EMU-1", "delay_samples": 1, "force_step": 1e-6}
+DEVICE = DeviceProfile(**KNOWN)
+# A certificate spends friction. The emulated device has none, but this is about what a certificate forbids.
+WITH_FRICTION = DeviceProfile(**KNOWN, coulomb_friction=1e-3)
 
 RENDER = """
 name=$1
-shift
-palpate-control /in/model.json --device usb --record $name.csv --json "$@" > $name.json 2> $name.told
+model=$2
+shift 2
+palpate-control /in/$model --device usb --record $name.csv --json "$@" > $name.json 2> $name.told
 echo $? > $name.code
 """
 FACTS = """
@@ -54,7 +59,8 @@ class Told:
     """What the guest left of its runs."""
 
     left: guest.Left
-    plan: Plan
+    felt: Plan
+    """What the run `whole` renders."""
 
     def text(self, name: str) -> str:
         assert name in self.left.files, f"no {name} came back\n{self.left.console[-3000:]}"
@@ -84,31 +90,32 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
     if missing:
         pytest.skip(missing)
     folder = tmp_path_factory.mktemp("guest")
-    plan = Plan(load_model(MODEL), Scheme()).certified_for(DEVICE)
-    assert plan.certificate is not None
-    assert plan.certificate.certified, plan.certificate.why
-    model = plan.stored().save(folder / "model.json")
+    felt = Plan(load_model(MODEL), Scheme(structure="direct"))
+    spring = Plan(load_model(SPRING), Scheme(structure="direct")).certified_for(WITH_FRICTION)
+    assert spring.certificate is not None
+    assert spring.certificate.certified, spring.certificate.why
+    spring.stored().save(folder / "spring.json")
     (folder / "render").write_text(RENDER, encoding="utf-8")
     (folder / "facts").write_text(FACTS, encoding="utf-8")
     script = f"""
 usbip_emulator -- sh /in/facts
 sleep 1
-usbip_emulator --trace whole.trace -- sh /in/render whole --duration-s {DURATION_S}
+usbip_emulator --trace whole.trace -- sh /in/render whole {MODEL.name} --uncertified --structure direct --duration-s {DURATION_S}
 sleep 1
-usbip_emulator --fault unplug@{UNPLUGGED_AT} -- sh /in/render cut
+usbip_emulator --fault unplug@{UNPLUGGED_AT} -- sh /in/render cut spring.json
 sleep 1
 grep -l 1209 /sys/bus/usb/devices/*/idVendor > left
-usbip_emulator -- sh /in/render again --duration-s 1
+usbip_emulator -- sh /in/render again spring.json --duration-s 1
 sleep 1
-usbip_emulator --rate-hz 900 -- sh /in/render slow
+usbip_emulator --rate-hz 900 -- sh /in/render slow spring.json
 sleep 1
-usbip_emulator --fault slow@{SLOW_FROM}x9999 -- sh /in/render slowed
+usbip_emulator --fault slow@{SLOW_FROM}x9999 -- sh /in/render slowed spring.json
 sleep 1
-usbip_emulator --rate-hz 900 -- sh /in/render told_slow --uncertified --lowest-rate-share 0 --duration-s 0.9
+usbip_emulator --rate-hz 900 -- sh /in/render told_slow spring.json --uncertified --lowest-rate-share 0 --duration-s 0.9
 """
     programs = {"usbip_emulator": usbip_emulator(), "palpate-control": CONTROL}
-    left = guest.run(script, programs, {path.name: path for path in (model, folder / "render", folder / "facts")})
-    return Told(left, plan)
+    left = guest.run(script, programs, {path.name: path for path in (MODEL, *folder.iterdir())})
+    return Told(left, felt)
 
 
 def test_the_kernel_enumerates_the_device(told: Told) -> None:
@@ -122,7 +129,7 @@ def test_the_kernel_enumerates_the_device(told: Told) -> None:
     assert "new full-speed USB device number 2" in told.text("dmesg")
 
 
-def test_a_certified_rendering_holds_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_loop_runs_at_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
     summary = told.summary("whole")
     with capsys.disabled():
         print(
@@ -144,16 +151,16 @@ def test_the_force_is_as_close_to_the_model_as_on_the_simulated_device(
     trace = told.table("whole.trace")
     trace = trace[(trace["status"] & 1).eq(1) & trace["started"].gt(0)][-sweeps - 1 - 10 : -10]
     # A torque stands in the row of the frame in which it arrived, and acts in the next one.
-    emulated = force_error(told.plan, -trace["torque_Nm"].to_numpy()[:-1], trace["position_rad"].to_numpy())
-    rendering = simulate(told.plan, DEVICE, Hand(), DURATION_S)
+    emulated = force_error(told.felt, -trace["torque_Nm"].to_numpy()[:-1], trace["position_rad"].to_numpy())
+    rendering = simulate(told.felt, DEVICE, Hand(), DURATION_S)
     ends = rendering.columns["handle_end_rad"]
-    simulated = force_error(told.plan, rendering.force[-sweeps:], ends[-sweeps - 1 :])
+    simulated = force_error(told.felt, rendering.force[-sweeps:], ends[-sweeps - 1 :])
     with capsys.disabled():
         print(
             f"\nguest: force error {1e3 * emulated:.3f} mN*m RMS, simulated device {1e3 * simulated:.3f} mN*m, "
             f"ratio {emulated / simulated:.3f}; largest torque {trace['torque_Nm'].abs().max():.2f} N*m"
         )
-    assert trace["torque_Nm"].abs().max() > 1.0  # the wall was felt
+    assert trace["position_rad"].max() > 0.4  # the wall was felt
     assert emulated <= 2.0 * simulated
 
 
