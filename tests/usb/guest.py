@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small Linux in QEMU in which commands meet the emulated USB device through a real kernel.
 
-usbfs, usbcore, a host-controller driver (vhci_hcd), enumeration and unplugging are the kernel's own; the device is
-`usbip_emulator` behind them. The guest's clock counts instructions, so that its times are exact whatever the load of
-this machine. Everything stands in one initial file system; what the guest leaves behind comes back over its second
-serial line.
+usbfs, usbcore, a host-controller driver (vhci_hcd), enumeration and unplugging are the kernel's own; the
+device is `usbip_emulator` behind them. The guest's clock counts instructions, so that its times are exact
+whatever the load of this machine. Everything stands in one initial file system; what the guest leaves behind
+comes back over its second serial line.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ class Left:
 def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Left:
     """Boot, run a shell script in the guest, come back with what it left in /out.
 
-    `programs` stand in /bin, with their libraries; `files` in /in. The script's last line should write a verdict:
-    QEMU ends with 0 whatever happened inside.
+    `programs` stand in /bin, with their libraries; `files` in /in. The script has to write down what it
+    finds: QEMU ends with 0 whatever happened inside.
     """
     folder = CACHE / "work"
     shutil.rmtree(folder, ignore_errors=True)
@@ -145,10 +145,11 @@ poweroff -f
         )
     boot = next((unpacked / "boot").glob("vmlinuz-*"))
     machine = ["-accel", "tcg", "-smp", "1", "-icount", "shift=1,sleep=off,align=off", "-m", "256"]
-    shown = ["-nographic", "-no-reboot", "-monitor", "none", "-serial", "stdio", "-serial", f"file:{came_back}"]
+    shown = ["-nographic", "-no-reboot", "-monitor", "none"]
+    lines = ["-serial", "stdio", "-serial", f"file:{came_back}"]
     started = ["-kernel", str(boot), "-initrd", str(image), "-append", "console=ttyS0 quiet panic=-1"]
     ran = subprocess.run(
-        ["qemu-system-x86_64", *machine, *shown, *started],
+        ["qemu-system-x86_64", *machine, *shown, *lines, *started],
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import guest
 import numpy as np
 import pandas as pd
 import pytest
 
+import guest
 from palpate import load_model
-from palpate.planning import DeviceProfile, Plan, force_at, simulate
 from palpate._core import Hand, Scheme
+from palpate.planning import DeviceProfile, Plan, force_at, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
@@ -32,8 +32,10 @@ SWEEP_S = 2.0
 DURATION_S = 60.0 if LONG else 6.0
 UNPLUGGED_AT = 500
 SLOW_FROM = 2000
+DIRECT = "--uncertified --structure direct"
+UNSTOPPED = "--uncertified --lowest-rate-share 0"
 
-# What GET_INFO and the echoes say of the emulated device; its mechanics and its hand are the defaults of both.
+# What GET_INFO and the echoes say of the emulated device; mechanics and hand are the defaults of both.
 KNOWN: dict[str, Any] = {"id": "EMU-1", "delay_samples": 1, "force_step": 1e-6}
 DEVICE = DeviceProfile(**KNOWN)
 # A certificate spends friction. The emulated device has none, but this is about what a certificate forbids.
@@ -100,7 +102,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
     script = f"""
 usbip_emulator -- sh /in/facts
 sleep 1
-usbip_emulator --trace whole.trace -- sh /in/render whole {MODEL.name} --uncertified --structure direct --duration-s {DURATION_S}
+usbip_emulator --trace whole.trace -- sh /in/render whole {MODEL.name} --duration-s {DURATION_S} {DIRECT}
 sleep 1
 usbip_emulator --fault unplug@{UNPLUGGED_AT} -- sh /in/render cut spring.json
 sleep 1
@@ -111,7 +113,7 @@ usbip_emulator --rate-hz 900 -- sh /in/render slow spring.json
 sleep 1
 usbip_emulator --fault slow@{SLOW_FROM}x9999 -- sh /in/render slowed spring.json
 sleep 1
-usbip_emulator --rate-hz 900 -- sh /in/render told_slow spring.json --uncertified --lowest-rate-share 0 --duration-s 0.9
+usbip_emulator --rate-hz 900 -- sh /in/render told_slow spring.json --duration-s 0.9 {UNSTOPPED}
 """
     programs = {"usbip_emulator": usbip_emulator(), "palpate-control": CONTROL}
     left = guest.run(script, programs, {path.name: path for path in (MODEL, *folder.iterdir())})
@@ -157,7 +159,7 @@ def test_the_force_is_as_close_to_the_model_as_on_the_simulated_device(
     simulated = force_error(told.felt, rendering.force[-sweeps:], ends[-sweeps - 1 :])
     with capsys.disabled():
         print(
-            f"\nguest: force error {1e3 * emulated:.3f} mN*m RMS, simulated device {1e3 * simulated:.3f} mN*m, "
+            f"\nguest: force error {1e3 * emulated:.3f} mN*m RMS, simulated device {1e3 * simulated:.3f}, "
             f"ratio {emulated / simulated:.3f}; largest torque {trace['torque_Nm'].abs().max():.2f} N*m"
         )
     assert trace["position_rad"].max() > 0.4  # the wall was felt
@@ -165,7 +167,7 @@ def test_the_force_is_as_close_to_the_model_as_on_the_simulated_device(
 
 
 def force_error(plan: Plan, force: np.ndarray, ends: np.ndarray) -> float:
-    """RMS of what acted in each tick, minus the model at the end of the tick; `ends` has one more in front."""
+    """RMS of what acted in each tick, less the model at the tick's end; `ends` has one more in front."""
     return float(np.sqrt(np.mean(np.square(force - force_at(plan, ends)[1:]))))
 
 
