@@ -152,8 +152,9 @@ void add_guards(CLI::App& app, Options& options) {
 }
 
 void add_running(CLI::App& app, Options& options) {
-    app.add_option("--device", options.device,
-                   has_usb() ? "simulated, or usb[:SERIAL]" : "simulated; built without libusb: no usb[:SERIAL]")
+    app.add_option(
+           "--device", options.device,
+           has_usb() ? "simulated, or usb[:SERIAL]" : "simulated; built without libusb: no usb[:SERIAL]")
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")

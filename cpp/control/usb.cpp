@@ -52,11 +52,11 @@ Story story_of(const UsbDevice& device) {
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
                       number(stream.repeated) + " repeated, " + number(stream.malformed) + " malformed, " +
                       number(health.discarded) + " discarded; " + number(health.skipped_commands) +
-                      " commands skipped, " + number(health.lost_commands) +
-                          " lost, " + number(stream.refused_commands) + " refused, " +
-                      number(stream.late_echoes) + " late echoes; " + number(health.timeouts) +
-                      " timeouts, " + number(health.stalls) + " stalls, " + number(health.bus_errors) +
-                      " bus errors, " + number(stream.watchdog_trips) + " watchdog trips"}},
+                      " commands skipped, " + number(health.lost_commands) + " lost, " +
+                      number(stream.refused_commands) + " refused, " + number(stream.late_echoes) +
+                      " late echoes; " + number(health.timeouts) + " timeouts, " + number(health.stalls) +
+                      " stalls, " + number(health.bus_errors) + " bus errors, " +
+                      number(stream.watchdog_trips) + " watchdog trips"}},
         {{"packets", stream.packets},
          {"lost", stream.lost},
          {"repeated", stream.repeated},

@@ -236,12 +236,13 @@ def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_pa
             cells = row.split(",")
             if cells[-1] in UNSOUND:
                 assert float(cells[2]) == 0.0, where  # in the tick that saw it
+        behind = round(summary["usb"]["delay_samples"]["p50"]) - 1  # in packets; on a busy machine
         felt = frames(trace)
         by_start = {frame.started: index for index, frame in enumerate(felt)}
         for kind, frame in script:
             index = by_start[frame]
             assert felt[index - 1].torque != 0.0, f"{where}: {kind} at {frame}"
-            after = felt[index : index + FAULTS[kind][2] + 1]
+            after = felt[index : index + FAULTS[kind][2] + behind + 1]
             assert any(one.torque == 0.0 for one in after) or after[-1].unplugged, (
                 f"{where}: {kind} at {frame}"
             )

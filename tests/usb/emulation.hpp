@@ -20,10 +20,11 @@ struct Settings {
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds patience{3000};  ///< how long lock-step waits for a host that does not do its part
-    std::string trace;                        ///< CSV, one row a frame
-    std::string preload_first;                ///< a sanitizer's library
-    bool denied = false;                      ///< the node can be opened by nobody
+    std::chrono::milliseconds patience{
+        3000};                  ///< how long lock-step waits for a host that does not do its part
+    std::string trace;          ///< CSV, one row a frame
+    std::string preload_first;  ///< a sanitizer's library
+    bool denied = false;        ///< the node can be opened by nobody
     std::vector<std::string> command;
 };
 

@@ -197,19 +197,23 @@ class FrameClock {
           period_{std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz))},
           patience_{patience} {}
 
-    void host_wrote() { in_conversation_ = true; }
+    void host_wrote() {
+        if (!std::exchange(in_conversation_, true)) {
+            first_ = Clock::now() + settling;
+        }
+    }
     void host_left() { in_conversation_ = false; }
 
     /// Whether a frame begins now; else `until` is when to look again at the latest.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
-        const bool in_step =
-            lock_step_ && in_conversation_ && !device.takes_its_time() && !device.is_slow();
+        const bool in_step = lock_step_ && in_conversation_ && !device.takes_its_time() && !device.is_slow();
         if (in_step && port.host_is_ready()) {
+            until = first_;
             last_ = now;
-            return true;
+            return now >= until;
         }
-        const Clock::duration waits = !in_step                   ? (device.is_slow() ? 3 : 1) * period_
+        const Clock::duration waits = !in_step                  ? (device.is_slow() ? 3 : 1) * period_
                                       : port.host_reads_ahead() ? patience_
                                                                 : 5 * period_;
         until = last_ + waits;
@@ -221,10 +225,14 @@ class FrameClock {
     }
 
   private:
+    /// What was sent before the conversation arrives before it begins: else the host stays a packet behind in it.
+    static constexpr std::chrono::milliseconds settling{20};
+
     bool lock_step_;
     Clock::duration period_;
     Clock::duration patience_;
     Clock::time_point last_ = Clock::now();
+    Clock::time_point first_ = last_;  ///< of the conversation
     bool in_conversation_ = false;
 };
 
