@@ -62,15 +62,17 @@ UsbDevice patient(const std::string& serial = "") {
     return UsbDevice{options};
 }
 
-/// Exchanges until the command is on the motor and the reading is the device's newest: from there on, one exchange is
-/// one frame.
+/// Exchanges until the command is on the motor, the reading is the device's newest and only two reads are on their
+/// way: from there on, one exchange is one frame.
 Reading settled(UsbDevice& device, double force = 0.0) {
     Reading reading;
     for (int k = 0; k < 4; ++k) {
         reading = device.exchange({force});
     }
-    while (reading.status != Status::Fault &&
-           static_cast<std::uint16_t>(reading.sequence) != static_cast<std::uint16_t>(state("sequence"))) {
+    const auto is_newest = [&] {
+        return static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("sequence"));
+    };
+    while (reading.status != Status::Fault && (device.in_flight() > 2 || !is_newest())) {
         std::this_thread::sleep_for(milliseconds{2});  // one is still on its way, and will be waiting
         reading = device.exchange({force});
     }
