@@ -179,8 +179,8 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
 
 # Kind -> how many frames it lasts, whether nothing can follow it, within how many frames the torque is zero.
 # What a packet shows is answered at once, and the answer acts one frame later; what takes the packet itself
-# shows in the next one. Otherwise the device's watchdog answers, when the last command's time is over; so it does
-# on a busy machine before a halted OUT endpoint is cleared.
+# shows in the next one. Otherwise the device's watchdog answers, when the last command's time is over; so it
+# does on a busy machine before a halted OUT endpoint is cleared.
 SHOWN = 1
 TAKEN = 2
 WATCHDOG = 10
