@@ -2,82 +2,111 @@
 """P1 to P6: error, parameters and time of palpate and its rivals, measured in one run.
 
 python bench/identification.py [P1 ...] [--draws 7] [--json FILE] [--only NAME ...]
+
+With every noise draw all methods take their turn, so that what the machine did meanwhile happened to all of
+them. "over ours" is a rival's fit and tuning over palpate's whole time, median of the draws.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import platform
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from peers.methods import METHODS, Method
-from problems import NAMES, TITLES, draws, problem
+from peers.methods import METHODS, Fitted, Method
+from problems import NAMES, TITLES, Problem, draws, problem
+from run import SCALE, count, leave
+
+OURS = METHODS[0].name
 
 
-def measured(method: Method, name: str, wanted: int) -> dict[str, object]:
-    """Medians over the noise draws; why not, where it does not apply."""
-    first = problem(name)
-    if first.X.shape[1] not in method.inputs:
-        return {"skipped": "one input only"}
-    if len(first.y) > method.most_rows:
-        return {"skipped": f"takes too long with {len(first.y)} rows"}
-    found = []
+def skipped(method: Method, rows: Problem) -> str | None:
+    """Why a method does not take part in a problem."""
+    if rows.X.shape[1] not in method.inputs:
+        return "one input only"
+    if len(rows.y) > method.most_rows:
+        return f"takes too long with {len(rows.y)} rows"
+    return None
+
+
+def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
+    """One row for each method: medians over the noise draws, or why there are none."""
+    found: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
+    reasons: dict[str, str] = {}
     for draw in range(draws(name, wanted)):
         rows = problem(name, draw)
-        try:
-            fitted = method.fit(rows.X, rows.y)
-        except ImportError as missing:
-            return {"skipped": f"needs {missing.name}"}
-        found.append((rows.nrmse(fitted.predict(rows.X_test)), fitted))
+        for method in methods:
+            if (reason := reasons.get(method.name) or skipped(method, rows)) is not None:
+                reasons[method.name] = reason
+                continue
+            try:
+                fitted = method.fit(rows.X, rows.y)
+            except ImportError as missing:
+                reasons[method.name] = f"needs {missing.name}"
+                continue
+            found[method.name].append((rows.nrmse(fitted.predict(rows.X_test)), fitted))
+    return [
+        {"problem": name, "method": method.name, "skipped": reasons[method.name]}
+        if method.name in reasons
+        else {"problem": name, "method": method.name, **_medians(found[method.name], found.get(OURS))}
+        for method in methods
+    ]
+
+
+def _medians(
+    theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None
+) -> dict[str, Any]:
+    over = [each.seconds / own.seconds for (_, each), (_, own) in zip(theirs, ours or theirs, strict=True)]
     return {
-        "nrmse": median(error for error, _ in found),
-        "worst": max(error for error, _ in found),
-        "n_parameters": int(median(each.n_parameters for _, each in found)),
-        "fit_s": median(each.fit_seconds for _, each in found),
-        "tuning_s": median(each.tuning_seconds for _, each in found),
-        "setting": found[0][1].setting,
-        "draws": len(found),
+        "nrmse": median(error for error, _ in theirs),
+        "worst": max(error for error, _ in theirs),
+        "n_parameters": int(median(each.n_parameters for _, each in theirs)),
+        "fit_s": median(each.fit_seconds for _, each in theirs),
+        "tuning_s": median(each.tuning_seconds for _, each in theirs),
+        "over_ours": median(over),
+        "setting": theirs[0][1].setting,
+        "draws": len(theirs),
     }
+
+
+def line(row: dict[str, Any]) -> str:
+    if "skipped" in row:
+        return f"{row['method']:28}  {row['skipped']}"
+    return (
+        f"{row['method']:28}{row['nrmse']:10.2e}{row['n_parameters']:12d}{row['fit_s']:9.3f}"
+        f"{row['tuning_s']:10.2f}{row['over_ours']:11.2f}  {row['setting']}"
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("problems", nargs="*", default=list(NAMES), metavar="P1 ...")
-    parser.add_argument("--draws", type=int, default=7)
+    chosen = NAMES if SCALE >= 0.1 else ("P1", "P4")
+    parser.add_argument("problems", nargs="*", default=list(chosen), metavar="P1 ...")
+    parser.add_argument("--draws", type=int, default=count(7))
     parser.add_argument("--only", nargs="*", default=None, help="names of methods")
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
+    methods = [each for each in METHODS if not options.only or each.name in options.only]
     results = []
     with threadpool_limits(limits=1):
         for name in options.problems:
             print(f"\n{name}: {TITLES[name]}")
-            print(f"{'':28}{'nrmse':>10}{'parameters':>12}{'fit s':>9}{'tuning s':>10}  setting", flush=True)
-            for method in METHODS:
-                if options.only and method.name not in options.only:
-                    continue
-                row = measured(method, name, options.draws)
-                results.append({"problem": name, "method": method.name, **row})
-                if "skipped" in row:
-                    print(f"{method.name:28}  {row['skipped']}")
-                else:
-                    print(
-                        f"{method.name:28}{row['nrmse']:10.2e}{row['n_parameters']:12d}{row['fit_s']:9.3f}"
-                        f"{row['tuning_s']:10.2f}  {row['setting']}",
-                        flush=True,
-                    )
-    if options.json is not None:
-        machine = {"python": platform.python_version(), "machine": platform.machine(), "threads": 1}
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(
-            json.dumps({"machine": machine, "results": results}, indent=1), encoding="utf-8"
-        )
+            print(
+                f"{'':28}{'nrmse':>10}{'parameters':>12}{'fit s':>9}{'tuning s':>10}{'over ours':>11}"
+                "  setting",
+                flush=True,
+            )
+            rows = measured(name, options.draws, methods)
+            results.extend(rows)
+            print("\n".join(map(line, rows)), flush=True)
+    leave(options.json, results)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ python bench/real_data.py [SET ...] [--files 5] [--json FILE]      PALPATE_DATA 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -19,8 +18,12 @@ from typing import Any
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from run import SCALE, count, leave
+
 import palpate
-from palpate.baselines import Compared, compare
+from palpate.baselines import Compared, PerStroke, SmoothingSpline, compare
 from palpate.recording.motion import velocity
 
 EVERY = 5
@@ -28,6 +31,9 @@ EVERY = 5
 
 LIMIT = 1.3
 """No file may be worse than this many times its own two-spline error."""
+
+MOST_FILES = 32
+"""Of a set."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,28 @@ def ours(train: palpate.Recording, test: palpate.Recording, options: Mapping[str
     }
 
 
+PASSIVE = "smoothing spline, two strokes, h >= 0"
+"""What no passive model can be expected to beat."""
+
+
+def passive_splines(train: palpate.Recording, test: palpate.Recording) -> dict[str, Any] | None:
+    """Two splines that meet in their mean where release would lie above press; None without strokes."""
+    if train.direction is None or test.direction is None or not {-1, 1} <= set(train.direction.tolist()):
+        return None
+    start = time.perf_counter()
+    used = train.direction != 0
+    pair = PerStroke(SmoothingSpline()).fit(
+        np.column_stack([train.position, train.direction])[used].astype(float), train.force[used]
+    )
+    seconds = time.perf_counter() - start
+    rows = test.direction != 0
+    x, side, force = test.position[rows][:, None], test.direction[rows], test.force[rows]
+    press, release = pair.press_.predict(x), pair.release_.predict(x)
+    modelled = 0.5 * (press + release) + side * 0.5 * np.maximum(press - release, 0.0)
+    nrmse = float(np.sqrt(np.mean((modelled - force) ** 2)) / np.std(force))
+    return {"nrmse": nrmse, "n_parameters": pair.n_parameters_, "seconds": seconds}
+
+
 def row_of(path: Path, kind: Set) -> dict[str, Any]:
     """One file: ours, and every baseline on the same rows."""
     reading = dict(kind.reading)
@@ -93,17 +121,21 @@ def row_of(path: Path, kind: Set) -> dict[str, Any]:
         # derived before rows are held out: a derivative needs its neighbours in time
         speed, _ = velocity(recording)
         recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
+    train, test = recording.split(EVERY)
     try:
-        found = ours(*recording.split(EVERY), kind.options)
+        found = ours(train, test, kind.options)
     except palpate.InputError as error:
         found = {"refused": str(error)}
     others = {each.name: each for each in compare([recording], EVERY)}
     splines = others["smoothing spline" if "smoothing spline" in others else "smoothing spline, two strokes"]
+    baselines = {name: _numbers(each) for name, each in others.items()}
+    if (passive := passive_splines(train, test)) is not None:
+        baselines[PASSIVE] = passive
     return {
         "file": path.stem,
         **found,
         "splines": {"nrmse": splines.nrmse, "n_parameters": splines.n_parameters},
-        "baselines": {name: _numbers(each) for name, each in others.items()},
+        "baselines": baselines,
     }
 
 
@@ -155,19 +187,22 @@ def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sets", nargs="*", default=list(SETS), metavar="SET ...")
-    parser.add_argument("--files", type=int, default=None, help="files of each set at most, evenly spread")
+    chosen = SETS if SCALE >= 0.1 else ("switch_springs",)
+    parser.add_argument("sets", nargs="*", default=list(chosen), metavar="SET ...")
+    parser.add_argument(
+        "--files", type=int, default=count(MOST_FILES), help="of each set at most, evenly spread"
+    )
     parser.add_argument("--each", action="store_true", help="print a line for each file")
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
     folder = os.environ.get("PALPATE_DATA")
     if folder is None or not Path(folder).is_dir():
-        sys.exit("skipped: needs measured data, set PALPATE_DATA")
+        print("skipped: needs measured data, set PALPATE_DATA")
+        return
     results: dict[str, list[dict[str, Any]]] = {}
     for name in options.sets:
         files = sorted((Path(folder) / name).glob(SETS[name].pattern))
-        if options.files is not None:
-            files = files[:: -(-len(files) // options.files)]
+        files = files[:: max(1, -(-len(files) // options.files))]
         print(f"\n{name}", flush=True)
         results[name] = []
         for path in files:
@@ -181,9 +216,7 @@ def main() -> None:
                     flush=True,
                 )
         report(name, results[name])
-    if options.json is not None:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
+    leave(options.json, results)
 
 
 if __name__ == "__main__":

@@ -31,6 +31,10 @@ for source in bench/*.cpp; do
 done
 .venv/bin/palpate chart speed build/bench --to build/bench/figures
 .venv/bin/python bench/ratios.py build/bench
+for name in identification filters parsimony real_data dynamic; do
+    echo && .venv/bin/python "bench/$name.py" --json "build/bench/$name.json"
+done
+.venv/bin/palpate chart identification build/bench --to build/bench
 echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."
 
 echo "Lateness of the real-time loop beside cyclictest"

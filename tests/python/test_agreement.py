@@ -50,5 +50,14 @@ def test_show_prints_and_draws_two_models(tmp_path: Path, capsys: pytest.Capture
     assert main(["show", one, "--beside", two, "--plot", picture]) == 0
     assert "0.5" in capsys.readouterr().out
     assert Path(picture).read_bytes().startswith(b"\x89PNG")
-    assert main(["show", one, "--plot", picture]) == 2
-    assert "--beside" in capsys.readouterr().err
+
+
+def test_show_draws_every_network_that_was_considered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, picture = str(tmp_path / "one.json"), str(tmp_path / "path.png")
+    model = spring(10.0)
+    model.save(one)
+    assert main(["show", one, "--plot", picture]) == 0
+    assert capsys.readouterr().out.strip() == str(model).strip()
+    assert Path(picture).read_bytes().startswith(b"\x89PNG")

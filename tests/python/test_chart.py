@@ -100,3 +100,55 @@ def test_refuses_what_is_no_benchmark_output(results: Path, capsys: pytest.Captu
     (results / "bench_work_precision.json").write_text("[1, 2")
     assert main(["chart", "speed", str(results), "--to", str(results / "figures")]) == 2
     assert "is no output of Google Benchmark" in capsys.readouterr().err
+
+
+def _left(folder: Path, name: str, results: Any) -> None:
+    where = {"machine": "2 cores", "python": "3", "date": "2026-01-02", "commit": "abc", "scale": 1.0}
+    (folder / f"{name}.json").write_text(json.dumps({"where": where, "results": results}))
+
+
+def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict[str, Any]:
+    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0}
+    return {"problem": problem, "method": method, "nrmse": nrmse, "n_parameters": n_parameters, **times}
+
+
+@pytest.fixture
+def identified(tmp_path: Path) -> Path:
+    """What the benchmarks of identification leave where there is no measured data."""
+    rows = [
+        _reached("P1", "palpate", 3e-4, 20),
+        _reached("P1", "splines", 5e-4, 44),
+        {"problem": "P1", "method": "MARS", "skipped": "needs pyearth"},
+        _reached("P3", "palpate", 8e-4, 58),
+    ]
+    _left(tmp_path, "identification", rows)
+    _left(tmp_path, "filters", [{"way": "matched", "fastest_hz": [1.0, 2.0], "nrmse": [1e-3, 2e-3]}])
+    _left(tmp_path, "parsimony", [{"claim": "no wavelet", "right": 99, "draws": 100, "seconds": 0.1}])
+    return tmp_path
+
+
+def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: Path) -> None:
+    names = ("identification", "filters", "parsimony", "real_data", "dynamic")
+    page = identified / "identification.md"
+    page.write_text("".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names))
+    assert main(["chart", "identification", str(identified), "--to", str(identified)]) == 0
+    for name in ("parameters", "time", "filters"):
+        assert (identified / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
+    text = page.read_text(encoding="utf-8")
+    assert "| P1, splines | 5.00e-04 | 44 | 0.25 | 0.5 | 3 |" in text
+    assert "MARS" not in text
+    assert "| no wavelet | 99 | 100 |" in text
+    assert "2026-01-02, 2 cores, Python 3, commit abc" in text
+    # what was not measured this time stays as it was
+    assert "old real_data" in text
+    assert "old parsimony" not in text
+
+
+def test_identification_without_its_benchmark_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["chart", "identification", str(tmp_path), "--to", str(tmp_path)]) == 2
+    assert "identification.json does not exist; make bench writes it" in capsys.readouterr().err
+    (tmp_path / "identification.json").write_text("[1, 2]")
+    assert main(["chart", "identification", str(tmp_path), "--to", str(tmp_path)]) == 2
+    assert "is no output of bench/identification.py" in capsys.readouterr().err

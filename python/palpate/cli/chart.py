@@ -11,6 +11,7 @@ from .verb import Verbs
 
 _SUBJECTS = {
     "failures": "Where each method fails, measured beside its theory.",
+    "identification": "Identification beside its rivals, from the output of the benchmarks.",
     "speed": "Error against computing time, from the output of the benchmarks.",
 }
 """Every subject with its line in the help; its file, chart_SUBJECT.py, is imported only when it is used."""

@@ -7,7 +7,6 @@ import datetime
 import json
 import os
 import platform
-import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ..errors import InputError
-from ..recording.files import replacing
 from .arguments import PATH
 from .figures import figure_file
 from .output import number, talk
+from .pages import with_tables, write_text
 from .verb import Verb
 
 if TYPE_CHECKING:
@@ -55,16 +53,11 @@ def chart_failures(to: Path, points: int) -> None:
         _draw(figures / f"failure-{name}.png", maps[-1])
     where = _where(time.perf_counter() - start)
     written = where | {"maps": [each.as_json() for each in maps]}
-    _write(figures / "failure-maps.json", json.dumps(written, indent=1) + "\n")
+    write_text(figures / "failure-maps.json", json.dumps(written, indent=1) + "\n")
     talk(f"wrote {len(maps)} figures and failure-maps.json to {figures}")
     if text is not None:
-        _write(page, _with_tables(text, page, maps, where))
+        write_text(page, with_tables(text, page, _tables(maps, where)))
         talk(f"wrote the tables of {page}")
-
-
-def _write(path: Path, text: str) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def _where(seconds: float) -> dict[str, Any]:
@@ -88,22 +81,14 @@ def _draw(path: Path, drawn: FailureMap) -> None:
         draw_failure_map(axes, drawn.along, drawn.limit, lines, searched=drawn.searched, linear=drawn.linear)
 
 
-def _with_tables(text: str, page: Path, maps: list[FailureMap], where: dict[str, Any]) -> str:
-    """The page with new tables between its marks."""
+def _tables(maps: list[FailureMap], where: dict[str, Any]) -> dict[str, str]:
+    """What stands between each pair of marks of the page."""
     tables = {each.name: _table(each) for each in maps}
     tables["where"] = (
         f"Measured by `palpate chart failures --to docs`: palpate {where['palpate']}, {where['date']}, "
         f"{where['machine']}, {where['seconds']} s.\n"
     )
-    for name, table in tables.items():
-        marked = re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->\n)", flags=re.DOTALL)
-        if len(marked.findall(text)) != 1:
-            raise InputError(
-                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line"
-            )
-        before, after = marked.split(text)
-        text = before + table + after
-    return text
+    return tables
 
 
 def _table(shown: FailureMap) -> str:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,10 @@ import click
 import numpy as np
 
 from ..errors import InputError
-from ..recording.files import replacing
 from .arguments import PATH
 from .figures import figure_file
 from .output import number, talk
+from .pages import markdown_table, write_text
 from .verb import Verb
 
 _STEPS = "bench_work_precision"
@@ -73,11 +73,6 @@ def _spoken(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _mark_down(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
 def _work_precision(results: _Results, path: Path) -> str:
     from ..plotting import WorkPrecision, draw_work_precision
 
@@ -115,7 +110,7 @@ def _work_precision(results: _Results, path: Path) -> str:
         for name, points in families.items()
         for period, time, error, diverges in points
     ]
-    return _mark_down(
+    return markdown_table(
         ("time step", "period [ms]", "a step [ns]", "1 ms of motion [ns]", "error, RMS [rad]"), rows
     )
 
@@ -151,7 +146,7 @@ def _rendered_force(results: _Results, path: Path) -> str:
         (each.name, number(each.nanoseconds), f"{evaluations:.3g}", number(each.error), number(instant))
         for each, instant, evaluations, _ in shown
     ]
-    return _mark_down(
+    return markdown_table(
         (
             "structure and solver",
             "a tick [ns]",
@@ -195,6 +190,5 @@ def chart_speed(folder: Path, to: Path) -> None:
             f"{forces.where()}\n",
         ]
     )
-    with replacing(to / "speed.md") as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(to / "speed.md", text)
     talk(f"wrote {to / 'work-precision.png'}, {to / 'rendered-force.png'} and {to / 'speed.md'}")

@@ -38,10 +38,12 @@ def require_figure_name(path: Path) -> None:
 
 
 @contextmanager
-def figure_file(path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,)) -> Iterator[list[Axes]]:
+def figure_file(
+    path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1
+) -> Iterator[list[Axes]]:
     """Give axes one below the other, of the given shares of the height; the file is complete or not there.
 
-    Several axes share their position axis.
+    Several axes share their position axis; in several columns, row by row, each has its own.
     """
     import matplotlib
 
@@ -50,11 +52,12 @@ def figure_file(path: Path, *, height_inches: float, rows: Sequence[float] = (1.
 
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(_COLUMN_INCHES, height_inches), dpi=_DOTS_PER_INCH, layout="constrained")
-        axes = figure.subplots(len(rows), squeeze=False, sharex=True, gridspec_kw={"height_ratios": rows})[
-            :, 0
-        ]
+        axes = figure.subplots(
+            len(rows), columns, squeeze=False, sharex=columns == 1, gridspec_kw={"height_ratios": rows}
+        ).ravel()
         yield list(axes)
-        for each in axes:
-            each.label_outer()
+        if columns == 1:
+            for each in axes:
+                each.label_outer()
         with replacing(path) as temporary:
             figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))

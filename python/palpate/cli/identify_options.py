@@ -23,6 +23,7 @@ HELP = {
     "rung_evidence": "Fall of the criterion that a richer kind of model must show.",
     "patience": "Wavelets added without improvement before growth stops.",
     "refine": "Move and stretch the wavelets, or leave them on the frame.",
+    "refinement": "Variable projection, or quasi-newton on all parameters as published.",
     "refine_steps": "Refinement steps after each wavelet.",
     "final_steps": "Refinement steps on the accepted network.",
     "frame_scale": "Ratio of neighbouring dilations of the frame.",

@@ -162,3 +162,13 @@ def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str) 
             [error.instant for _, error in shown],
             force_unit,
         )
+
+
+def picture_path(path: Path, model: Model) -> None:
+    """How a model was found: error of every network that was considered, its criterion beneath."""
+    from ..plotting import draw_path
+
+    if not model.path:
+        raise InputError("the model does not say how it was found: it holds no path of networks")
+    with figure_file(path, height_inches=3.6, rows=(1.6, 1.0)) as (error, criterion):
+        draw_path(error, criterion, model.path, model.units["force"])

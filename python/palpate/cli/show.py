@@ -10,6 +10,7 @@ import click
 from .arguments import PATH
 from .figures import figure_file, require_figure_name
 from .output import number, print_table
+from .pictures import picture_path
 from .verb import Verb
 
 
@@ -22,19 +23,22 @@ from .verb import Verb
     help="Another model: print how far it is from the first, in shares of the just noticeable difference.",
 )
 @click.option(
-    "--plot", metavar="PNG", type=PATH, help="Draw both models and their difference; needs --beside."
+    "--plot",
+    metavar="PNG",
+    type=PATH,
+    help="Draw every network that was considered; with --beside both models and their difference.",
 )
 def show(model_file: Path, beside: Path | None, plot: Path | None) -> None:
     """Print a model: its terms, its domain, its units, and how it was identified."""
     from ..model import load_model
 
     if plot is not None:
-        if beside is None:
-            raise click.UsageError("--plot draws two models; name the other one with --beside OTHER.json")
         require_figure_name(plot)
     model = load_model(model_file)
     if beside is None:
         click.echo(str(model))
+        if plot is not None:
+            picture_path(plot, model)
         return
     from ..verification import compare
 

@@ -14,6 +14,7 @@ from .._typing import Float1D
 from ..errors import InputError
 from .fresh import FreshRows
 from .options import IdentifyOptions
+from .quasi_newton import refine_all
 from .refinement import refine
 from .selection import Library, OrthogonalSelection, residual_gains, select_backward
 from .separable import TINY, Basis, SeparableProblem, Solution
@@ -172,7 +173,8 @@ def _improved(
 ) -> Solution:
     """Refine, then let the prior on the weights follow the noise level that is left."""
     if options.refine:
-        solution = refine(problem, solution, steps=steps, tolerance=tolerance)
+        descend = refine_all if options.refinement == "quasi-newton" else refine
+        solution = descend(problem, solution, steps=steps, tolerance=tolerance)
     problem.set_prior(solution.rss)
     return problem.solve(solution.basis)
 

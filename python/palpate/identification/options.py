@@ -15,6 +15,7 @@ RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
 WORDS: dict[str, tuple[str, ...]] = {
     "criterion": tuple(CRITERIA),
     "selection": ("orthogonal", "residual", "backward"),
+    "refinement": ("projection", "quasi-newton"),
     "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
 }
@@ -49,6 +50,8 @@ class IdentifyOptions:
     """Wavelets without improvement after which growth stops [-]"""
     refine: bool = True
     """False: dilations and translations stay on the frame"""
+    refinement: str = "projection"
+    """How wavelets are refined: by variable projection, or all parameters by quasi-newton as published"""
     refine_steps: int = 8
     """Refinement steps after each wavelet that was added or removed [-]"""
     final_steps: int = 30

@@ -31,12 +31,17 @@ OF_RECORDINGS = {
     "inputs",
     "hysteresis_nonnegative",
     "slope_bounds",
+    "monotone",
+    "fixed_force",
+    "filters",
+    "assumed_mass",
+    "assumed_damping",
     "coupling_stiffness",
     "play_radius",
     "contact_share",
     "period",
 }
-"""Settings that only a recording gives a meaning to: strokes, contact, a position with its slope."""
+"""Settings that only a recording gives a meaning to: strokes, contact, motion, a position with its slope."""
 
 SETTINGS = {each.name: each.default for each in fields(IdentifyOptions) if each.name not in OF_RECORDINGS}
 """Those of :class:`IdentifyOptions` that the regressor takes, with their defaults."""

@@ -2,7 +2,9 @@
 """Figures: one function each, drawing on axes that the caller made. Only the command line needs them."""
 
 from .failure_maps import MeasuredLimit, draw_failure_map
+from .identification import Reached, draw_legend, draw_over_speed, draw_reached
 from .measured_and_modelled import draw_measured_and_modelled
+from .path import draw_path
 from .real_against_rendered import draw_real_against_rendered
 from .speed import RenderedForce, WorkPrecision, draw_rendered_force, draw_work_precision
 from .structures import draw_structures
@@ -10,10 +12,15 @@ from .two_models import draw_two_models
 
 __all__ = [
     "MeasuredLimit",
+    "Reached",
     "RenderedForce",
     "WorkPrecision",
     "draw_failure_map",
+    "draw_legend",
     "draw_measured_and_modelled",
+    "draw_over_speed",
+    "draw_path",
+    "draw_reached",
     "draw_real_against_rendered",
     "draw_rendered_force",
     "draw_structures",
