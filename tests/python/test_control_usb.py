@@ -215,18 +215,18 @@ def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_pa
     run = 0
     while done < 100 * SCALE:
         run += 1
-        kinds = generator.choices(passing, k=9)
-        if run % 2:
+        kinds = generator.choices(passing, k=29)
+        if run % 3:
             kinds.append(generator.choice(final))
         at, script = 260, []
         for kind in kinds:
             script.append((kind, at))
-            at += generator.randrange(40, 70)
+            at += generator.randrange(25, 40)
         where = f"seed {seed}, run {run}: {script}"
         faults = [word for kind, frame in script for word in ("--fault", f"{kind}@{frame}x{FAULTS[kind][0]}")]
         record, trace = tmp_path / f"felt{run}.csv", tmp_path / "trace.csv"
         answer = uncertified(
-            "--duration-s", 0.9, "--record", record, "--json", device=[*faults, "--trace", str(trace)]
+            "--duration-s", 1.5, "--record", record, "--json", device=[*faults, "--trace", str(trace)]
         )
         ends = kinds[-1] in final
         assert answer.returncode == int(ends), f"{where}\n{answer.stderr}"

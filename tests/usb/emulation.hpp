@@ -40,6 +40,7 @@ inline constexpr const char* options_text =
     "  --somebody-elses       another magic in GET_INFO\n"
     "  --flipped              a torque that points the wrong way\n"
     "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
+    "  --from-zero            counters begin at 0, and not close to where they wrap around\n"
     "  --spring STIFFNESS     a real spring on the handle, N*m/rad [0]\n"
     "  --no-hand              nobody holds the handle\n"
     "  --fault KIND@FRAME[xCOUNT]   repeatable; frames are counted from the first OUT packet\n"
@@ -87,6 +88,9 @@ inline constexpr const char* options_text =
             common.flipped = true;
         } else if (word == "--takes-out-first") {
             common.takes_out_first = true;
+        } else if (word == "--from-zero") {
+            common.first_sequence = 0;
+            common.first_us = 0;
         } else if (word == "--spring") {
             settings.plant.spring = std::stod(value());
         } else if (word == "--no-hand") {

@@ -130,6 +130,8 @@ class Port {
     }
     /// Whether the host keeps reads queued, or does one thing after the other.
     [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
+    /// Whether such a host has not come to queue the next one.
+    [[nodiscard]] bool lacks_reads() const { return reads_ahead_ && in_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
 
@@ -185,9 +187,9 @@ class Port {
 ///
 /// Paced: every millisecond; up to three late ones are made up for. Lock-step: as soon as the host has done its part,
 /// so that nothing depends on how fast the machine is. Before the host's first command, and while the device itself
-/// takes its time, frames go by the clock in lock-step too. A host that does not do its part is waited for; when
-/// patience ends it misses one frame. One that does not keep two reads queued does one thing after the other, and is
-/// waited for a few milliseconds only.
+/// takes its time, frames go by the clock in lock-step too, as long as the host reads. A host that does not do its
+/// part is waited for; when patience ends it misses one frame. One that does not keep two reads queued does one thing
+/// after the other, and is waited for a few milliseconds only.
 class FrameClock {
   public:
     using Clock = std::chrono::steady_clock;
@@ -207,13 +209,14 @@ class FrameClock {
     /// Whether a frame begins now; else `until` is when to look again at the latest.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
-        const bool in_step = lock_step_ && in_conversation_ && !device.takes_its_time() && !device.is_slow();
-        if (in_step && port.host_is_ready()) {
+        const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow();
+        if (in_step && in_conversation_ && port.host_is_ready()) {
             until = first_;
             last_ = now;
             return now >= until;
         }
-        const Clock::duration waits = !in_step                  ? (device.is_slow() ? 3 : 1) * period_
+        const bool waits_for_host = in_step && (in_conversation_ || port.lacks_reads());
+        const Clock::duration waits = !waits_for_host           ? (device.is_slow() ? 3 : 1) * period_
                                       : port.host_reads_ahead() ? patience_
                                                                 : 5 * period_;
         until = last_ + waits;

@@ -427,6 +427,27 @@ TEST(UsbPlainDevice, WithoutTransducerAndTachometerHasNoMeasuredForceAndDifferen
     }
 }
 
+// Whatever the page leaves to the firmware.
+TEST(UsbOtherFirmware, IsTheSameDevice) {
+    UsbDevice device = patient();
+    ASSERT_EQ(device.open().reason, "");
+    Reading last = settled(device);
+    const UsbHealth before = device.health();
+    for (int k = 0; k < 200; ++k) {
+        const Reading reading = device.exchange({0.0});
+        ASSERT_EQ(reading.status, Status::Ok);
+        ASSERT_EQ(reading.sequence, last.sequence + 1);
+        last = reading;
+    }
+    EXPECT_EQ(device.health().stream.lost, before.stream.lost);
+    EXPECT_EQ(device.health().stream.late_echoes, 0U);
+    EXPECT_LE(device.health().stream.delay.quantile(0.5), 1e6 + 1.0);  // a sample at most
+    EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-9);
+    device.close();
+    EXPECT_EQ(state("torque_uNm"), 0.0);
+    EXPECT_EQ(state("enabled"), 0.0);
+}
+
 }  // namespace
 }  // namespace palpate
 
@@ -482,7 +503,8 @@ int main(int count, char** words) {
                                    {"UsbNoDevice", {"--no-device"}},
                                    {"UsbForeignDevice", {"--somebody-elses"}},
                                    {"UsbDeniedDevice", {"--denied"}},
-                                   {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}}}) {
+                                   {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}},
+                                   {"UsbOtherFirmware", {"--takes-out-first", "--from-zero"}}}) {
         const std::string suite = machine.suite;
         if (filter.empty() || filter.rfind(suite + ".", 0) == 0) {
             std::vector<std::string> given = asked;
