@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shlex
 import signal
 import subprocess
 import sys
@@ -175,6 +176,24 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
     assert "stopped because it was asked to" in out
     assert frames(trace)[-1].torque == 0.0
     assert not frames(trace)[-1].enabled
+
+
+def test_killed_it_leaves_the_device_to_its_watchdog(tmp_path: Path) -> None:
+    trace, record = tmp_path / "trace.csv", tmp_path / "felt.csv"
+    words = [PROGRAM, SPRING, "--device", "usb", "--uncertified", *PATIENT]
+    rendering = shlex.join(map(str, [*words, "--duration-s", "inf", "--record", record]))
+    script = f"""
+        {rendering} 2> /dev/null &
+        until [ "$(wc -l < '{record}.part' 2> /dev/null)" -gt 300 ] 2> /dev/null; do sleep 0.05; done
+        kill -9 $!
+        sleep 1
+    """
+    answer = emulated("sh", "-c", script, device=[*LOCK_STEP, "--trace", str(trace)])
+    assert answer.returncode == 0, answer.stderr
+    felt = frames(trace)
+    assert min(frame.torque for frame in felt) < -0.01
+    assert felt[-1].torque == 0.0
+    assert felt[-1].status & 2  # the watchdog
 
 
 # Kind -> how many frames it lasts, whether nothing can follow it, within how many frames the torque is zero.

@@ -30,7 +30,7 @@ NEEDED = {
     "dpkg": "dpkg",
     "ldd": "libc-bin",
 }
-LONGEST_S = 600
+LONGEST_S = 1800
 
 
 def missing() -> str:
