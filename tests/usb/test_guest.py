@@ -174,9 +174,11 @@ def force_error(plan: Plan, force: np.ndarray, ends: np.ndarray) -> float:
 def test_unplugged_it_ends_with_a_fault_and_a_complete_record_and_plugged_in_it_goes_on(told: Told) -> None:
     summary = told.summary("cut")
     assert told.text("cut.code").strip() == "1"
-    assert summary["status"] == "Fault"
+    # The kernel notices by and by: until then, nothing answers.
+    assert summary["status"] in ("Fault", "Timeout")
+    assert summary["ended"].startswith("stopped by a fault of the device")
     assert len(told.table("cut.csv")) == summary["ticks"] == summary["recorded"]
-    assert summary["ticks"] == pytest.approx(UNPLUGGED_AT, abs=5)
+    assert summary["ticks"] == pytest.approx(UNPLUGGED_AT, abs=10)
     assert told.text("left") == ""
     assert "USB disconnect, device number" in told.text("dmesg")
     assert told.text("again.code").strip() == "0", told.text("again.told")
