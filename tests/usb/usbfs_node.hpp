@@ -95,8 +95,8 @@ class UsbfsNode {
             }
             return text;
         };
-        Bytes descriptors = EmulatedDevice::device_descriptor();
-        const Bytes configuration = EmulatedDevice::configuration_descriptor();
+        Bytes descriptors = Identity::device_descriptor();
+        const Bytes configuration = Identity::configuration_descriptor();
         descriptors.insert(descriptors.end(), configuration.begin(), configuration.end());
         const Identity& identity = port_.device().identity();
         const std::string address = std::to_string(address_);
