@@ -22,6 +22,7 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 
 bool chooses_rendering(const Options& options) {
     const SchemeChoices& scheme = options.scheme;
+    // The parser writes a flag that was not given, too.
     return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
            scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || options.slew_s ||
            options.tolerated;

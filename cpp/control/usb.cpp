@@ -80,6 +80,10 @@ Story story_of(const UsbDevice& device) {
 
 }  // namespace
 
+bool has_usb() noexcept {
+    return true;
+}
+
 int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
     if (!options.faults.empty()) {
         refuse("--fault is for the simulated device");
