@@ -187,8 +187,10 @@ def _fitted(
         new[f"linear{suffix}"] = found.linear[k].tolist()
         new[f"weight{suffix}"] = found.weights[k].tolist()
     limited = changed_network(model, **new)
-    least = _least_loss(limited) if hysteretic else 0.0
-    if not least < 0.0 or _least_loss(model) < 0.0:
+    if not lossy:
+        return limited
+    least = sliding_bounds(limited).loss_min
+    if least >= 0.0:
         return limited
     # What is imposed holds but for rounding, and h >= 0 is proved or not: raise it by that much.
     return changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
