@@ -6,6 +6,7 @@ from .identification import Reached, draw_legend, draw_over_speed, draw_reached
 from .measured_and_modelled import draw_measured_and_modelled
 from .path import draw_path
 from .real_against_rendered import draw_real_against_rendered
+from .root_locus import draw_root_locus
 from .speed import (
     ModelError,
     OverWavelets,
@@ -36,6 +37,7 @@ __all__ = [
     "draw_reached",
     "draw_real_against_rendered",
     "draw_rendered_force",
+    "draw_root_locus",
     "draw_structures",
     "draw_two_models",
     "draw_work_precision",
