@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "palpate/readable.hpp"
 
@@ -21,6 +22,7 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 
 bool chooses_rendering(const Options& options) {
     const SchemeChoices& scheme = options.scheme;
+    // The parser writes a flag that was not given, too.
     return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
            scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || options.slew_s ||
            options.tolerated;
@@ -62,6 +64,26 @@ std::string not_certified(const ModelFile& file, const Options& options, const D
                "--tolerated-samples";
     }
     return "";
+}
+
+Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units, const Bench& bench) {
+    if (!options.uncertified) {
+        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
+            refuse(options.model + " " + reason +
+                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+        }
+    }
+    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
+    GuardSettings guards = guards_of(options, bench);
+    LoopSettings loop = options.loop;
+    if (!options.uncertified) {
+        keep_to(*file.certificate, guards, loop);
+    }
+    Job job{std::move(file), std::move(units), scheme, guards, {}};
+    job.settings.loop = loop;
+    job.settings.real_time = options.real_time;
+    validate(job.settings.loop);
+    return job;
 }
 
 }  // namespace palpate::control

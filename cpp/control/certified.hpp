@@ -4,8 +4,10 @@
 #include <string>
 
 #include "options.hpp"
+#include "palpate/bench.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/io/model_file.hpp"
+#include "rendering.hpp"
 
 namespace palpate::control {
 
@@ -23,5 +25,10 @@ void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings
 /// this rate, and for the rendering that was asked for. That it fits the model was seen to when the file was read.
 [[nodiscard]] std::string not_certified(const ModelFile& file, const Options& options,
                                         const DeviceProfile& device);
+
+/// What is done on a real device, which `bench` describes: what the model's certificate is for, or, where the risk was
+/// typed in full, what the options say. Throws where neither allows it.
+[[nodiscard]] Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units,
+                                     const Bench& bench);
 
 }  // namespace palpate::control

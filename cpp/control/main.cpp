@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "certified.hpp"
+#include "inverse3.hpp"
 #include "options.hpp"
 #include "palpate/bench.hpp"
 #include "palpate/device/faulty.hpp"
@@ -182,9 +183,12 @@ int run_on_simulated(const Options& given, ModelFile file, RecordUnits units) {
 
 int run(const Options& options) {
     const std::string kind = options.device.substr(0, options.device.find(':'));
-    const bool has_serial = options.device.size() > kind.size() + 1;
-    if (options.device != "simulated" && options.device != "usb" && !(kind == "usb" && has_serial)) {
-        refuse("--device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    const bool has_more = options.device.size() > kind.size() + 1;
+    const bool is_whole = options.device == kind;
+    if (!(kind == "simulated" && is_whole) &&
+        !((kind == "usb" || kind == "inverse3") && (is_whole || has_more))) {
+        refuse("--device is '" + options.device +
+               "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
     ModelFile file = load_model_file(options.model);
     const RecordUnits units = units_of(file);
@@ -192,7 +196,8 @@ int run(const Options& options) {
         refuse(options.model + " has " + std::to_string(file.inputs.size()) +
                " inputs: a model of the position alone can be rendered");
     }
-    return (kind == "usb" ? run_on_usb : run_on_simulated)(options, std::move(file), units);
+    const auto run_on = kind == "usb" ? run_on_usb : kind == "inverse3" ? run_on_inverse3 : run_on_simulated;
+    return run_on(options, std::move(file), units);
 }
 
 }  // namespace

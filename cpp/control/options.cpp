@@ -14,6 +14,7 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/readable.hpp"
+#include "usb.hpp"
 
 namespace palpate::control {
 
@@ -151,7 +152,10 @@ void add_guards(CLI::App& app, Options& options) {
 }
 
 void add_running(CLI::App& app, Options& options) {
-    app.add_option("--device", options.device, "simulated, or usb[:SERIAL]")
+    app.add_option("--device", options.device,
+                   has_usb() ? "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z"
+                             : "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built "
+                               "without libusb: no usb[:SERIAL]")
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")

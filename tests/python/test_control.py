@@ -73,9 +73,7 @@ def test_the_version_is_that_of_the_package() -> None:
             [MODEL, "--structure", "explicit", "--mass", "1e-4"],
             "explicit, which diverges: the model's steepest",
         ),
-        ([MODEL, "--device", "usb"], "no USB device"),
-        ([MODEL, "--device", "usb:42"], "no USB device"),
-        ([MODEL, "--device", "knob"], "must be simulated or usb[:SERIAL]"),
+        ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL] or inverse3"),
         ([MODEL, "--record", "/no/such/folder/out.csv"], "cannot be written: No such file or directory"),
         ([MODEL, "--record", "/tmp"], "cannot be written: it is not an ordinary file"),
         ([MODEL, "--record", MODEL], "is the model"),
@@ -103,6 +101,15 @@ def test_what_is_wrong_is_refused_with_one_sentence(words: list[Any], sentence: 
     assert answer.stderr.startswith("error: ")
     assert answer.stderr.count("\n") == 1
     assert sentence in answer.stderr
+
+
+def test_a_usb_device_is_refused_for_what_is_missing() -> None:
+    without = "built without libusb" in control("--help").stdout
+    answer = control(MODEL, "--device", "usb:NOBODY")
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("error: --device usb:NOBODY: ")
+    assert answer.stderr.count("\n") == 1
+    assert ("built without libusb" in answer.stderr) == without
 
 
 def test_a_motor_current_is_no_force(tmp_path: Path) -> None:

@@ -186,7 +186,14 @@ def _fitted(
         new[f"bias{suffix}"] = float(found.bias[k])
         new[f"linear{suffix}"] = found.linear[k].tolist()
         new[f"weight{suffix}"] = found.weights[k].tolist()
-    return changed_network(model, **new)
+    limited = changed_network(model, **new)
+    if not lossy:
+        return limited
+    least = sliding_bounds(limited).loss_min
+    if least >= 0.0:
+        return limited
+    # What is imposed holds but for rounding, and h >= 0 is proved or not: raise it by that much.
+    return changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
 
 
 def _change(
