@@ -17,8 +17,8 @@ namespace detail {
 class NumberHash {
   public:
     void add(std::uint64_t bits) noexcept {
-        for (int byte = 0; byte < 8; ++byte) {
-            value_ = (value_ ^ ((bits >> (8 * byte)) & 0xFFU)) * 0x100000001B3U;
+        for (unsigned byte = 0; byte < 8U; ++byte) {
+            value_ = (value_ ^ ((bits >> (8U * byte)) & 0xFFU)) * 0x100000001B3U;
         }
     }
     void add(double number) noexcept { add(std::bit_cast<std::uint64_t>(number)); }
@@ -62,8 +62,8 @@ class NumberHash {
     hash.add(model.play_radius().value_or(0.0));
     constexpr std::array<char, 17> digits{"0123456789abcdef"};
     std::string text;
-    for (int shift = 60; shift >= 0; shift -= 4) {
-        text += digits[(hash.value() >> shift) & 0xFU];
+    for (unsigned digit = 16; digit-- > 0;) {
+        text += digits[(hash.value() >> (4U * digit)) & 0xFU];
     }
     return text;
 }

@@ -38,6 +38,7 @@ namespace palpate {
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
+    constexpr int halvings = 20;     // of the grid's step, in the end
     constexpr double lowest = 1e-4;  // [rad a sample]
     const double octaves = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
@@ -62,7 +63,8 @@ namespace palpate {
             look(static_cast<double>(k) / frequencies, slopes.lower + across * i / slope_steps);
         }
     }
-    for (double share = 1.0; share > 1e-6; share *= 0.5) {
+    for (int halving = 0; halving < halvings; ++halving) {
+        const double share = std::ldexp(1.0, -halving);
         const double along = best_along;
         const double slope = best_slope;
         for (const double i : {-1.0, 0.0, 1.0}) {
