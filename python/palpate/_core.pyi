@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'fingerprint', 'force_bounds', 'force_driven', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -628,6 +628,13 @@ def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[nump
     The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
     Arrays (n,) by name: force, environment_position, evaluations, status.
     """
+def guard_effects() -> list:
+    """
+    Every guard by itself: its cost where nothing is wrong, and what it makes of what is.
+    
+    By row: guard, cost (RMS change of the force over its RMS), wrong (what is wrong, and what of
+    it is measured), without and with the guard.
+    """
 def measure(device: str = 'simulated', *, object: ForceModel | None = None, transducer: bool = True, position_unit: str = 'rad', force_unit: str = 'N*m', probe: bool = False, lower: typing.SupportsFloat | typing.SupportsIndex | None = None, upper: typing.SupportsFloat | typing.SupportsIndex | None = None, speed: typing.SupportsFloat | typing.SupportsIndex | None = None, stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, force_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, push: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', keep: bool = False, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, wait_s: typing.SupportsFloat | typing.SupportsIndex | None = None, progress: collections.abc.Callable | None = None) -> dict:
     """
     A real object measured in real time; on the simulated device the model `object` is mounted.
@@ -725,7 +732,7 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
     """
 __version__: str = '0.1.0'
-failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'solver', 'pole', 'guard')
+failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
 longest_delay_samples: int = 16
 paper_sample_time_s: float = 0.001
 status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}
