@@ -45,7 +45,7 @@ namespace detail {
     constexpr double reach = 0.01;  // [rad]
     const double period = device.period_s;
     for (const int pace : {1, 2, 3, 4, 6, 10}) {
-        const auto settled = static_cast<std::size_t>(400 * pace * pace);
+        const auto settled = 400 * static_cast<std::size_t>(pace) * static_cast<std::size_t>(pace);
         const double tangent = std::tan(0.5 * std::numbers::pi / pace);
         for (const double share :
              {1e6, 3.0, 1.0, 0.3, -0.5, -0.8, -1.0, -1.1, -1.2, -1.4, -1.7, -2.0, -4.0}) {

@@ -31,6 +31,7 @@ struct FailureMap {
 /// Values from `first` to `last`, evenly spaced on a logarithmic axis.
 [[nodiscard]] inline std::vector<double> logarithmic(double first, double last, int points) {
     std::vector<double> values;
+    values.reserve(static_cast<std::size_t>(points));
     for (int k = 0; k < points; ++k) {
         values.push_back(points == 1 ? first : first * std::pow(last / first, k / (points - 1.0)));
     }

@@ -39,7 +39,7 @@ struct GuardedRun {
 struct GuardedScene {
     ForceModel model;
     double start = 0.0;
-    std::optional<Fault> fault{};
+    std::optional<Fault> fault = std::nullopt;
     std::size_t ticks = 3000;
 };
 
