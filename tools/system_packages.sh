@@ -24,6 +24,8 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
         compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
+        # The WebSocket of a Haply Inverse3.
+        compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
         # The USB device, and what its tests put in the place of one.
         command -v pkg-config >/dev/null || echo pkg-config
         compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev

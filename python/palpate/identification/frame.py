@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from .._typing import Float2D
 from ..errors import InputError
-from .separable import Basis
+from .options import IdentifyOptions
+from .separable import Basis, SeparableProblem
+
+COARSEST_CANDIDATE = 1.0
+"""Dilation of the frame's coarsest level [1/box]."""
+
+LIBRARY_ENTRIES = 2**23
+"""Numbers that a library may hold: with many rows it has fewer candidates."""
 
 NEGLIGIBLE = 1e-14
 """Spectral products below this share of the first one cannot change a printed digit of the bounds."""
@@ -77,6 +84,19 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
 def _spectrum(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
     """Fourier transform (unitary) of the unit-norm Mexican hat, without its sign."""
     return np.asarray(2.0 / np.sqrt(3.0) * np.pi**-0.25 * frequency**2 * np.exp(-0.5 * frequency**2))
+
+
+def resolved_frame(problem: SeparableProblem, options: IdentifyOptions) -> Basis:
+    """The truncated frame over the rows of a problem, down to what they resolve."""
+    positions = np.concatenate([block.positions for block in problem.blocks])
+    return truncated_frame(
+        positions,
+        coarsest=COARSEST_CANDIDATE,
+        finest=float(problem.finest(positions).max()),
+        frame_scale=options.frame_scale,
+        frame_step=options.frame_step,
+        max_candidates=max(1, min(options.max_candidates, LIBRARY_ENTRIES // len(positions))),
+    )
 
 
 def truncated_frame(

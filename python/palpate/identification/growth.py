@@ -6,12 +6,13 @@ it sees what is still missing. Pruning removes what refinement made superfluous,
 all, since of two that coincide one costs nothing to remove. N is thus decided again on the refined network.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .._typing import Float1D
 from ..errors import InputError
+from .frame import resolved_frame
 from .fresh import FreshRows
 from .options import IdentifyOptions
 from .quasi_newton import refine_all
@@ -26,6 +27,18 @@ PRUNE_CANDIDATES = 3
 PRUNE_HOPE = 6.0
 """A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
 
+
+REGROWTHS = 3
+"""Times that a refined and pruned network is grown again at most."""
+
+WITHOUT_NOISE = 5
+"""Positions that a wavelet's core must hold where there is hardly any noise to be taken for structure."""
+
+EVEN = 0.5
+"""Evenness of what a network leaves from which it is noise, and no finer wavelet is tried."""
+
+WORTH_FINER = 4.0
+"""How many times smaller the error must become by wavelets finer than noise would allow."""
 
 GROWING_TOLERANCE = 1e-3
 """While the size is open, refinement ends at steps that gain less than this share of the squared error."""
@@ -72,6 +85,35 @@ def fresh_deviance(criterion: str, fresh: FreshRows, errors: Float1D) -> float:
 
 
 def grow(
+    problem: SeparableProblem, library: Library, start: Basis, rung: str, options: IdentifyOptions
+) -> Grown:
+    """Grow from the wavelets of start; where that pays, again from what is left of them, then finer.
+
+    What was added one by one stands where it was best among fewer; once refined and pruned it leaves other
+    gaps. It pays for a single force: of two strokes measured objects gain nothing by it. Not for wavelets
+    that stay on the frame, nor where fresh rows judge.
+    """
+    found = _grown(problem, library, start, rung, options)
+    once = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
+    if once or problem.n_channels > 1 or len(found.solution.basis) == 0:
+        return found
+    for _ in range(REGROWTHS):
+        again = _grown(problem, library, found.solution.basis, rung, options)
+        if again.criterion >= found.criterion:
+            break
+        found = replace(again, path=(*found.path[:-1], again.path[-1]))
+    if problem.resolved_by > WITHOUT_NOISE and problem.evenness(found.solution) < EVEN:
+        before, problem.resolved_by = problem.resolved_by, WITHOUT_NOISE
+        fine = Library(problem, resolved_frame(problem, options))
+        finer = _grown(problem, fine, found.solution.basis, rung, options)
+        if problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
+            return replace(finer, path=(*found.path[:-1], finer.path[-1]))
+        problem.resolved_by = before
+    problem.set_prior(found.solution.rss)
+    return found
+
+
+def _grown(
     problem: SeparableProblem, library: Library, start: Basis, rung: str, options: IdentifyOptions
 ) -> Grown:
     """Grow from the wavelets of start until the criterion stops it, prune, refine to the end.

@@ -16,11 +16,10 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
 from .environment import MOST_HALVINGS
-from .frame import truncated_frame
+from .frame import resolved_frame
 from .fresh import FreshRows, kept_back
 from .growth import PathPoint, grow
 from .identified import Readings
-from .ladder import COARSEST_CANDIDATE, LIBRARY_ENTRIES
 from .options import IdentifyOptions
 from .robust import robust_weights
 from .rung import Rung
@@ -167,17 +166,10 @@ def _climbed(
     best = _better(best, line, options)
     if options.max_wavelets == 0 or problem.n_parameters(1) >= problem.samples:
         return best, path
-    frame = truncated_frame(
-        rows.positions,
-        coarsest=COARSEST_CANDIDATE,
-        finest=float(problem.finest(rows.positions).max()),
-        frame_scale=options.frame_scale,
-        frame_step=options.frame_step,
-        max_candidates=max(1, min(options.max_candidates, LIBRARY_ENTRIES // len(rows.force))),
-    )
     # growth sets a prior of its own in its problem
     apart = data.problem(rows, options)
-    grown = grow(apart, Library(apart, frame), Basis.empty(apart.dimension), "network", options)
+    library = Library(apart, resolved_frame(apart, options))
+    grown = grow(apart, library, Basis.empty(apart.dimension), "network", options)
     path.extend(grown.path)
     n_parameters = apart.n_parameters(len(grown.solution.basis))
     return _better(

@@ -156,6 +156,11 @@ class SeparableProblem:
         """The same, but never less than a sensor resolves: what other errors are measured by."""
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
+    def evenness(self, solution: Solution) -> float:
+        """Median over RMS of the residuals, 1 for normal noise; small where a few places hold the error."""
+        residual = np.abs(np.concatenate(solution.residuals))
+        return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
+
     def fresh_errors(self, solution: Solution, fresh: FreshRows) -> Float1D:
         """Force less the solution's at rows that the problem was not made of."""
         return fresh.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
