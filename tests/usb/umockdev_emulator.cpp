@@ -142,6 +142,9 @@ class Emulation {
         ::prctl(PR_SET_TIMERSLACK, 1000);
         std::unique_lock locked{mutex_};
         while (!over_) {
+            for (const std::unique_ptr<Place>& place : places_) {
+                place->node->look_after_clients();
+            }
             const FrameClock::Clock::time_point next = begin_frames();
             for (const std::unique_ptr<Place>& place : places_) {
                 if (place->node->port().device().is_unplugged() &&

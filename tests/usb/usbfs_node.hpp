@@ -15,7 +15,6 @@
 #include <functional>
 #include <map>
 #include <mutex>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -56,10 +55,6 @@ class UsbfsNode {
     }
     ~UsbfsNode() {
         umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
-        for (const UMockdevIoctlClient* client : clients_) {
-            auto* const object = const_cast<UMockdevIoctlClient*>(client);
-            g_object_weak_unref(G_OBJECT(object), &UsbfsNode::client_left, this);
-        }
         g_object_unref(handler_);
         ::close(fifo_);
     }
@@ -74,6 +69,15 @@ class UsbfsNode {
     void frame() {
         port_.frame();
         show_readiness();
+    }
+    /// A client that ended without a word takes its transfers along.
+    void look_after_clients() {
+        for (auto& [client, is_there] : clients_) {
+            if (is_there && umockdev_ioctl_client_get_connected(client) == FALSE) {
+                is_there = false;
+                forget(client);
+            }
+        }
     }
 
     /// Not under the mutex: the testbed may be answering an ioctl that waits for it.
@@ -151,31 +155,21 @@ class UsbfsNode {
         return TRUE;
     }
 
-    /// A client that is seen for the first time: its end takes its transfers along.
+    /// A client that is seen for the first time. It is kept, so that it can be asked whether it is still there.
     void notice(UMockdevIoctlClient* client) {
-        if (clients_.insert(client).second) {
-            g_object_weak_ref(G_OBJECT(client), &UsbfsNode::client_left, this);
+        if (clients_.insert({client, true}).second) {
+            g_object_ref(client);
         }
     }
-    /// Only its address is left of it.
-    static void client_left(gpointer node, GObject* object) {
-        auto* const self = static_cast<UsbfsNode*>(node);
-        const auto* const client = reinterpret_cast<const UMockdevIoctlClient*>(object);
-        const std::lock_guard locked{self->mutex_};
-        self->clients_.erase(client);
-        self->port_.forget(client);
-        if (self->claimed_by_ == client) {
-            self->let_go();
+
+    void forget(const UMockdevIoctlClient* client) {
+        port_.forget(client);
+        if (claimed_by_ == client) {
+            let_go();
         }
-        for (auto urb = self->urbs_.begin(); urb != self->urbs_.end();) {
-            if (urb->first.first == client) {
-                g_object_unref(urb->second);
-                urb = self->urbs_.erase(urb);
-            } else {
-                ++urb;
-            }
-        }
-        self->show_readiness();
+        // Their data went with the client: nobody is left to give it back to.
+        std::erase_if(urbs_, [&](const auto& urb) { return urb.first.first == client; });
+        show_readiness();
     }
 
     void let_go() {
@@ -187,15 +181,31 @@ class UsbfsNode {
     /// The argument of an ioctl, copied from the client; changes reach the client when the ioctl is completed.
     template <class Struct>
     static Struct* argument(UMockdevIoctlClient* client, UMockdevIoctlData*& data) {
-        UMockdevIoctlData* pointer = umockdev_ioctl_client_get_arg(client);
-        data = umockdev_ioctl_data_resolve(pointer, 0, sizeof(Struct), nullptr);
-        return data == nullptr ? nullptr : reinterpret_cast<Struct*>(data->data);
+        data = resolved(umockdev_ioctl_client_get_arg(client), 0, sizeof(Struct));
+        return reinterpret_cast<Struct*>(data->data);
+    }
+
+    /// The client ended in the middle of an ioctl.
+    struct Gone {};
+
+    /// What a pointer in the client's memory points to.
+    static UMockdevIoctlData* resolved(UMockdevIoctlData* data, std::size_t offset, std::size_t length) {
+        UMockdevIoctlData* target = umockdev_ioctl_data_resolve(data, offset, length, nullptr);
+        if (target == nullptr) {
+            throw Gone{};
+        }
+        return target;
     }
 
     /// A result >= 0, or a negative errno.
     int answer(UMockdevIoctlClient* client, unsigned long request) {
         UMockdevIoctlData* data = nullptr;
-        int result = answer(client, request, data);
+        int result = -EFAULT;
+        try {
+            result = answer(client, request, data);
+        } catch (const Gone&) {
+            forget(client);
+        }
         if (data != nullptr) {
             g_object_unref(data);
         }
@@ -273,8 +283,7 @@ class UsbfsNode {
         const auto length = static_cast<std::size_t>(urb->buffer_length);
         Bytes bytes;
         if (length > 0) {
-            UMockdevIoctlData* buffer =
-                umockdev_ioctl_data_resolve(data, offsetof(usbdevfs_urb, buffer), length, nullptr);
+            UMockdevIoctlData* buffer = resolved(data, offsetof(usbdevfs_urb, buffer), length);
             bytes.assign(buffer->data, buffer->data + length);
             g_object_unref(buffer);
         }
@@ -322,8 +331,7 @@ class UsbfsNode {
         const bool in =
             found->is_control ? (found->setup.at(0) & 0x80U) != 0 : (found->endpoint & 0x80U) != 0;
         if (in && found->actual > 0) {
-            UMockdevIoctlData* buffer =
-                umockdev_ioctl_data_resolve(urb_data, offsetof(usbdevfs_urb, buffer), 0, nullptr);
+            UMockdevIoctlData* buffer = resolved(urb_data, offsetof(usbdevfs_urb, buffer), 0);
             std::memcpy(buffer->data + (found->is_control ? 8 : 0), found->data.data(), found->actual);
             g_object_unref(buffer);
         }
@@ -353,7 +361,7 @@ class UsbfsNode {
     bool shown_ready_ = true;  ///< an empty FIFO
     std::mutex& mutex_;
     std::function<void()> woken_;
-    std::set<const UMockdevIoctlClient*> clients_;
+    std::map<UMockdevIoctlClient*, bool> clients_;  ///< and whether they are there
     const UMockdevIoctlClient* claimed_by_ = nullptr;
     std::map<std::pair<const UMockdevIoctlClient*, std::uint64_t>, UMockdevIoctlData*>
         urbs_;  ///< by client, address
