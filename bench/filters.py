@@ -62,13 +62,14 @@ def mean_force(model: Model, x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=count(3))
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
     speeds = FASTEST_HZ[-count(len(FASTEST_HZ)) :]
     print(f"{'nrmse of f, the hand up to [Hz]':38}" + "".join(f"{hz:>10g}" for hz in speeds), flush=True)
     results = []
     for name, (there, settings) in WAYS.items():
-        errors = [median(error(there, settings, hz, draw) for draw in range(count(3))) for hz in speeds]
+        errors = [median(error(there, settings, hz, draw) for draw in range(options.draws)) for hz in speeds]
         print(f"{name:38}" + "".join(f"{each:10.2e}" for each in errors), flush=True)
         results.append({"way": name, "fastest_hz": list(speeds), "nrmse": errors})
     leave(options.json, results)

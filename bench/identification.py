@@ -106,7 +106,7 @@ def main() -> None:
             rows = measured(name, options.draws, methods)
             results.extend(rows)
             print("\n".join(map(line, rows)), flush=True)
-    leave(options.json, results)
+            leave(options.json, results)
 
 
 if __name__ == "__main__":

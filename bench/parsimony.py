@@ -70,11 +70,6 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
         lambda draw: moved(draw, damping=0.03),
         lambda model: model.kind != "hysteresis",
     ),
-    "hysteresis beside velocity: taken": (
-        100,
-        lambda draw: moved(draw, hysteresis=0.1, damping=0.03),
-        lambda model: model.kind == "hysteresis" and velocity_is_there(model),
-    ),
     f"mass and damping from 60 s: within {100 * WITHIN:g} %": (
         20,
         lambda draw: moved(draw, seconds=60.0, mass=MASS, damping=DAMPING),

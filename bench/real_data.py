@@ -32,7 +32,7 @@ EVERY = 5
 LIMIT = 1.3
 """No file may be worse than this many times its own two-spline error."""
 
-MOST_FILES = 32
+MOST_FILES = 16
 """Of a set."""
 
 

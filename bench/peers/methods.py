@@ -247,7 +247,7 @@ def mars(X: Array, y: Array) -> Fitted:
 METHODS = (
     Method("palpate", palpate_regressor),
     Method("palpate, selection alone", palpate_selection_alone),
-    Method("palpate, quasi-Newton", palpate_quasi_newton),
+    Method("palpate, quasi-Newton", palpate_quasi_newton, most_rows=100_000),
     Method("OMP on a Mexican-hat frame", frame_pursuit, most_rows=100_000),
     Method("make_lsq_spline", lsq_spline, inputs=(1,)),
     Method("UnivariateSpline", univariate_spline, inputs=(1,), most_rows=100_000),

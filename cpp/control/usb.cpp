@@ -47,8 +47,11 @@ Story story_of(const UsbDevice& device) {
     const auto number = [](std::uint64_t count) { return std::to_string(count); };
     return {
         {{"round trip", percentiles(stream.round_trip)},
-         {"delay", "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
-                       readable(samples(1.0)) + " samples, from a sample to the force made of it"},
+         {"delay",
+          "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
+              readable(samples(1.0)) + " samples, from a sample to the force made of it" +
+              (stream.late_commands == 0 ? ""
+                                         : "; " + number(stream.late_commands) + " later than certified")},
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
                       number(stream.repeated) + " repeated, " + number(stream.malformed) + " malformed, " +
                       number(health.discarded) + " discarded; " + number(health.skipped_commands) +
@@ -66,6 +69,7 @@ Story story_of(const UsbDevice& device) {
            {"skipped_commands", health.skipped_commands},
            {"refused_commands", stream.refused_commands},
            {"late_echoes", stream.late_echoes},
+           {"late_commands", stream.late_commands},
            {"timeouts", health.timeouts},
            {"stalls", health.stalls},
            {"bus_errors", health.bus_errors},
@@ -75,6 +79,10 @@ Story story_of(const UsbDevice& device) {
 }
 
 }  // namespace
+
+bool has_usb() noexcept {
+    return true;
+}
 
 int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
     if (!options.faults.empty()) {

@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from palpate import InputError, identify
+from palpate import InputError, identify, verify
 from palpate.identification.compression import Compressor
 from palpate.identification.hysteresis_input import HysteresisInput
 from palpate.recording import Recording
@@ -52,15 +52,16 @@ def test_a_play_radius_between_those_that_are_tried_is_measured() -> None:
     side = HysteresisInput.of_play([x], RADIUS, [-0.6]).side
     noise = np.random.default_rng(2).normal(0.0, 0.005, len(x))
     force = np.tanh(6 * (x - 0.5)) + side * (0.2 + 0.1 * x) + noise
-    model = identify(Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x))))
+    recording = Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x)))
+    model = identify(recording)
     assert model.play_radius == pytest.approx(RADIUS, rel=0.01)
-    assert model.fit.rmse < 1.1 * 0.005
+    assert verify(model, recording).rmse < 1.1 * 0.005
 
 
 def test_models_of_several_inputs_are_not_laid_beside_each_other() -> None:
     rng = np.random.default_rng(0)
     X = rng.uniform(0.0, 1.0, (400, 2))
     recording = Recording.from_arrays(X[:, 0], X.sum(axis=1), inputs={"temperature": X[:, 1]})
-    model = identify(recording, inputs=("temperature",))
+    model = identify(recording, inputs=("position", "temperature"))
     with pytest.raises(InputError, match="several inputs"):
         compare(model, model)

@@ -150,7 +150,8 @@ def _draw_reached(path: Path, rows: Sequence[Row], label: str, spent: str) -> No
             draw_reached(axes, problem, reached, methods)
         for axes in panels[len(problems) :]:
             axes.set_visible(False)
-        panels[0].figure.supxlabel(label, fontsize=8.0)
+        for axes in panels[max(0, len(problems) - 2) : len(problems)]:
+            axes.set_xlabel(label)
         panels[0].figure.supylabel("NRMSE against the truth", fontsize=8.0)
         draw_legend(panels, methods)
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -20,13 +19,14 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def with_tables(text: str, page: Path, tables: Mapping[str, str]) -> str:
     """The page's text with new tables between its marks `<!-- name -->` and `<!-- end -->`."""
     for name, table in tables.items():
-        marked = re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->\n)", flags=re.DOTALL)
-        if len(marked.findall(text)) != 1:
+        mark, end = f"<!-- {name} -->\n", "<!-- end -->\n"
+        before, _, marked = text.partition(mark)
+        _, found, after = marked.partition(end)
+        if not found or mark in after:
             raise InputError(
                 f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line"
             )
-        before, after = marked.split(text)
-        text = before + table + after
+        text = before + mark + table + end + after
     return text
 
 

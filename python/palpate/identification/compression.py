@@ -119,7 +119,7 @@ class Compressor:
         dy = self._force - y[group]
         within = self._within + float(dy @ (weight * dy))
         spread = np.zeros_like(x)
-        inputs = []
+        inputs: list[Float1D] = []
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])

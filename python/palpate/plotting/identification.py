@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from matplotlib.axes import Axes
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullLocator
 
 from .._typing import Float1D
 
@@ -60,6 +60,7 @@ def draw_reached(axes: Axes, title: str, reached: Sequence[Reached], methods: Se
             markerfacecolor=filling,
             markeredgewidth=0.7,
             label=each.method,
+            clip_on=False,
             # ours stands above the others where they meet
             zorder=3 if filling == "black" else 2,
         )
@@ -70,7 +71,8 @@ def draw_reached(axes: Axes, title: str, reached: Sequence[Reached], methods: Se
         scale("log")
         limits(*_decades(values))
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_minor_formatter(NullFormatter())
+        axis.set_major_locator(LogLocator(numticks=9))
+        axis.set_minor_locator(NullLocator())
     axes.grid(color="0.88", linewidth=0.5)
     axes.set_axisbelow(True)
     axes.set_title(title, fontsize=7.0)
@@ -103,7 +105,8 @@ def draw_over_speed(axes: Axes, along: str, ways: Mapping[str, tuple[Float1D, Fl
     ways : mapping
         Name to speeds (k,) and NRMSE (k,).
     """
-    for (name, (speed, error)), (marker, filling), dash in zip(ways.items(), _LOOKS, _DASHES, strict=False):
+    looks = zip(_LOOKS, _DASHES, (6.5, 5.5, 4.5, 4.0, 3.5), strict=False)
+    for (name, (speed, error)), ((marker, filling), dash, size) in zip(ways.items(), looks, strict=False):
         axes.plot(
             speed,
             error,
@@ -111,13 +114,16 @@ def draw_over_speed(axes: Axes, along: str, ways: Mapping[str, tuple[Float1D, Fl
             linewidth=0.8,
             linestyle=dash,
             marker=marker,
-            markersize=4.5,
+            markersize=size,
             markerfacecolor=filling,
             markeredgewidth=0.7,
             label=name,
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
+    places = sorted({float(at) for speed, _ in ways.values() for at in speed})
+    axes.set_xticks(places, [f"{at:g}" for at in places])
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.set_ylim(*_decades([value for _, error in ways.values() for value in error]))
     axes.grid(color="0.88", linewidth=0.5)
     axes.set_axisbelow(True)

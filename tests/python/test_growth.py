@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Growth begins again where that pays, and finer where there is no noise."""
+
+import numpy as np
+import pytest
+
+from palpate.identification import IdentifyOptions, growth
+from palpate.identification.compression import Compressor
+from palpate.identification.frame import resolved_frame
+from palpate.identification.growth import WITHOUT_NOISE, Grown, grow
+from palpate.identification.selection import Library
+from palpate.identification.separable import Basis, SeparableProblem, problem_of
+
+OPTIONS = IdentifyOptions()
+
+
+def kinked(noise: float, seed: int = 0) -> SeparableProblem:
+    """Two kinks 100 samples apart."""
+    x = np.linspace(0.0, 1.0, 200)
+    y = 2.0 * np.abs(x - 0.25) - 3.0 * np.maximum(x - 0.75, 0.0)
+    y = y + np.random.default_rng(seed).normal(0.0, noise, len(x))
+    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+
+
+def grown(problem: SeparableProblem) -> Grown:
+    library = Library(problem, resolved_frame(problem, OPTIONS))
+    return grow(problem, library, Basis.empty(1), "position", OPTIONS)
+
+
+def test_without_noise_wavelets_become_as_fine_as_a_kink_needs() -> None:
+    problem = kinked(0.0)
+    coarse = problem.finest(np.array([[0.25]]))[0, 0]
+    found = grown(problem)
+    assert problem.resolved_by == WITHOUT_NOISE
+    assert found.solution.basis.alpha.max() > 1.05 * coarse
+    assert problem.rmse(found.solution) < 1e-3
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.03])
+def test_noise_is_not_taken_for_structure(noise: float) -> None:
+    problem = kinked(noise)
+    found = grown(problem)
+    assert problem.resolved_by == OPTIONS.resolved_by
+    assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_growing_again_lowers_the_criterion_or_changes_nothing(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = kinked(0.01, seed)
+    again = grown(problem)
+    monkeypatch.setattr(growth, "REGROWTHS", 0)
+    once = grown(kinked(0.01, seed))
+    assert again.criterion <= once.criterion
+    assert len(again.path) == len(once.path)
+    assert again.path[-1].n_wavelets == len(again.solution.basis)
