@@ -34,8 +34,8 @@ class HysteresisInput:
         """The play operator along motions that each begin with a history of their own: at s = 0, or first.
 
         Once a motion has covered the slot's width 2 r its history is forgotten: whatever the state was, it
-        has been pushed by one edge of the slot past where the other edge could have held it. Where no motion is
-        that long, none of the rows is known better than another, and all count.
+        has been pushed by one edge of the slot past where the other edge could have held it. Where no motion
+        is that long, none of the rows is known better than another, and all count.
         """
         side, known = [], []
         for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):
