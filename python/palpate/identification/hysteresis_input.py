@@ -34,7 +34,8 @@ class HysteresisInput:
         """The play operator along motions that each begin with a history of their own: at s = 0, or first.
 
         Once a motion has covered the slot's width 2 r its history is forgotten: whatever the state was, it
-        has been pushed by one edge of the slot past where the other edge could have held it.
+        has been pushed by one edge of the slot past where the other edge could have held it. Where no motion
+        is that long, none of the rows is known better than another, and all count.
         """
         side, known = [], []
         for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):
@@ -42,4 +43,5 @@ class HysteresisInput:
             side.append(np.clip((motion - play) / radius, -1.0, 1.0))
             covered = np.maximum.accumulate(motion) - np.minimum.accumulate(motion)
             known.append(covered >= 2.0 * radius)
-        return cls(np.concatenate(side), np.concatenate(known), radius)
+        all_known = np.concatenate(known)
+        return cls(np.concatenate(side), all_known if all_known.any() else ~all_known, radius)
