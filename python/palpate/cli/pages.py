@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..errors import InputError
 from ..recording.files import replacing
+
+_END = "<!-- end -->\n"
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -20,13 +21,14 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def with_tables(text: str, page: Path, tables: Mapping[str, str]) -> str:
     """The page's text with new tables between its marks `<!-- name -->` and `<!-- end -->`."""
     for name, table in tables.items():
-        marked = re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->\n)", flags=re.DOTALL)
-        if len(marked.findall(text)) != 1:
+        mark = f"<!-- {name} -->\n"
+        before, found, rest = text.partition(mark)
+        _, end, after = rest.partition(_END)
+        if not (found and end) or mark in rest:
             raise InputError(
                 f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line"
             )
-        before, after = marked.split(text)
-        text = before + table + after
+        text = before + mark + table + end + after
     return text
 
 
