@@ -93,6 +93,7 @@ test-full: setup
 	  PALPATE_TEST_SCALE=$$sanitized tools/cpp_tests.sh $$preset; done
 	tools/install_tests.sh
 	$(MAKE) --no-print-directory test-python
+	$(python) -m pytest tests/usb
 
 bench: setup
 	tools/bench.sh

@@ -11,6 +11,7 @@
 
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/network.hpp"
+#include "palpate/model/radial_network.hpp"
 #include "scene.hpp"
 
 namespace {
@@ -175,6 +176,68 @@ void throughput_batch(benchmark::State& state) {
     }
 }
 
+/// A network of several inputs, value and gradient, and the loop that anybody would write.
+struct Radial {
+    palpate::RadialNetwork network;
+
+    double operator()(const std::vector<double>& x, std::vector<double>& gradient) const {
+        return network.at(x, gradient);
+    }
+};
+
+struct RadialExpLoop {
+    palpate::RadialNetwork network;
+
+    double operator()(const std::vector<double>& x, std::vector<double>& gradient) const {
+        const NetworkParameters& p = network.parameters();
+        const std::size_t d = p.dimension;
+        double sum = p.bias;
+        for (std::size_t j = 0; j < d; ++j) {
+            sum += p.linear[j] * x[j];
+            gradient[j] = p.linear[j];
+        }
+        for (std::size_t i = 0; i < p.weight.size(); ++i) {
+            double square = 0.0;
+            for (std::size_t j = 0; j < d; ++j) {
+                const double u = p.alpha[i * d + j] * (x[j] - p.beta[i * d + j]);
+                square += u * u;
+            }
+            const double gaussian = p.weight[i] * std::exp(-0.5 * square);
+            const auto inputs = static_cast<double>(d);
+            sum += (square - inputs) * gaussian;
+            for (std::size_t j = 0; j < d; ++j) {
+                const double alpha = p.alpha[i * d + j];
+                gradient[j] +=
+                    (inputs + 2.0 - square) * gaussian * alpha * alpha * (x[j] - p.beta[i * d + j]);
+            }
+        }
+        return sum;
+    }
+};
+
+template <class Method>
+void latency_of_inputs(benchmark::State& state) {
+    const auto network = palpate::bench::several_inputs(static_cast<std::size_t>(state.range(0)),
+                                                        static_cast<std::size_t>(state.range(1)));
+    const Method method{network};
+    std::vector<double> x(network.dimension(), 0.4);
+    std::vector<double> gradient(network.dimension());
+    for (auto _ : state) {
+        x[0] = 0.4 + 1e-3 * method(x, gradient);
+    }
+    benchmark::DoNotOptimize(x);
+    const RadialExpLoop exact{network};
+    double error = 0.0;
+    for (int k = 0; k <= 1000; ++k) {
+        x[0] = 1e-3 * k;
+        error = std::max(error, std::abs(method(x, gradient) - exact(x, gradient)));
+    }
+    state.counters["max_error"] = error;
+    if (!(error <= 1e-12)) {
+        state.SkipWithError(("wrong by " + std::to_string(error)).c_str());
+    }
+}
+
 /// What loading a model costs once: the table and its certificate.
 void compile(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
@@ -194,6 +257,10 @@ void sizes(benchmark::internal::Benchmark* benchmark) {
     benchmark->ArgName("wavelets")->RangeMultiplier(2)->Range(8, 128);
 }
 
+void sizes_and_inputs(benchmark::internal::Benchmark* benchmark) {
+    benchmark->ArgNames({"wavelets", "inputs"})->ArgsProduct({{16, 64}, {2, 3}});
+}
+
 }  // namespace
 
 BENCHMARK_TEMPLATE(latency, ExpLoop)->Apply(sizes);
@@ -207,6 +274,8 @@ BENCHMARK(throughput_batch)->Apply(sizes);
 BENCHMARK_TEMPLATE(throughput, Compiled)->Apply(sizes);
 BENCHMARK_TEMPLATE(throughput, Table)->Apply(sizes);
 BENCHMARK_TEMPLATE(throughput, CubicSpline)->Apply(sizes);
+BENCHMARK_TEMPLATE(latency_of_inputs, RadialExpLoop)->Apply(sizes_and_inputs);
+BENCHMARK_TEMPLATE(latency_of_inputs, Radial)->Apply(sizes_and_inputs);
 BENCHMARK(compile)->Apply(sizes);
 
 BENCHMARK_MAIN();

@@ -140,12 +140,18 @@ void compensated_newton(benchmark::State& state) {
     const palpate::Compensated object{compiled(), softer_damper.stiffness};
     tick(state, palpate::Massless{object, softer_damper, period}, of_the_hold);
 }
+void compensated_table(benchmark::State& state) {
+    const palpate::Compensated object{compiled(), softer_damper.stiffness};
+    const double p = palpate::Massless<CompiledNetwork>::load_line_slope(softer_damper, period);
+    const palpate::CompensatedResolvent solver{palpate::piecewise(sum().curve()), softer_damper.stiffness, p};
+    tick(state, palpate::Massless{object, softer_damper, period, solver}, of_the_hold);
+}
 
 void massless_newton(benchmark::State& state) {
     tick(state, palpate::Massless{compiled(), coupling, period}, of_the_coupling);
 }
 void massless_certified_newton(benchmark::State& state) {
-    const palpate::LoadLineSolver solver = palpate::certified_solver(sum().curve(), massless_slope());
+    const palpate::LoadLineSolver solver = palpate::certified_solver(palpate::piecewise(sum().curve()));
     tick(state, palpate::Massless{compiled(), coupling, period, solver}, of_the_coupling);
 }
 void massless_table(benchmark::State& state) {
@@ -157,7 +163,7 @@ void implicit_newton(benchmark::State& state) {
     tick(state, palpate::Implicit{compiled(), undamped, coupling, period}, of_the_mass);
 }
 void implicit_certified_newton(benchmark::State& state) {
-    const palpate::LoadLineSolver solver = palpate::certified_solver(sum().curve(), implicit_slope(undamped));
+    const palpate::LoadLineSolver solver = palpate::certified_solver(palpate::piecewise(sum().curve()));
     tick(state, palpate::Implicit{compiled(), undamped, coupling, period, solver}, of_the_mass);
 }
 void implicit_table(benchmark::State& state) {
@@ -200,6 +206,7 @@ void explicit_substepped(benchmark::State& state) {
 BENCHMARK(direct_sum);
 BENCHMARK(direct_table);
 BENCHMARK(compensated_newton);
+BENCHMARK(compensated_table);
 BENCHMARK(massless_newton);
 BENCHMARK(massless_certified_newton);
 BENCHMARK(massless_table);

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the benchmarks of one run say about each claim: python bench/ratios.py build/bench
 
+Printed, and written to ratios.json beside them.
+
 Times are medians over the interleaved repetitions of one run, so that what the machine did meanwhile happened
 to both sides of a ratio.
 """
@@ -67,7 +69,10 @@ def spread(names: list[str]) -> Callable[[dict[str, Run]], float]:
 
 
 def worst(prefix: str, key: str) -> Callable[[dict[str, Run]], float]:
-    return lambda run: max(run[name].counters[key] for name in run if name.startswith(prefix))
+    """The largest of a counter, over the benchmarks of that name that have it."""
+    return lambda run: max(
+        one.counters[key] for name, one in run.items() if name.startswith(prefix) and key in one.counters
+    )
 
 
 _WALL = "step<SpringWall>/wavelets:16"
@@ -98,15 +103,25 @@ CLAIMS = [
           ratio("latency<Network>/wavelets:16", "latency<ExpLoop>/wavelets:16")),
     Claim("network in batches / std::exp loop in batches, 16 wavelets", 0.2,
           per_item("throughput_batch/wavelets:16", "throughput<ExpLoop>/wavelets:16")),
+    Claim("two inputs, value and gradient / std::exp loop, 16 wavelets", 0.45,
+          ratio("latency_of_inputs<Radial>/wavelets:16/inputs:2",
+                "latency_of_inputs<RadialExpLoop>/wavelets:16/inputs:2")),
     Claim("99.9th percentile of a whole tick [ns]", 500.0, worst("tick/", "p999_ns")),
     Claim("proved slope bound of 64 wavelets [ms]", 1.0, lambda run: run["slope_bound/wavelets:64"].ns / 1e6),
+    Claim("proved gradient bound of 64 wavelets, two inputs [ms]", 1.0,
+          lambda run: run["gradient_bound_two_inputs/wavelets:64"].ns / 1e6),
+    Claim("excess of any proved slope bound, of the steepest slope", 0.01,
+          lambda run: max(worst("slope_bound", "excess")(run),
+                          worst("gradient_bound", "excess")(run))),
     Claim("one prediction from Python / np.interp", 1.0, ratio("predict_one", "np_interp_one")),
     Claim("10^6 predictions from Python / SciPy's BSpline", 1.0, ratio("predict_many", "bspline_many")),
 ]  # fmt: skip
 
 
 def main() -> None:
-    run = runs(Path(sys.argv[1]))
+    folder = Path(sys.argv[1])
+    run = runs(folder)
+    found = []
     print(f"{'':66} {'measured':>10} {'asked':>10}")
     for claim in CLAIMS:
         try:
@@ -116,6 +131,10 @@ def main() -> None:
             continue
         verdict = "" if measured <= claim.most else "  <- missed"
         print(f"{claim.text:66} {measured:10.4g} {claim.most:10.4g}{verdict}")
+        found.append({"name": claim.text, "measured": measured, "most": claim.most})
+    (folder / "ratios.json").write_text(
+        json.dumps({"context": {}, "benchmarks": found}, indent=1), encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "palpate/model/network.hpp"
+#include "palpate/model/radial_network.hpp"
 
 namespace palpate::bench {
 
@@ -42,6 +43,24 @@ inline WaveletNetwork two_clicks(std::size_t size) {
         network.weight.push_back(0.01 / static_cast<double>(size));
     }
     return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+}
+
+/// Waves over the unit box of several inputs.
+inline RadialNetwork several_inputs(std::size_t size, std::size_t inputs) {
+    NetworkParameters network;
+    network.dimension = inputs;
+    network.linear.assign(inputs, 1.0);
+    for (std::size_t k = 0; k < size; ++k) {
+        for (std::size_t j = 0; j < inputs; ++j) {
+            const double turn = std::numbers::phi * static_cast<double>(k * (j + 1));
+            network.alpha.push_back(3.0 + static_cast<double>(k % 5));
+            network.beta.push_back(turn - std::floor(turn));
+        }
+        network.weight.push_back(k % 2 == 0 ? 0.3 : -0.2);
+    }
+    return {network,
+            {std::vector<double>(inputs, 0.0), std::vector<double>(inputs, 1.0), Continuation::Linear,
+             Continuation::Linear, std::nullopt}};
 }
 
 /// A hand pressing and letting go twice a second, sampled at 1 kHz: what a structure sees tick by tick.

@@ -9,9 +9,10 @@ governor=$(cat /sys/devices/system/cpu/cpu0/cpufreq/scaling_governor 2>/dev/null
 commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 
 cmake --preset release >/dev/null
-cmake --build --preset release
+cmake --build --preset release --target benchmarks
 mkdir -p build/bench
 
+processor=$(awk -F': ' '/^model name/ { print $2; exit }' /proc/cpuinfo 2>/dev/null || uname -m)
 compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' build/release/CMakeCache.txt)
 flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCache.txt)
 
@@ -23,14 +24,16 @@ for source in bench/*.cpp; do
         --benchmark_out="build/bench/$name.json" --benchmark_out_format=json \
         --benchmark_context=commit="$commit" --benchmark_context=governor="$governor" \
         --benchmark_context=compiler="$("$compiler" --version | head -1 | tr ', ' '__')" \
-        --benchmark_context=flags="${flags// /_}"
+        --benchmark_context=flags="${flags// /_}" --benchmark_context=processor="${processor//[ ,]/_}"
     if grep -q '"error_occurred": true' "build/bench/$name.json"; then
         echo "$name: a benchmark gave a wrong answer" >&2
         exit 1
     fi
 done
-.venv/bin/palpate chart speed build/bench --to build/bench/figures
+.venv/bin/python bench/python_calls.py build/bench/bench_python_calls.json
+.venv/bin/python bench/model_error.py build/bench/bench_model_error.json
 .venv/bin/python bench/ratios.py build/bench
+.venv/bin/palpate chart speed build/bench --to build/bench/figures
 for name in identification filters parsimony real_data dynamic; do
     echo && .venv/bin/python "bench/$name.py" --json "build/bench/$name.json"
 done

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian or Ubuntu packages that this machine lacks, or says in one line which ones to install.
 #
-#   tools/system_packages.sh PYTHON build|test
+#   tools/system_packages.sh PYTHON build|test|guest
 set -euo pipefail
 
 python=$1
@@ -24,11 +24,19 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
         compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
+        # The WebSocket of a Haply Inverse3.
+        compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
         # The USB device, and what its tests put in the place of one.
         command -v pkg-config >/dev/null || echo pkg-config
         compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
         [ -e /usr/include/umockdev-1.0/umockdev.h ] || echo libumockdev-dev
         command -v umockdev-run >/dev/null || echo umockdev
+    fi
+    if [ "$purpose" = guest ]; then
+        # The small Linux in which palpate-control meets a USB device through a real kernel's drivers.
+        command -v qemu-system-x86_64 >/dev/null || echo qemu-system-x86
+        command -v busybox >/dev/null || echo busybox-static
+        command -v cpio >/dev/null || echo cpio
     fi
 }
 

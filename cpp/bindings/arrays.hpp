@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -38,6 +42,29 @@ inline void require_vector(const Array& array, const char* name) {
     if (array.ndim() != 1) {
         throw std::invalid_argument(std::string(name) + " has shape " + shape_of(array) + ", must be (n,)");
     }
+}
+
+/// Calls work(first, count) for parts that make up 0..size, on as many processors as that pays for: starting a
+/// thread takes as long as some thousand samples. To be called without the interpreter's lock.
+template <class Work>
+void in_parts(std::size_t size, const Work& work) {
+    constexpr std::size_t least = 16'384;
+    const std::size_t processors = std::max(1U, std::thread::hardware_concurrency());
+    const std::size_t parts = std::clamp<std::size_t>(size / least, 1, processors);
+    const auto part = [&](std::size_t k) {
+        const std::size_t first = size * k / parts;
+        work(first, size * (k + 1) / parts - first);
+    };
+    std::vector<std::jthread> others;
+    others.reserve(parts - 1);
+    for (std::size_t k = 1; k < parts; ++k) {
+        try {
+            others.emplace_back([&part, k] { part(k); });
+        } catch (const std::system_error&) {
+            part(k);  // no thread to be had
+        }
+    }
+    part(0);
 }
 
 /// Hands a vector to numpy without a copy.

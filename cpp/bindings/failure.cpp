@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/failure/failure_maps.hpp"
+#include "palpate/failure/guard_effects.hpp"
 
 #include <algorithm>
 #include <string>
@@ -37,6 +38,20 @@ py::dict failure_map_in_python(const std::string& name, int points) {
                     "searched"_a = map.searched, "linear"_a = map.linear);
 }
 
+py::list guard_effects_in_python() {
+    std::vector<GuardEffect> effects;
+    {
+        const py::gil_scoped_release unlocked;
+        effects = guard_effects();
+    }
+    py::list rows;
+    for (const GuardEffect& effect : effects) {
+        rows.append(py::dict("guard"_a = effect.guard, "cost"_a = effect.cost, "wrong"_a = effect.wrong,
+                             "without"_a = effect.without, "with"_a = effect.with));
+    }
+    return rows;
+}
+
 }  // namespace
 
 void bind_failure(py::module_& module) {
@@ -52,6 +67,11 @@ void bind_failure(py::module_& module) {
         "arrays (points,) at, measured (NaN: none failed) and theory (NaN: nothing is known);\n"
         "searched (up to how many times the theory, where none failed) and linear (the limit spans no "
         "decades).");
+    module.def(
+        "guard_effects", &guard_effects_in_python,
+        "Every guard by itself: its cost where nothing is wrong, and what it makes of what is.\n\n"
+        "By row: guard, cost (RMS change of the force over its RMS), wrong (what is wrong, and what of\n"
+        "it is measured), without and with the guard.");
 }
 
 }  // namespace palpate::bindings

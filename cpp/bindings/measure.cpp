@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <optional>
@@ -85,6 +87,7 @@ struct Measurement {
     std::string record;
     bool keep = false;
     std::optional<py::function> progress;
+    std::optional<double> wait_s;  ///< for a packet of a device that paces the host
 };
 
 /// Tells Python how far it is; an exception from there ends the measurement and is thrown again afterwards.
@@ -130,6 +133,7 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
                      Metadata metadata, Measurement& wanted, Told told) {
     const double period_s = 1.0 / wanted.session.loop.rate_hz;
     GuardSettings guards = bench.guards();
+    guards.ramp_s = probe || wanted.push ? guards.ramp_s : 0.0;  // what makes no force has none to begin with
     guards.force_limit = probe ? probe->force_limit : guards.force_limit;
     Outlets outlets;
     outlets.real_object = !wanted.push;
@@ -195,7 +199,7 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
     SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
     wanted.transducer = object && wanted.transducer;
     if (object) {
-        device.mount({object_of(*object, 0.0), wanted.transducer});
+        device.mount({object_of(*object, bench, 0.0), wanted.transducer});
     }
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
@@ -220,12 +224,21 @@ py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
     wanted.session.loop.rate_hz = info.rate_hz;
     validate(wanted.session.loop);
     wanted.transducer = (info.capabilities & wire::has_transducer) != 0;
+    detail::require(
+        wanted.transducer || wanted.probe.wanted || wanted.record.empty(),
+        bench.device.id +
+            " has no force transducer, and its motor shows nothing of a force while somebody else "
+            "moves the handle: probe instead");
     detail::require(!wanted.probe.wanted || wanted.probe.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     const ProbeSettings standard;
     wanted.probe.force_limit = wanted.probe.force_limit.value_or(standard.force_limit);
     const std::optional<ProbeSettings> probe = wanted.probe.granted(bench, standard.lower, standard.upper);
-    UsbDevice device{{.serial = serial, .makes_force = probe || wanted.push}};
+    UsbOptions options{.serial = serial, .makes_force = probe || wanted.push};
+    if (wanted.wait_s) {
+        options.wait = std::chrono::microseconds{std::llround(1e6 * *wanted.wait_s)};
+    }
+    UsbDevice device{options};
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
     return measured_on(device, bench, probe, std::move(metadata), wanted, [&](py::dict& summary) {
@@ -260,7 +273,10 @@ void bind_measure(py::module_& module) {
            std::optional<double> lower, std::optional<double> upper, std::optional<double> speed,
            std::optional<double> stiffness, std::optional<double> force_limit, std::optional<double> push,
            double rate_hz, double duration_s, const std::string& record, bool keep, int priority, int cpu,
-           double lowest_rate_share, const std::optional<py::function>& progress) {
+           double lowest_rate_share, std::optional<double> wait_s,
+           const std::optional<py::function>& progress) {
+            detail::require(!wait_s || (std::isfinite(*wait_s) && *wait_s > 0.0),
+                            "wait_s is " + readable(wait_s.value_or(0.0)) + ", must be > 0");
             Measurement wanted{transducer,
                                {position_unit, force_unit == "N*m" ? "Nm" : force_unit},
                                {probe, lower, upper, speed, stiffness, force_limit},
@@ -268,7 +284,8 @@ void bind_measure(py::module_& module) {
                                {},
                                record,
                                keep,
-                               progress};
+                               progress,
+                               wait_s};
             wanted.session.loop.rate_hz = rate_hz;
             wanted.session.loop.duration_s = duration_s;
             wanted.session.loop.lowest_rate_share = lowest_rate_share;
@@ -286,14 +303,15 @@ void bind_measure(py::module_& module) {
         "force_limit"_a = py::none(), "push"_a = py::none(), "rate_hz"_a = loop.rate_hz,
         "duration_s"_a = loop.duration_s, "record"_a = "", "keep"_a = false,
         "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
-        "lowest_rate_share"_a = loop.lowest_rate_share, "progress"_a = py::none(),
+        "lowest_rate_share"_a = loop.lowest_rate_share, "wait_s"_a = py::none(), "progress"_a = py::none(),
         "A real object measured in real time; on the simulated device the model `object` is "
         "mounted.\n\n"
         "A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;\n"
         "with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: "
         "until\n"
         "Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a\n"
-        "second. `record` names the recording, which grows as record.part; with `keep` the summary, "
+        "second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows "
+        "as record.part; with `keep` the summary, "
         "returned\n"
         "by name, holds the ticks. ValueError where it is refused before anything moves.");
 }

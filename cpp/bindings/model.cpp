@@ -104,16 +104,17 @@ py::array_t<double> batch(const ForceModel& model, const Array& position, const 
         std::vector<py::ssize_t>(position.shape(), position.shape() + position.ndim()));
     const double* in = position.data();
     double* out = result.mutable_data();
-    const py::ssize_t size = position.size();
     const py::gil_scoped_release unlocked;
-    if (const WaveletNetwork* network = model.network()) {
-        network->curve().at(quantity_of(member), {in, static_cast<std::size_t>(size)},
-                            {out, static_cast<std::size_t>(size)});
-        return result;
-    }
-    for (py::ssize_t k = 0; k < size; ++k) {
-        out[k] = sample(model, in[k], directions[k], plays[k]).*member;
-    }
+    in_parts(static_cast<std::size_t>(position.size()), [&](std::size_t first, std::size_t count) {
+        if (const WaveletNetwork* network = model.network()) {
+            network->curve().at(quantity_of(member), {in + first, count}, {out + first, count});
+            return;
+        }
+        for (std::size_t k = first; k < first + count; ++k) {
+            const auto at = static_cast<py::ssize_t>(k);
+            out[k] = sample(model, in[k], directions[at], plays[at]).*member;
+        }
+    });
     return result;
 }
 
@@ -168,13 +169,11 @@ Array row(const std::vector<double>& values) {
     return Array(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// Force at one row of X.
+/// Force at one row of X of a model of several inputs or with hysteresis.
 double row_force(const ForceModel& model, const double* row) {
-    if (const RadialNetwork* radial = model.radial()) {
-        return radial->value({row, radial->dimension()});
-    }
-    return model.hysteresis() ? model.hysteresis()->sliding(row[0], row[1]).force
-                              : model.network()->at(row[0], {}).force;
+    const RadialNetwork* radial = model.radial();
+    return radial != nullptr ? radial->value({row, radial->dimension()})
+                             : model.hysteresis()->sliding(row[0], row[1]).force;
 }
 
 py::array_t<double> predict(const ForceModel& model, const Array& x) {
@@ -187,11 +186,16 @@ py::array_t<double> predict(const ForceModel& model, const Array& x) {
     py::array_t<double> result(x.shape(0));
     const double* in = x.data();
     double* out = result.mutable_data();
-    const py::ssize_t rows = x.shape(0);
     const py::gil_scoped_release unlocked;
-    for (py::ssize_t k = 0; k < rows; ++k, in += columns) {
-        out[k] = row_force(model, in);
-    }
+    in_parts(static_cast<std::size_t>(x.shape(0)), [&](std::size_t first, std::size_t count) {
+        if (const WaveletNetwork* network = model.network()) {
+            network->curve().at(HatQuantity::Value, {in + first, count}, {out + first, count});
+            return;
+        }
+        for (std::size_t k = first; k < first + count; ++k) {
+            out[k] = row_force(model, in + k * columns);
+        }
+    });
     return result;
 }
 

@@ -162,6 +162,9 @@ void bind_stability(py::module_& module) {
         "Device damping over the longest period that a coupling of K_c and B_c needs for any passive "
         "object.");
     module.def(
+        "felt_slope", &felt_slope, "slope"_a, "coupling_stiffness"_a,
+        "K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.");
+    module.def(
         "device_difference", &device_difference, "certified"_a, "device"_a,
         "The first field in which a device is not the certified one, as a sentence; empty where it is.");
     module.def("fingerprint", &fingerprint, "model"_a,

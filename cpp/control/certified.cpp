@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "certified.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "palpate/readable.hpp"
 
@@ -16,13 +18,22 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
     return std::abs(certified - measured) > rounding * std::abs(measured);
 }
 
-[[nodiscard]] bool chooses_rendering(const Options& options) {
+}  // namespace
+
+bool chooses_rendering(const Options& options) {
     const SchemeChoices& scheme = options.scheme;
-    return options.structure || scheme.compensated || scheme.coupling_stiffness || scheme.coupling_damping ||
-           scheme.mass || scheme.damping || scheme.play_radius;
+    // The parser writes a flag that was not given, too.
+    return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
+           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || options.slew_s ||
+           options.tolerated;
 }
 
-}  // namespace
+void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
+    guards.slew_s = 0.0;
+    loop.tolerated = 0;
+    loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
+    loop.longest_period_s = certificate.longest_period_s;
+}
 
 std::string not_certified(const ModelFile& file, const Options& options, const DeviceProfile& device) {
     if (!file.certificate) {
@@ -49,9 +60,30 @@ std::string not_certified(const ModelFile& file, const Options& options, const D
                readable(device.force_limit) + " N*m";
     }
     if (chooses_rendering(options)) {
-        return "is certified as it was planned: leave --structure and its numbers out";
+        return "is certified as it was planned: leave out --structure and its numbers, --slew-s, "
+               "--tolerated-samples";
     }
     return "";
+}
+
+Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units, const Bench& bench) {
+    if (!options.uncertified) {
+        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
+            refuse(options.model + " " + reason +
+                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+        }
+    }
+    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
+    GuardSettings guards = guards_of(options, bench);
+    LoopSettings loop = options.loop;
+    if (!options.uncertified) {
+        keep_to(*file.certificate, guards, loop);
+    }
+    Job job{std::move(file), std::move(units), scheme, guards, {}};
+    job.settings.loop = loop;
+    job.settings.real_time = options.real_time;
+    validate(job.settings.loop);
+    return job;
 }
 
 }  // namespace palpate::control

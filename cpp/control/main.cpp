@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // palpate-control: a model rendered on a device in real time. The exit codes stand in --help.
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <exception>
 #include <filesystem>
@@ -10,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "certified.hpp"
+#include "inverse3.hpp"
 #include "options.hpp"
 #include "palpate/bench.hpp"
 #include "palpate/device/faulty.hpp"
@@ -69,7 +72,7 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
     GuardSettings guards = bench.guards();
     guards.force_limit = options.force_limit.value_or(guards.force_limit);
     guards.largest_speed = options.largest_speed.value_or(guards.largest_speed);
-    guards.slew_s = options.slew_s;
+    guards.slew_s = options.slew_s.value_or(guards.slew_s);
     guards.ramp_s = options.ramp_s;
     guards.frozen_s = options.frozen_s;
     guards.energy_tank = !options.no_energy_tank;
@@ -114,11 +117,50 @@ RecordUnits units_of(const ModelFile& file) {
     return {file.position_unit, file.force_unit == "N*m" ? "Nm" : file.force_unit};
 }
 
-int run_on_simulated(const Options& options, ModelFile file, RecordUnits units) {
+/// Whether the certificate of a model holds for this run on a simulated device, and else why not.
+std::string void_because(const Options& options, const ModelFile& file) {
+    if (!file.certificate) {
+        return "the model has no certificate";
+    }
+    if (options.uncertified) {
+        return "--uncertified was given";
+    }
+    return chooses_rendering(options) ? "the command line asks for a rendering of its own" : "";
+}
+
+/// Ticks a second: those of the certificate where there is one. Another rate is refused.
+double rate_of(const Options& options, const ModelFile& file, bool certified) {
+    if (!certified) {
+        return options.loop.rate_hz;
+    }
+    const double rate = 1.0 / file.certificate->device.period_s;
+    if (options.rate_given && std::abs(options.loop.rate_hz - rate) > 1e-6 * rate) {
+        refuse("--rate-hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
+               readable(rate) + " Hz: plan again for a device of that period, or give --uncertified");
+    }
+    return rate;
+}
+
+/// A simulated device is the one that the certificate is for, where there is one.
+int run_on_simulated(const Options& given, ModelFile file, RecordUnits units) {
+    const std::string reason = void_because(given, file);
+    const bool certified = reason.empty();
+    Options options = given;
+    options.loop.rate_hz = rate_of(given, file, certified);
     const double period_s = 1.0 / options.loop.rate_hz;
-    const Bench bench = bench_for(file.model, file.position_unit == "rad", period_s);
-    const Scheme scheme = scheme_of(options, file.model, bench);
-    const GuardSettings guards = guards_of(options, bench);
+    Bench bench = bench_for(file.model, file.position_unit == "rad", period_s);
+    if (certified) {
+        bench.device = file.certificate->device;
+    }
+    const bool planned = file.plan && !chooses_rendering(options);
+    const Scheme scheme = planned ? *file.plan : scheme_of(options, file.model, bench);
+    validate(scheme, file.model, period_s);
+    GuardSettings guards = guards_of(options, bench);
+    if (certified) {
+        keep_to(*file.certificate, guards, options.loop);
+    } else if (file.certificate) {
+        std::cerr << "uncertified: " << reason << "\n";
+    }
     Job job{std::move(file), std::move(units), scheme, guards, {}};
     job.settings.loop = options.loop;
     job.settings.real_time = options.real_time;
@@ -132,15 +174,21 @@ int run_on_simulated(const Options& options, ModelFile file, RecordUnits units) 
     if (const Opened opened = device.open(); !opened) {
         refuse(opened.reason);
     }
-    return render_on(device, bench.device.id + " (simulated: nothing moves)", options, job,
-                     simulated_metadata(bench), [] { return Story{}; });
+    Metadata about = simulated_metadata(bench);
+    about.emplace_back("certified",
+                       certified ? std::string(name_of(job.file.certificate->verdict)) : "no: " + reason);
+    return render_on(device, bench.device.id + " (simulated: nothing moves)", options, job, about,
+                     [] { return Story{}; });
 }
 
 int run(const Options& options) {
     const std::string kind = options.device.substr(0, options.device.find(':'));
-    const bool has_serial = options.device.size() > kind.size() + 1;
-    if (options.device != "simulated" && options.device != "usb" && !(kind == "usb" && has_serial)) {
-        refuse("--device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    const bool has_more = options.device.size() > kind.size() + 1;
+    const bool is_whole = options.device == kind;
+    if (!(kind == "simulated" && is_whole) &&
+        !((kind == "usb" || kind == "inverse3") && (is_whole || has_more))) {
+        refuse("--device is '" + options.device +
+               "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
     ModelFile file = load_model_file(options.model);
     const RecordUnits units = units_of(file);
@@ -148,7 +196,8 @@ int run(const Options& options) {
         refuse(options.model + " has " + std::to_string(file.inputs.size()) +
                " inputs: a model of the position alone can be rendered");
     }
-    return (kind == "usb" ? run_on_usb : run_on_simulated)(options, std::move(file), units);
+    const auto run_on = kind == "usb" ? run_on_usb : kind == "inverse3" ? run_on_inverse3 : run_on_simulated;
+    return run_on(options, std::move(file), units);
 }
 
 }  // namespace

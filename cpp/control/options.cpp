@@ -14,6 +14,7 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/readable.hpp"
+#include "usb.hpp"
 
 namespace palpate::control {
 
@@ -125,7 +126,7 @@ void add_guards(CLI::App& app, Options& options) {
         ->check(positive());
     group(app.add_option("--slew-s", options.slew_s, "Least time from no force to the limit, 0 = any"))
         ->check(not_negative())
-        ->capture_default_str();
+        ->default_str(readable(GuardSettings{}.slew_s));
     group(app.add_option("--ramp-s", options.ramp_s, "From no force to all of it at the start"))
         ->check(not_negative())
         ->capture_default_str();
@@ -140,10 +141,10 @@ void add_guards(CLI::App& app, Options& options) {
         ->capture_default_str();
     group(app.add_flag("--no-energy-tank", options.no_energy_tank,
                        "Let the rendering give more energy than the model can hold"));
-    group(app.add_option("--tolerated-samples", options.loop.tolerated,
+    group(app.add_option("--tolerated-samples", options.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
         ->check(number_between(0, 1e6))
-        ->capture_default_str();
+        ->default_str(std::to_string(LoopSettings{}.tolerated));
     group(app.add_option("--lowest-rate-share", options.loop.lowest_rate_share,
                          "Of the rate: less for half a second ends the run, 0 = never"))
         ->check(number_between(0.0, 1.0))
@@ -151,7 +152,10 @@ void add_guards(CLI::App& app, Options& options) {
 }
 
 void add_running(CLI::App& app, Options& options) {
-    app.add_option("--device", options.device, "simulated, or usb[:SERIAL]")
+    app.add_option("--device", options.device,
+                   has_usb() ? "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z"
+                             : "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built "
+                               "without libusb: no usb[:SERIAL]")
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
@@ -168,8 +172,10 @@ void add_running(CLI::App& app, Options& options) {
     app.add_option("--telemetry-hz", options.telemetry_hz, "Lines a second")
         ->check(number_between(0.1, highest_rate_hz))
         ->capture_default_str();
-    app.add_flag("--uncertified", options.uncertified,
-                 "Render on a USB device without a certificate: nothing proves that it stays stable");
+    app.add_flag(
+        "--uncertified", options.uncertified,
+        "Render without the certificate's limits, on a USB device without any: nothing proves that it "
+        "stays stable");
     app.add_option("--wait-ms", options.wait_ms, "How long to wait for a packet of a USB device")
         ->check(number_between(0.1, 10'000.0))
         ->capture_default_str();
@@ -226,6 +232,8 @@ std::optional<int> read_options(int count, char** words, Options& options) {
     }
     try {
         app.parse(count, words);
+        options.rate_given = app.count("--rate-hz") > 0;
+        options.loop.tolerated = options.tolerated.value_or(options.loop.tolerated);
     } catch (const CLI::CallForHelp&) {
         std::cout << app.help();
         return 0;

@@ -29,7 +29,9 @@ struct Options {
 
     std::optional<double> force_limit;
     std::optional<double> largest_speed;
-    double slew_s = GuardSettings{}.slew_s;
+    std::optional<double> slew_s;
+    std::optional<std::uint64_t> tolerated;
+    bool rate_given = false;
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
     bool no_energy_tank = false;

@@ -130,7 +130,7 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
                                {"telemetry_dropped", outlets.telemetry.dropped()},
                                {"without", report.refused}};
         if (!device.json.is_null()) {
-            summary["usb"] = device.json;
+            summary.update(device.json);
         }
         std::cout << summary.dump() << std::endl;
         return;

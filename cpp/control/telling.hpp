@@ -33,7 +33,8 @@ class LiveView {
     int calls_ = 0;
 };
 
-/// What a device adds to the summary: lines of a title and a text, and the same as JSON.
+/// What a device adds to the summary: lines of a title and a text, and the same as JSON, under a
+/// name of its own.
 struct Story {
     std::vector<std::pair<std::string, std::string>> lines;
     nlohmann::json json;

@@ -47,33 +47,42 @@ Story story_of(const UsbDevice& device) {
     const auto number = [](std::uint64_t count) { return std::to_string(count); };
     return {
         {{"round trip", percentiles(stream.round_trip)},
-         {"delay", "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
-                       readable(samples(1.0)) + " samples, from a sample to the force made of it"},
+         {"delay",
+          "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
+              readable(samples(1.0)) + " samples, from a sample to the force made of it" +
+              (stream.late_commands == 0 ? ""
+                                         : "; " + number(stream.late_commands) + " later than certified")},
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
                       number(stream.repeated) + " repeated, " + number(stream.malformed) + " malformed, " +
                       number(health.discarded) + " discarded; " + number(health.skipped_commands) +
-                      " commands skipped, " + number(health.lost_commands) +
-                          " lost, " + number(stream.refused_commands) + " refused, " +
-                      number(stream.late_echoes) + " late echoes; " + number(health.timeouts) +
-                      " timeouts, " + number(health.stalls) + " stalls, " + number(health.bus_errors) +
-                      " bus errors, " + number(stream.watchdog_trips) + " watchdog trips"}},
-        {{"packets", stream.packets},
-         {"lost", stream.lost},
-         {"repeated", stream.repeated},
-         {"malformed", stream.malformed},
-         {"discarded", health.discarded},
-         {"skipped_commands", health.skipped_commands},
-         {"refused_commands", stream.refused_commands},
-         {"late_echoes", stream.late_echoes},
-         {"timeouts", health.timeouts},
-         {"stalls", health.stalls},
-         {"bus_errors", health.bus_errors},
-         {"watchdog_trips", stream.watchdog_trips},
-         {"round_trip", microseconds(stream.round_trip)},
-         {"delay_samples", {{"p50", samples(0.5)}, {"p99", samples(0.99)}, {"max", samples(1.0)}}}}};
+                      " commands skipped, " + number(health.lost_commands) + " lost, " +
+                      number(stream.refused_commands) + " refused, " + number(stream.late_echoes) +
+                      " late echoes; " + number(health.timeouts) + " timeouts, " + number(health.stalls) +
+                      " stalls, " + number(health.bus_errors) + " bus errors, " +
+                      number(stream.watchdog_trips) + " watchdog trips"}},
+        {{"usb",
+          {{"packets", stream.packets},
+           {"lost", stream.lost},
+           {"repeated", stream.repeated},
+           {"malformed", stream.malformed},
+           {"discarded", health.discarded},
+           {"skipped_commands", health.skipped_commands},
+           {"refused_commands", stream.refused_commands},
+           {"late_echoes", stream.late_echoes},
+           {"late_commands", stream.late_commands},
+           {"timeouts", health.timeouts},
+           {"stalls", health.stalls},
+           {"bus_errors", health.bus_errors},
+           {"watchdog_trips", stream.watchdog_trips},
+           {"round_trip", microseconds(stream.round_trip)},
+           {"delay_samples", {{"p50", samples(0.5)}, {"p99", samples(0.99)}, {"max", samples(1.0)}}}}}}};
 }
 
 }  // namespace
+
+bool has_usb() noexcept {
+    return true;
+}
 
 int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
     if (!options.faults.empty()) {
@@ -92,21 +101,7 @@ int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
     require_fitting(options, file, device);
     Bench bench = bench_for(file.model, true, 1.0 / device.info().rate_hz);
     bench.device = device.profile(bench.device);
-    if (!options.uncertified) {
-        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
-            refuse(options.model + " " + reason +
-                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
-        }
-    }
-    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
-    const GuardSettings guards = guards_of(options, bench);
-    Job job{std::move(file), std::move(units), scheme, guards, {}};
-    job.settings.loop = options.loop;
-    job.settings.real_time = options.real_time;
-    if (!options.uncertified) {
-        job.settings.loop.lowest_rate_share = std::max(options.loop.lowest_rate_share, certified_rate_share);
-    }
-    validate(job.settings.loop);
+    const Job job = job_on_real_device(options, std::move(file), std::move(units), bench);
     const Metadata about{{"device", device.name().text()},
                          {"certified", options.uncertified ? "no: --uncertified was given" : "yes"}};
     return render_on(device, device.name().text() + (options.uncertified ? ", uncertified," : ""), options,

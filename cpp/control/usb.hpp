@@ -9,7 +9,10 @@
 
 namespace palpate::control {
 
-/// Renders on a USB device; returns the exit code. Without libusb at hand when this was built it refuses.
+/// Whether libusb was at hand when this was built.
+[[nodiscard]] bool has_usb() noexcept;
+
+/// Renders on a USB device; returns the exit code. Refuses without libusb.
 int run_on_usb(const Options& options, ModelFile file, RecordUnits units);
 
 }  // namespace palpate::control

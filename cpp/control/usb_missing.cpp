@@ -5,6 +5,10 @@
 
 namespace palpate::control {
 
+bool has_usb() noexcept {
+    return false;
+}
+
 int run_on_usb(const Options& options, ModelFile /*file*/, RecordUnits /*units*/) {
     refuse("--device " + options.device +
            ": palpate-control was built without libusb; install libusb-1.0-0-dev and build it again");

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/bounds.hpp"
 
+#include <array>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "palpate/model/network_curve.hpp"
+#include "palpate/model/radial_network.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -52,12 +56,12 @@ TEST(Bounds, HoldAtEveryPointOfRandomNetworks) {
 TEST(Bounds, AreWithinOnePercentOfWhatADenseSearchFinds) {
     Random random{32};
     for (int k = 0; k < cases(20); ++k) {
-        const NetworkParameters network = test::random_network(random, static_cast<std::size_t>(1 + k % 64));
+        const NetworkParameters network = difficult_network(random, k);
         const NetworkCurve curve{network, test::unit_domain()};
         Interval slope{1e300, -1e300};
         Interval value{1e300, -1e300};
-        for (int j = 0; j <= 200'000; ++j) {
-            const Curve here = curve.inside(j / 200'000.0);
+        for (int j = 0; j <= 50'000; ++j) {
+            const Curve here = curve.inside(j / 50'000.0);
             slope = {std::min(slope.lower, here.slope), std::max(slope.upper, here.slope)};
             value = {std::min(value.lower, here.value), std::max(value.upper, here.value)};
         }
@@ -84,12 +88,95 @@ TEST(Bounds, SeeANarrowWaveletBetweenTheFirstCells) {
     EXPECT_GE(slope_bounds(spike, 0.0, 1.0).upper, 1.38e5);
 }
 
-TEST(Bounds, ExtremaOfTheHatAreWhereItsNextDerivativeVanishes) {
-    for (const double u : detail::hat_slope.extrema) {
-        EXPECT_NEAR(mexican_hat_curvature(u), 0.0, 1e-14);
+// Two wavelets apart by a millionth of their width, weights of a million: the sum is of the size of one.
+TEST(Bounds, AreTightWhereHugeWeightsCancel) {
+    Random random{33};
+    for (int k = 0; k < cases(20); ++k) {
+        NetworkParameters network = test::random_network(random, 8);
+        for (std::size_t i = 0; i + 1 < 8; i += 2) {
+            network.alpha[i + 1] = network.alpha[i];
+            network.beta[i + 1] = network.beta[i] + uniform(random, -1e-6, 1e-6) / network.alpha[i];
+            network.weight[i] = uniform(random, 0.5e6, 1e6);
+            network.weight[i + 1] = -network.weight[i];
+        }
+        const NetworkCurve curve{network, test::unit_domain()};
+        Interval seen{1e300, -1e300};
+        for (int j = 0; j <= 20'000; ++j) {
+            const double slope = curve.inside(j / 20'000.0).slope;
+            seen = seen.with({slope, slope});
+        }
+        const Interval proved = slope_bounds(network, 0.0, 1.0);
+        EXPECT_LE(proved.upper - seen.upper, 0.011 * seen.largest()) << k;
+        EXPECT_LE(seen.lower - proved.lower, 0.011 * seen.largest()) << k;
+        EXPECT_GE(proved.upper, seen.upper - 1e-6 * seen.largest());
     }
-    for (const double u : detail::hat_curvature.extrema) {
-        EXPECT_NEAR(mexican_hat_jerk(u), 0.0, 1e-14);
+}
+
+Domain unit_box(std::size_t dimension) {
+    return {std::vector<double>(dimension, 0.0), std::vector<double>(dimension, 1.0), Continuation::Linear,
+            Continuation::Linear, std::nullopt};
+}
+
+TEST(RadialBounds, HoldAtEveryPointInsideAndOutside) {
+    Random random{34};
+    for (int k = 0; k < cases(30); ++k) {
+        const std::size_t d = k % 10 == 9 ? 3 : 2;
+        NetworkParameters parameters = test::random_network(random, static_cast<std::size_t>(1 + k % 16), d);
+        for (double& alpha : parameters.alpha) {
+            alpha = d == 3 ? std::min(alpha, 4.0) : std::min(alpha, 20.0);
+        }
+        const RadialNetwork network{parameters, unit_box(d)};
+        const RadialBounds bounds = network.bounds();
+        std::vector<double> x(d);
+        std::vector<double> gradient(d);
+        for (int j = 0; j < 1000; ++j) {
+            const bool outside = j % 4 == 0;
+            for (double& one : x) {
+                one = outside ? uniform(random, -1.0, 2.0) : uniform(random, 0.0, 1.0);
+            }
+            network.at(x, gradient);
+            for (std::size_t i = 0; i < d; ++i) {
+                ASSERT_GE(gradient[i], bounds.gradient[i].lower) << k;
+                ASSERT_LE(gradient[i], bounds.gradient[i].upper) << k;
+            }
+            if (!network.extrapolated(x)) {
+                ASSERT_GE(network.value(x), bounds.value.lower) << k;
+                ASSERT_LE(network.value(x), bounds.value.upper) << k;
+            }
+        }
+    }
+}
+
+TEST(RadialBounds, AreWithinOnePercentOfWhatADenseSearchFinds) {
+    Random random{35};
+    for (int k = 0; k < cases(4); ++k) {
+        const std::size_t size = static_cast<std::size_t>(1 + 4 * (k % 4));
+        NetworkParameters parameters = test::random_network(random, size, 2);
+        for (double& alpha : parameters.alpha) {
+            alpha = std::min(alpha, 10.0);
+        }
+        const RadialNetwork network{parameters, unit_box(2)};
+        Interval value{1e300, -1e300};
+        std::array<Interval, 2> slopes{value, value};
+        std::vector<double> gradient(2);
+        for (int i = 0; i <= 200; ++i) {
+            for (int j = 0; j <= 200; ++j) {
+                const std::vector<double> x{i / 200.0, j / 200.0};
+                const double here = network.value(x);
+                value = value.with({here, here});
+                network.at(x, gradient);
+                for (std::size_t l = 0; l < 2; ++l) {
+                    slopes[l] = slopes[l].with({gradient[l], gradient[l]});
+                }
+            }
+        }
+        const RadialBounds bounds = radial_bounds(parameters, network.domain().lower, network.domain().upper);
+        EXPECT_LE(bounds.value.upper - value.upper, 0.012 * value.largest());
+        EXPECT_LE(value.lower - bounds.value.lower, 0.012 * value.largest());
+        for (std::size_t l = 0; l < 2; ++l) {
+            EXPECT_LE(bounds.gradient[l].upper - slopes[l].upper, 0.012 * slopes[l].largest());
+            EXPECT_LE(slopes[l].lower - bounds.gradient[l].lower, 0.012 * slopes[l].largest());
+        }
     }
 }
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/failure/failure_maps.hpp"
+#include "palpate/failure/guard_effects.hpp"
 #include "scenes.hpp"
 #include "support.hpp"
 
@@ -94,6 +95,32 @@ TEST(FailureMaps, GuardsTakeTheBuzzOutOfAWallThatIsTooStiff) {
                     << map.lines[guarded].name << " " << share;
             }
         }
+    }
+}
+
+// The bound is for every hand that only takes energy: a heavy one needs all of it, a light one nearly all.
+TEST(FailureMaps, ALightHandLeavesLittleOfTheBoundUnusedAndAHandThatDampsLeavesMuch) {
+    const FailureMap map = hand_map(3);
+    for (std::size_t delay = 0; delay <= 2; ++delay) {
+        const FailureLine& line = map.lines[delay];
+        EXPECT_GE(line.measured.front(), 1.04 * line.theory.front()) << line.name;
+        expect_between(ratios(map, delay, delay), 1.0, 1.12);
+        EXPECT_LE(line.measured.back(), 1.001 * line.theory.back()) << line.name;
+    }
+    expect_between(ratios(map, 3, 3), 2.0, 2.3);
+}
+
+// spec section 7, quantised: "massless f_c >= gamma Delta/2; B_c = 0: L' Delta/2"
+TEST(FailureMaps, TheEncoderBoundOfACouplingIsMetWithoutItsDamperAndIsEnoughWithIt) {
+    const FailureMap map = coupled_encoder_map(test::cases(3));
+    expect_between(ratios(map, 0, 0, 10.0), 1.0, 1.01);
+    EXPECT_GE(ratios(map, 1, 2, 10.0).lower, 1.0);
+}
+
+TEST(Guards, CostNextToNothingAndDoWhatTheyAreThereFor) {
+    for (const GuardEffect& effect : guard_effects()) {
+        EXPECT_LE(effect.cost, 0.02) << effect.guard;
+        EXPECT_LE(effect.with, 0.5 * effect.without) << effect.guard << ": " << effect.wrong;
     }
 }
 

@@ -28,16 +28,25 @@ namespace {
 
 constexpr double period_s = 1e-3;
 
-/// Deadlines that are always met, as fast as it goes.
+/// A tick that comes late by so much; all others are punctual.
+struct LateTick {
+    std::uint64_t tick = 0;
+    Nanoseconds by = 0;
+};
+
+/// Deadlines that are met but for one, as fast as it goes.
 class VirtualClock {
   public:
+    explicit VirtualClock(LateTick late) : late_{late} {}
     void start() noexcept { now_ = 0; }
     [[nodiscard]] Wake wait() noexcept {
         now_ += 1'000'000;
-        return {now_, now_, 0};
+        return {now_, now_ + (tick_++ == late_.tick ? late_.by : 0), 0};
     }
 
   private:
+    LateTick late_;
+    std::uint64_t tick_ = 0;
     Nanoseconds now_ = 0;
 };
 
@@ -91,14 +100,13 @@ ForceModel spring() {
     return {network, Domain{{0.0}, {0.5}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }
 
-Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingFile* file = nullptr) {
+Rendering render(const std::vector<Fault>& faults, const LoopSettings& settings,
+                 RecordingFile* file = nullptr, LateTick late = {}) {
     Rendering run;
     const ForceModel model = spring();
     const Bench bench = bench_for(model, true, period_s);
     run.guards = bench.guards();
     run.guards.ramp_s = 0.02;
-    LoopSettings settings;
-    settings.duration_s = duration_s;
     with_structure(model, bench.scheme(model), period_s, [&](auto structure) {
         Observing device{Faulty{SimulatedDevice{bench.device, bench.hand, 4}, faults,
                                 3.0 * run.guards.largest_speed * period_s},
@@ -106,7 +114,7 @@ Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingF
         EXPECT_TRUE(device.open());
         Controller controller{device, std::move(structure),
                               guards_of(run.guards, model, bench.scheme(model), period_s)};
-        VirtualClock clock;
+        VirtualClock clock{late};
         Collected sink;
         sink.file = file;
         LoopProgress progress;
@@ -116,6 +124,12 @@ Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingF
         return 0;
     });
     return run;
+}
+
+Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingFile* file = nullptr) {
+    LoopSettings settings;
+    settings.duration_s = duration_s;
+    return render(faults, settings, file);
 }
 
 /// What holds whatever goes wrong.
@@ -151,6 +165,24 @@ TEST(Faults, ARunWithoutThemIsOrderly) {
     const auto largest = std::max_element(run.ticks.begin(), run.ticks.end(),
                                           [](const auto& a, const auto& b) { return a.force < b.force; });
     EXPECT_GT(largest->force, 2.0);
+}
+
+// A force that stood longer than its certificate allows for has left it, whatever comes next.
+TEST(Faults, ATickLaterThanCertifiedEndsTheRunWithZeroForceAndSaysSo) {
+    LoopSettings settings;
+    settings.duration_s = 1.0;
+    settings.longest_period_s = 1.5e-3;
+    const Rendering punctual = render({}, settings, nullptr, {400, 499'000});
+    EXPECT_EQ(punctual.report->ending, Ending::TimeUp);
+    const Rendering late = render({}, settings, nullptr, {400, 501'000});
+    expect_safe(late);
+    EXPECT_EQ(late.report->ending, Ending::NotCertified);
+    EXPECT_FALSE(is_orderly(late.report->ending));
+    ASSERT_EQ(late.ticks.size(), 400U) << "the late tick makes no force";
+    EXPECT_GT(late.ticks.back().force, 0.1);
+    EXPECT_EQ(
+        ending_text(*late.report, settings),
+        "stopped because a tick came 1.501 ms after the one before: the certificate holds up to 1.5 ms");
 }
 
 struct Expected {

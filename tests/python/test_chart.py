@@ -36,9 +36,31 @@ def _force(name: str, nanoseconds: float, end: float, instant: float) -> dict[st
     }
 
 
+def _model(name: str, wavelets: int, error: float) -> dict[str, Any]:
+    return {
+        "name": name,
+        "cpu_time": 3.0 + wavelets,
+        "nrmse": error,
+        "n_parameters": 3 * wavelets + 2,
+        "n_wavelets": wavelets,
+    }
+
+
+def _sized(name: str, **counters: float) -> list[dict[str, Any]]:
+    """A benchmark for 8 and 16 wavelets, in three repetitions and with their mean."""
+    rows: list[dict[str, Any]] = []
+    for wavelets in (8, 16):
+        of = f"{name}/wavelets:{wavelets}"
+        for time in (1.0, 2.0, 30.0):
+            row = {"name": of, "run_name": of, "run_type": "iteration", "cpu_time": time, "time_unit": "us"}
+            rows.append({**row, **counters})
+        rows.append({"name": f"{of}_mean", "run_name": of, "run_type": "aggregate", "cpu_time": 11.0})
+    return rows
+
+
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    """What two benchmarks leave, with a time step that diverges."""
+    """What the benchmarks leave, with a time step that diverges."""
     context = {"num_cpus": 2, "mhz_per_cpu": 2000, "date": "2026-01-02T03:04:05", "commit": "abc"}
     benchmarks = {
         "bench_work_precision": [
@@ -51,23 +73,59 @@ def results(tmp_path: Path) -> Path:
             _force("direct_table", 8.0, 4e-3, 4e-4),
             _force("massless_table", 20.0, 0.12, 0.12),
         ],
+        "bench_controller": [{"name": "tick/direct", "cpu_time": 30.0, "p50_ns": 29.0, "p999_ns": 120.0}],
+        "bench_model_error": [
+            _model("P1/wavelet network/0", 2, 1e-2),
+            _model("P1/wavelet network/1", 6, 3e-4),
+            _model("P1/lookup table/2", 0, 2e-2),
+        ],
+        "bench_evaluation": [
+            row
+            for method in ("ExpLoop", "Network", "Compiled", "Table", "CubicSpline")
+            for row in _sized(f"latency<{method}>")
+        ],
+        "bench_bounds": [
+            row
+            for name in ("slope_bound", "slope_bound_cancelling", "gradient_bound_two_inputs")
+            for row in _sized(name, excess=0.004)
+        ],
+        "ratios": [{"name": "table / explicit step", "measured": 0.93, "most": 1.0}],
     }
     for name, rows in benchmarks.items():
         (tmp_path / f"{name}.json").write_text(json.dumps({"context": context, "benchmarks": rows}))
     return tmp_path
 
 
-def test_draws_both_figures_and_writes_their_numbers_with_machine_and_date(results: Path) -> None:
+def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(results: Path) -> None:
     to = results / "figures"
     assert main(["chart", "speed", str(results), "--to", str(to)]) == 0
-    for name in ("work-precision.png", "rendered-force.png"):
-        assert (to / name).read_bytes().startswith(PNG)
+    for name in (
+        "work-precision",
+        "rendered-force",
+        "model-error-size",
+        "model-error-time",
+        "evaluation",
+        "bounds",
+    ):
+        assert (to / f"{name}.png").read_bytes().startswith(PNG)
     text = (to / "speed.md").read_text(encoding="utf-8")
     assert "| explicit euler | 4 | 20 | 5 | diverges |" in text
     assert "| massless table | 20 | 1 | 0.12 | 0.12 |" in text
+    assert "| P1, wavelet network | 6 | 20 | 9 | 0.0003 |" in text
+    assert "| table / explicit step | 0.93 | 1 |" in text
+    assert "| direct | 30 | 29 | 120 |" in text
     assert "2 cores at 2000 MHz" in text
     assert "2026-01-02" in text
     assert "commit abc" in text
+
+
+def test_takes_the_median_of_the_repetitions_and_no_mean_for_one(results: Path) -> None:
+    to = results / "figures"
+    assert main(["chart", "speed", str(results), "--to", str(to)]) == 0
+    text = (to / "speed.md").read_text(encoding="utf-8")
+    assert "| compiled network | 16 | 2000 |" in text
+    assert "| one input | 8 | 2000 | 0.4 |" in text
+    assert "11000" not in text
 
 
 def test_refuses_a_folder_without_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

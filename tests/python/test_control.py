@@ -24,6 +24,12 @@ def changed_model(folder: Path, **fields: Any) -> Path:
     return path
 
 
+def rows_of(recording: Path) -> list[str]:
+    """Its rows, without what is told of them and without their header."""
+    lines = recording.read_text(encoding="utf-8").splitlines()
+    return [line for line in lines if not line.startswith("#")][1:]
+
+
 def test_help_shows_defaults_units_exit_codes_and_an_example() -> None:
     answer = control("--help")
     assert answer.returncode == 0
@@ -67,9 +73,7 @@ def test_the_version_is_that_of_the_package() -> None:
             [MODEL, "--structure", "explicit", "--mass", "1e-4"],
             "explicit, which diverges: the model's steepest",
         ),
-        ([MODEL, "--device", "usb"], "this build has no USB device"),
-        ([MODEL, "--device", "usb:42"], "this build has no USB device"),
-        ([MODEL, "--device", "knob"], "must be simulated or usb[:SERIAL]"),
+        ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL] or inverse3"),
         ([MODEL, "--record", "/no/such/folder/out.csv"], "cannot be written: No such file or directory"),
         ([MODEL, "--record", "/tmp"], "cannot be written: it is not an ordinary file"),
         ([MODEL, "--record", MODEL], "is the model"),
@@ -97,6 +101,15 @@ def test_what_is_wrong_is_refused_with_one_sentence(words: list[Any], sentence: 
     assert answer.stderr.startswith("error: ")
     assert answer.stderr.count("\n") == 1
     assert sentence in answer.stderr
+
+
+def test_a_usb_device_is_refused_for_what_is_missing() -> None:
+    without = "built without libusb" in control("--help").stdout
+    answer = control(MODEL, "--device", "usb:NOBODY")
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("error: --device usb:NOBODY: ")
+    assert answer.stderr.count("\n") == 1
+    assert ("built without libusb" in answer.stderr) == without
 
 
 def test_a_motor_current_is_no_force(tmp_path: Path) -> None:
@@ -143,12 +156,12 @@ def test_a_fault_ends_the_run_with_zero_force_and_its_story(tmp_path: Path, faul
     assert "the last 8 ticks" in answer.stderr
     summary = json.loads(answer.stdout)
     assert summary["status"] == status
-    rows = out.read_text(encoding="utf-8").splitlines()[12:]
+    rows = rows_of(out)
     assert len(rows) == summary["ticks"]
     last = rows[-1].split(",")
     assert last[-1] == status
     assert float(last[2]) == 0.0
-    story = (tmp_path / "felt.fault.csv").read_text(encoding="utf-8").splitlines()[12:]
+    story = rows_of(tmp_path / "felt.fault.csv")
     assert story == rows[-len(story) :]
 
 

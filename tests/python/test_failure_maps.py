@@ -11,6 +11,7 @@ import pytest
 from palpate import analysis
 from palpate.analysis import failure_map_names, measure_failure_map
 from palpate.cli.main import main
+from palpate.cli.pages import with_tables
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "where-each-method-fails.md"
@@ -47,7 +48,7 @@ def test_the_command_draws_writes_and_fills_the_tables(
     quick = ("encoder", "pole", "guard")
     monkeypatch.setattr(analysis, "failure_map_names", quick)
     page = tmp_path / PAGE.name
-    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "where")))
+    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "guards", "where")))
     assert main(["chart", "failures", "--to", str(tmp_path), "--points", "3"]) == 0
     for name in quick:
         assert (tmp_path / "figures" / f"failure-{name}.png").stat().st_size > 5000
@@ -71,13 +72,21 @@ def test_a_page_without_its_marks_is_refused_in_one_sentence(
     assert page.read_text() == "nothing to fill\n"
 
 
+def test_marks_with_nothing_between_are_filled_too(tmp_path: Path) -> None:
+    bare = "<!-- one -->\n<!-- end -->\nbetween\n<!-- two -->\nold\n<!-- end -->\n"
+    assert with_tables(bare, tmp_path, {"one": "1\n", "two": "2\n"}) == (
+        "<!-- one -->\n1\n<!-- end -->\nbetween\n<!-- two -->\n2\n<!-- end -->\n"
+    )
+
+
 def test_the_page_has_a_picture_and_a_table_for_every_map() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name in failure_map_names:
         assert text.count(f"(figures/failure-{name}.png)") == 1
         assert text.count(f"<!-- {name} -->\n") == 1
         assert (PAGE.parent / "figures" / f"failure-{name}.png").exists()
-    assert len(re.findall(r"<!-- end -->", text)) == len(failure_map_names) + 1
+    assert text.count("<!-- guards -->\n") == 1
+    assert len(re.findall(r"<!-- end -->", text)) == len(failure_map_names) + 2
 
 
 def test_the_numbers_of_the_page_are_those_of_its_file() -> None:

@@ -20,17 +20,18 @@ struct Settings {
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds patience{250};  ///< how long lock-step waits for a host that stopped writing
-    std::string trace;                        ///< CSV, one row a frame
-    std::string preload_first;                ///< a sanitizer's library
-    bool denied = false;                      ///< the node can be opened by nobody
+    std::chrono::milliseconds patience{
+        3000};                  ///< how long lock-step waits for a host that does not do its part
+    std::string trace;          ///< CSV, one row a frame
+    std::string preload_first;  ///< a sanitizer's library
+    bool denied = false;        ///< the node can be opened by nobody
     std::vector<std::string> command;
 };
 
 inline constexpr const char* options_text =
     "  --lock-step            the host's transfers are the clock; else frames begin every 1/rate\n"
     "  --rate-hz RATE         frames a second [1000]\n"
-    "  --patience-ms MS       lock-step waits so long for a host that stopped writing [250]\n"
+    "  --patience-ms MS       lock-step waits so long for the host to do its part [3000]\n"
     "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
     "  --no-device            nothing is plugged in\n"
     "  --says-rate-hz RATE    what GET_INFO says [1000]\n"
@@ -39,6 +40,7 @@ inline constexpr const char* options_text =
     "  --somebody-elses       another magic in GET_INFO\n"
     "  --flipped              a torque that points the wrong way\n"
     "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
+    "  --from-zero            counters begin at 0, and not close to where they wrap around\n"
     "  --spring STIFFNESS     a real spring on the handle, N*m/rad [0]\n"
     "  --no-hand              nobody holds the handle\n"
     "  --fault KIND@FRAME[xCOUNT]   repeatable; frames are counted from the first OUT packet\n"
@@ -86,6 +88,9 @@ inline constexpr const char* options_text =
             common.flipped = true;
         } else if (word == "--takes-out-first") {
             common.takes_out_first = true;
+        } else if (word == "--from-zero") {
+            common.first_sequence = 0;
+            common.first_us = 0;
         } else if (word == "--spring") {
             settings.plant.spring = std::stod(value());
         } else if (word == "--no-hand") {

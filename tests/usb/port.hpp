@@ -52,6 +52,7 @@ class Port {
         if (transfer.endpoint != 0x81 && transfer.endpoint != 0x01) {
             return -ENOENT;
         }
+        owes_answer_ = owes_answer_ && transfer.endpoint == 0x81;
         (transfer.endpoint == 0x81 ? in_ : out_).push_back(std::move(transfer));
         reads_ahead_ = reads_ahead_ || in_.size() >= 2;
         return 0;
@@ -73,9 +74,14 @@ class Port {
         return false;
     }
 
-    /// Whoever held the device let it go.
-    void forget(const void* owner) {
+    /// Whoever held the device let it go: the next host begins anew.
+    void let_go() {
         reads_ahead_ = false;
+        owes_answer_ = true;
+    }
+
+    /// The transfers of one that is gone.
+    void forget(const void* owner) {
         for (std::deque<Transfer>* queue : {&in_, &out_, &done_}) {
             std::erase_if(*queue, [&](const Transfer& transfer) { return transfer.owner == owner; });
         }
@@ -118,12 +124,14 @@ class Port {
         }
     }
 
-    /// Whether the host has done its part of a frame.
+    /// Whether the host has done its part of a frame: it reads, and has answered every packet that it could.
     [[nodiscard]] bool host_is_ready() const {
-        return !in_.empty() && !out_.empty() && !in_held_ && !out_held_;
+        return !in_.empty() && (!out_.empty() || !owes_answer_) && !in_held_ && !out_held_;
     }
     /// Whether the host keeps reads queued, or does one thing after the other.
     [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
+    /// Whether such a host has not come to queue the next one.
+    [[nodiscard]] bool lacks_reads() const { return reads_ahead_ && in_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
 
@@ -143,6 +151,7 @@ class Port {
             transfer.status = packet.size() > transfer.length ? -EOVERFLOW : 0;
             packet.resize(std::min(packet.size(), transfer.length));
             transfer.actual = packet.size();
+            owes_answer_ = owes_answer_ || EmulatedDevice::is_whole(packet);
             transfer.data = std::move(packet);
         }
         done_.push_back(std::move(transfer));
@@ -171,14 +180,16 @@ class Port {
     bool in_held_ = false;  ///< a halted endpoint serves nothing until it is cleared
     bool out_held_ = false;
     bool reads_ahead_ = false;
+    bool owes_answer_ = true;  ///< the host has a packet, and has sent nothing since
 };
 
 /// When frames begin.
 ///
-/// Paced: every millisecond; up to three late ones are made up for. Lock-step: as soon as the host has both read and
-/// written, so that nothing depends on how fast the machine is. A host that stops writing is waited for once, then
-/// the frames go on by the clock until it writes again. One that does not keep two reads queued does one thing after
-/// the other, and is waited for a few milliseconds only.
+/// Paced: every millisecond; up to three late ones are made up for. Lock-step: as soon as the host has done its part,
+/// so that nothing depends on how fast the machine is. Before the host's first command, and while the device itself
+/// takes its time, frames go by the clock in lock-step too, as long as the host reads. A host that does not do its
+/// part is waited for; when patience ends it misses one frame. One that does not keep two reads queued does one thing
+/// after the other, and is waited for a few milliseconds only.
 class FrameClock {
   public:
     using Clock = std::chrono::steady_clock;
@@ -188,32 +199,43 @@ class FrameClock {
           period_{std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz))},
           patience_{patience} {}
 
-    void host_wrote() { in_conversation_ = true; }
+    void host_wrote() {
+        if (!std::exchange(in_conversation_, true)) {
+            first_ = Clock::now() + settling;
+        }
+    }
     void host_left() { in_conversation_ = false; }
 
     /// Whether a frame begins now; else `until` is when to look again at the latest.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
-        const bool by_clock = !lock_step_ || port.device().takes_its_time() || port.device().is_slow();
-        if (!by_clock && port.host_is_ready()) {
+        const EmulatedDevice& device = port.device();
+        const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow();
+        if (in_step && in_conversation_ && port.host_is_ready()) {
+            until = first_;
             last_ = now;
-            return true;
+            return now >= until;
         }
-        const bool waits = lock_step_ && in_conversation_ && !by_clock;
-        const bool waits_long = waits && port.host_reads_ahead();
-        until = last_ + (waits_long ? patience_ : (waits ? 5 : port.device().is_slow() ? 3 : 1) * period_);
+        const bool waits_for_host = in_step && (in_conversation_ || port.lacks_reads());
+        const Clock::duration waits = !waits_for_host           ? (device.is_slow() ? 3 : 1) * period_
+                                      : port.host_reads_ahead() ? patience_
+                                                                : 5 * period_;
+        until = last_ + waits;
         if (now < until) {
             return false;
         }
-        in_conversation_ = in_conversation_ && !waits_long;
         last_ = lock_step_ || now - until > 3 * period_ ? now : until;
         return true;
     }
 
   private:
+    /// What was sent before the conversation arrives before it begins: else the host stays a packet behind in it.
+    static constexpr std::chrono::milliseconds settling{20};
+
     bool lock_step_;
     Clock::duration period_;
     Clock::duration patience_;
     Clock::time_point last_ = Clock::now();
+    Clock::time_point first_ = last_;  ///< of the conversation
     bool in_conversation_ = false;
 };
 

@@ -15,6 +15,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -55,6 +56,10 @@ class UsbfsNode {
     }
     ~UsbfsNode() {
         umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
+        for (const UMockdevIoctlClient* client : clients_) {
+            auto* const object = const_cast<UMockdevIoctlClient*>(client);
+            g_object_weak_unref(G_OBJECT(object), &UsbfsNode::client_left, this);
+        }
         g_object_unref(handler_);
         ::close(fifo_);
     }
@@ -90,8 +95,8 @@ class UsbfsNode {
             }
             return text;
         };
-        Bytes descriptors = EmulatedDevice::device_descriptor();
-        const Bytes configuration = EmulatedDevice::configuration_descriptor();
+        Bytes descriptors = Identity::device_descriptor();
+        const Bytes configuration = Identity::configuration_descriptor();
         descriptors.insert(descriptors.end(), configuration.begin(), configuration.end());
         const Identity& identity = port_.device().identity();
         const std::string address = std::to_string(address_);
@@ -148,16 +153,19 @@ class UsbfsNode {
 
     /// A client that is seen for the first time: its end takes its transfers along.
     void notice(UMockdevIoctlClient* client) {
-        if (g_object_get_data(G_OBJECT(client), "palpate") == nullptr) {
-            g_object_set_data(G_OBJECT(client), "palpate", this);
-            g_signal_connect(client, "notify::connected", G_CALLBACK(&UsbfsNode::client_left), this);
+        if (clients_.insert(client).second) {
+            g_object_weak_ref(G_OBJECT(client), &UsbfsNode::client_left, this);
         }
     }
-    static void client_left(UMockdevIoctlClient* client, GParamSpec* /*property*/, UsbfsNode* self) {
+    /// Only its address is left of it.
+    static void client_left(gpointer node, GObject* object) {
+        auto* const self = static_cast<UsbfsNode*>(node);
+        const auto* const client = reinterpret_cast<const UMockdevIoctlClient*>(object);
         const std::lock_guard locked{self->mutex_};
+        self->clients_.erase(client);
         self->port_.forget(client);
         if (self->claimed_by_ == client) {
-            self->claimed_by_ = nullptr;
+            self->let_go();
         }
         for (auto urb = self->urbs_.begin(); urb != self->urbs_.end();) {
             if (urb->first.first == client) {
@@ -168,6 +176,12 @@ class UsbfsNode {
             }
         }
         self->show_readiness();
+    }
+
+    void let_go() {
+        claimed_by_ = nullptr;
+        port_.let_go();
+        clock_->host_left();
     }
 
     /// The argument of an ioctl, copied from the client; changes reach the client when the ioctl is completed.
@@ -224,8 +238,7 @@ class UsbfsNode {
                 if (claimed_by_ != client) {
                     return -EINVAL;
                 }
-                claimed_by_ = nullptr;
-                clock_->host_left();
+                let_go();
                 return 0;
             case USBDEVFS_GETDRIVER:
             case USBDEVFS_IOCTL:
@@ -340,6 +353,7 @@ class UsbfsNode {
     bool shown_ready_ = true;  ///< an empty FIFO
     std::mutex& mutex_;
     std::function<void()> woken_;
+    std::set<const UMockdevIoctlClient*> clients_;
     const UMockdevIoctlClient* claimed_by_ = nullptr;
     std::map<std::pair<const UMockdevIoctlClient*, std::uint64_t>, UMockdevIoctlData*>
         urbs_;  ///< by client, address

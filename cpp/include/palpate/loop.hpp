@@ -43,8 +43,8 @@ inline void validate(const LoopSettings& settings) {
     require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
             settings.rate_hz, "100 to 10000");
     require(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
-    require(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s", settings.longest_period_s,
-            "at least one period");
+    require(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s",
+            settings.longest_period_s, "at least one period");
     require(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
             settings.lowest_rate_share, "0 to 1");
 }

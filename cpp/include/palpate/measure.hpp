@@ -66,14 +66,18 @@ template <Device D, Structure S, class Watch>
         {"rate_hz", readable(rate_hz)}};
 }
 
-/// A model as a thing that can be mounted on a simulated device, at rest at `start`.
-[[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, double start) {
-    Scheme direct;
+/// A model as a thing that can be mounted on the simulated device of its bench, at rest at `start`.
+[[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, const Bench& bench,
+                                                             double start) {
+    SchemeChoices direct;
     direct.structure = StructureKind::Direct;
-    return with_structure(model, direct, 1.0, [start](auto structure) -> std::function<double(double)> {
-        structure.reset(start);
-        return [structure](double position) mutable { return structure.step(position).force; };
-    });
+    return with_structure(model, bench.scheme(model, direct), bench.device.period_s,
+                          [start](auto structure) -> std::function<double(double)> {
+                              structure.reset(start);
+                              return [structure](double position) mutable {
+                                  return structure.step(position).force;
+                              };
+                          });
 }
 
 }  // namespace palpate

@@ -19,6 +19,7 @@
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/dynamics/transfer_function.hpp"
 #include "palpate/failure/failure_maps.hpp"
+#include "palpate/failure/guard_effects.hpp"
 #include "palpate/guard/energy_tank.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/guards.hpp"

@@ -1,6 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Views of methods and models that no rendering needs; only the command line does."""
 
-from .failure_maps import FailureLine, FailureMap, failure_map_names, measure_failure_map
+from .failure_maps import (
+    FailureLine,
+    FailureMap,
+    GuardEffect,
+    failure_map_names,
+    measure_failure_map,
+    measure_guard_effects,
+)
 
-__all__ = ["FailureLine", "FailureMap", "failure_map_names", "measure_failure_map"]
+__all__ = [
+    "FailureLine",
+    "FailureMap",
+    "GuardEffect",
+    "failure_map_names",
+    "measure_failure_map",
+    "measure_guard_effects",
+]

@@ -68,6 +68,27 @@ class FailureMap:
         }
 
 
+@dataclass(frozen=True)
+class GuardEffect:
+    """What one guard costs where nothing is wrong, and what it makes of what is."""
+
+    guard: str
+    cost: float
+    """RMS change of the force, over its RMS [-]"""
+    wrong: str
+    """What is wrong, and what of it is measured, with its unit"""
+    without: float
+    with_guard: float
+
+
+def measure_guard_effects() -> tuple[GuardEffect, ...]:
+    """Every guard by itself, with its default setting, on the default knob."""
+    return tuple(
+        GuardEffect(row["guard"], row["cost"], row["wrong"], row["without"], row["with"])
+        for row in _core.guard_effects()
+    )
+
+
 def measure_failure_map(name: str, points: int) -> FailureMap:
     """Measure one map: every point is a bisection over closed loops, simulated in the core.
 

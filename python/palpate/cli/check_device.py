@@ -49,6 +49,7 @@ def check_device(
     ctx: click.Context,
     device: str,
     object_file: Path | None,
+    wait_ms: float | None,
     transducer: bool,
     rate_hz: float,
     duration_s: float,
@@ -92,6 +93,7 @@ def check_device(
             push=push,
             profile=expected,
             model=certified,
+            wait_s=None if wait_ms is None else 1e-3 * wait_ms,
             progress=line.show,
         )
     except DeviceError as error:

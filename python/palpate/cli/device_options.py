@@ -27,6 +27,12 @@ def device_options(command: F) -> F:
                 help="What is mounted on the simulated device.",
             ),
             click.option(
+                "--wait-ms",
+                type=click.FloatRange(0.1, 10000),
+                show_default="5",
+                help="How long to wait for a packet of a USB device.",
+            ),
+            click.option(
                 "--transducer/--no-transducer",
                 default=True,
                 help="Whether the simulated device has a force transducer.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate devices: which devices there are, and the rule that lets a user at them."""
+"""palpate devices: which devices there are, what is set on one, and the rule that lets a user at them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import asdict
 
 import click
 
-from ..devices import DeviceError, find_devices, install_rule
+from ..devices import DeviceError, find_devices, install_rule, open_usb
+from ..devices.wire import LONGEST_WATCHDOG_MS, SHORTEST_WATCHDOG_MS
+from ..errors import InputError
 from .arguments import json_option
 from .ending import WorkError
 from .output import number, print_json, talk
@@ -20,28 +22,50 @@ from .verb import Verb
     is_flag=True,
     help="Let users of this machine at USB devices; needs root, says what it does.",
 )
+@click.option("--device", default="usb", metavar="usb[:SERIAL]", help="Which one the four below are for.")
+@click.option("--disable", is_flag=True, help="End its force.")
+@click.option("--clear", is_flag=True, help="Clear its faults; after an emergency stop nothing goes without.")
+@click.option("--zero", is_flag=True, help="Make its present position 0.")
+@click.option(
+    "--watchdog-ms",
+    type=click.IntRange(SHORTEST_WATCHDOG_MS, LONGEST_WATCHDOG_MS),
+    help="How long it may make force without hearing anything.",
+)
 @json_option
-def devices(install_udev_rule: bool, as_json: bool) -> None:
-    """List haptic devices: what they say of themselves, or why they cannot be used."""
+def devices(
+    install_udev_rule: bool,
+    device: str,
+    disable: bool,
+    clear: bool,
+    zero: bool,
+    watchdog_ms: int | None,
+    as_json: bool,
+) -> None:
+    """List haptic devices: what they say of themselves, or why they cannot be used; or set one up.
+
+    Nothing moves by that, and no force is enabled: what renders does so itself.
+    """
     try:
         if install_udev_rule:
             install_rule(talk)
             return
+        if disable or clear or zero or watchdog_ms is not None:
+            _set_up(device, disable=disable, clear=clear, zero=zero, watchdog_ms=watchdog_ms)
         found = find_devices()
     except DeviceError as error:
         raise WorkError(str(error)) from None
     if as_json:
-        print_json({"devices": [asdict(device) for device in found]})
+        print_json({"devices": [asdict(one) for one in found]})
         return
-    for device in found:
-        name = " ".join(part for part in (device.product, device.serial) if part) or "without a name"
-        click.echo(f"{name} ({device.place})")
-        if device.info is None:
-            click.echo(f"  {device.problem}")
+    for one in found:
+        name = " ".join(part for part in (one.product, one.serial) if part) or "without a name"
+        click.echo(f"{name} ({one.place})")
+        if one.info is None:
+            click.echo(f"  {one.problem}")
             continue
-        info = device.info
+        info = one.info
         click.echo(
-            f"  --device usb:{device.serial}\n"
+            f"  --device usb:{one.serial}\n"
             f"  encoder {info.counts_per_rev} counts a turn ({number(info.encoder_step)} rad), "
             f"torque up to {number(info.max_torque)} N*m, {info.rate_hz} Hz, watchdog {info.watchdog_ms} ms\n"
             f"  force transducer: {'yes' if info.transducer else 'no'}; "
@@ -50,3 +74,20 @@ def devices(install_udev_rule: bool, as_json: bool) -> None:
         )
     if not found:
         click.echo("no haptic USB device is plugged in; --device simulated needs none")
+
+
+def _set_up(device: str, *, disable: bool, clear: bool, zero: bool, watchdog_ms: int | None) -> None:
+    kind, _, serial = device.partition(":")
+    if kind != "usb" or device == "usb:":
+        raise InputError(f"--device is '{device}', must be usb[:SERIAL]: the simulated one needs no set-up")
+    with open_usb(serial) as opened:
+        if disable:
+            opened.disable()
+        if clear:
+            opened.clear()
+        if zero:
+            opened.zero()
+        if watchdog_ms is not None:
+            opened.set_watchdog(watchdog_ms)
+        done = {"disabled": disable, "faults cleared": clear, "zeroed": zero, "watchdog set": watchdog_ms}
+        talk(f"{opened.name}: {', '.join(word for word, wanted in done.items() if wanted)}")

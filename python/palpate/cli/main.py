@@ -15,6 +15,7 @@ from .verb import Verbs
 _VERBS = {
     "identify": "Identify a model from recordings.",
     "verify": "Compare a model with a recording.",
+    "plan": "Choose and certify how a model is rendered on a device.",
     "simulate": "Render a model on a simulated device.",
     "render": "Render a model live, tick by tick.",
     "record": "Record a real object.",

@@ -7,6 +7,7 @@ import json
 import math
 import signal
 import tempfile
+import textwrap
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -60,6 +61,11 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
             *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)),
         ]
         click.echo("  ".join(cells).rstrip())
+
+
+def print_paragraph(text: str, *, indent: str = "") -> None:
+    """Text broken to 80 columns; what follows its first line stands two columns further in."""
+    click.echo(textwrap.fill(text, 80, initial_indent=indent, subsequent_indent=indent + "  "))
 
 
 def require_writable(target: Path, *, inputs: Sequence[Path] = ()) -> None:

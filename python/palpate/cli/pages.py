@@ -9,8 +9,6 @@ from pathlib import Path
 from ..errors import InputError
 from ..recording.files import replacing
 
-_END = "<!-- end -->\n"
-
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table whose first column is text and whose others are numbers."""
@@ -21,10 +19,10 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def with_tables(text: str, page: Path, tables: Mapping[str, str]) -> str:
     """The page's text with new tables between its marks `<!-- name -->` and `<!-- end -->`."""
     for name, table in tables.items():
-        mark = f"<!-- {name} -->\n"
-        before, found, rest = text.partition(mark)
-        _, end, after = rest.partition(_END)
-        if not (found and end) or mark in rest:
+        mark, end = f"<!-- {name} -->\n", "<!-- end -->\n"
+        before, _, marked = text.partition(mark)
+        _, found, after = marked.partition(end)
+        if not found or mark in after:
             raise InputError(
                 f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line"
             )

@@ -41,15 +41,23 @@ from .verb import Verb
     show_default="the device's",
     help="Where the object holds this, it turns round.",
 )
+@click.option(
+    "--lowest-rate-share",
+    type=click.FloatRange(0, 1),
+    show_default="the loop's",
+    help="Of the rate: less for half a second ends a probe, 0: never.",
+)
 @json_option
 def record(
     recording: Path,
     device: str,
     object_file: Path | None,
+    wait_ms: float | None,
     transducer: bool,
     rate_hz: float,
     duration_s: float,
     probe: bool,
+    lowest_rate_share: float | None,
     as_json: bool,
     **sweep: Any,
 ) -> None:
@@ -81,6 +89,8 @@ def record(
             probe=probe,
             duration_s=duration_s,
             rate_hz=rate_hz,
+            wait_s=None if wait_ms is None else 1e-3 * wait_ms,
+            lowest_rate_share=lowest_rate_share,
             progress=line.show,
             **sweep,
         )

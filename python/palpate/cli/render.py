@@ -13,7 +13,7 @@ from .._core import LoopSettings, usual_telemetry_hz
 from .arguments import PATH, json_option
 from .ending import WorkError
 from .output import number, print_json, print_numbers, require_writable, talk
-from .scheme_options import scheme_options
+from .scheme_options import chosen_plan, scheme_options
 from .verb import Verb
 
 _LOOP = LoopSettings()
@@ -69,13 +69,13 @@ def render(
     """
     from .._core import render as render_live
     from ..model import load_model
-    from ..planning import Plan, bench_for
+    from ..planning import bench_for
 
     if record is not None:
         require_writable(record, inputs=(model_file,))
     model = load_model(model_file)
     bench = bench_for(model)
-    plan = Plan(model, bench.scheme(model, **scheme))
+    plan = chosen_plan(model, bench, scheme)
     talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated: nothing moves")
     # A request to terminate is as orderly an end as Ctrl-C.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)

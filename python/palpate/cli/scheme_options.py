@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
 from .._core import Scheme, structure_names
+
+if TYPE_CHECKING:
+    from .._core import Bench
+    from ..model import Model
+    from ..planning import Plan
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -23,7 +28,8 @@ def scheme_options(command: F) -> F:
             click.option(
                 "--structure",
                 type=click.Choice(structure_names),
-                default=_DEFAULT.structure,
+                default=None,
+                show_default=f"the model's plan, else {_DEFAULT.structure}",
                 help="How the force is computed.",
             ),
             click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model."),
@@ -61,3 +67,13 @@ def scheme_options(command: F) -> F:
     ):
         described = option(described)
     return cast(F, described)
+
+
+def chosen_plan(model: Model, bench: Bench, scheme: Mapping[str, Any]) -> Plan:
+    """The plan that stands in the model, unless a rendering was asked for; else what was asked for."""
+    from ..planning import Plan
+
+    if model.plan is not None and all(value is None or value is False for value in scheme.values()):
+        return Plan.of(model)
+    structure = scheme["structure"] or _DEFAULT.structure
+    return Plan(model, bench.scheme(model, **{**scheme, "structure": structure}))

@@ -14,7 +14,7 @@ from .ending import WorkError
 from .figures import require_figure_name
 from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
 from .pictures import picture_rendering
-from .scheme_options import scheme_options
+from .scheme_options import chosen_plan, scheme_options
 from .verb import Verb
 
 
@@ -35,11 +35,12 @@ def simulate(
     """Render a model in closed loop with a simulated device and a simulated hand.
 
     The hand sweeps through the model's domain twice in four seconds. An angle is rendered on a knob with a
-    16-bit encoder at 1 kHz; for other units the knob is scaled to the model's travel and force. Nothing is
-    certified: this shows what happens, and proves nothing.
+    16-bit encoder at 1 kHz; for other units the knob is scaled to the model's travel and force. A model with
+    a plan is rendered as planned, on the device that it was certified for, unless a structure is asked for.
+    This shows what happens, and proves nothing.
     """
     from ..model import load_model
-    from ..planning import Plan, bench_for, force_error
+    from ..planning import bench_for, force_error
     from ..planning import simulate as render
 
     if plot is not None:
@@ -49,9 +50,10 @@ def simulate(
     require_distinct(output, plot)
     model = load_model(model_file)
     bench = bench_for(model)
-    plan = Plan(model, bench.scheme(model, **scheme))
-    talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated")
-    rendered = render(plan, bench.device, bench.hand, duration_s)
+    plan = chosen_plan(model, bench, scheme)
+    device = bench.device if plan.certificate is None else plan.certificate.device
+    talk(f"read {model_file}: {model!r}; rendering on a {device.id}, which is simulated")
+    rendered = render(plan, device, bench.hand, duration_s)
     error = force_error(plan, rendered)
     endings = Counter(rendered.columns["status"])
     if endings["NonFinite"]:

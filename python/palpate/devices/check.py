@@ -31,6 +31,9 @@ _DELAY_TOLERANCE = 0.25
 """Of a sample: what the clocks of host and device leave open."""
 _SEEN_STEPS = 5.0
 """A push that moved the handle by less, in encoder steps, tells nothing."""
+_SURE = 3.0
+"""Standard errors that a push has to stand out by."""
+_SIGN = "sign of the force"
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ def check_device(
     push: bool = False,
     profile: DeviceProfile | None = None,
     model: Model | None = None,
+    wait_s: float | None = None,
     progress: Progress | None = None,
 ) -> Check:
     """Measure a device for some seconds and judge it.
@@ -104,6 +108,8 @@ def check_device(
         What the device is thought to be.
     model : Model, optional
         One with a certificate: whether that holds on this device.
+    wait_s : float, optional
+        How long a packet of a USB device is waited for [s].
     progress : callable, optional
         Is told ten times a second: ticks, position, force.
 
@@ -119,18 +125,27 @@ def check_device(
         "object": object,
         "transducer": transducer,
         "rate_hz": rate_hz,
+        "wait_s": wait_s,
         "progress": progress,
         "keep": True,
         "lowest_rate_share": 0.0,  # a low rate is a finding, and no reason to stop
     }
     listened = measure(device, duration_s=duration_s * (LISTENING_SHARE if push else 1.0), **common)
     check = judge(listened)
-    if push and check.may_push:
+    if not push:
+        check = _with(check, Finding(_SIGN, "not looked at", None, "let it push a free handle: --push"))
+    elif not check.may_push:
+        check = _with(check, Finding(_SIGN, "not looked at: what was heard forbids any force"))
+    else:
         force = PUSH_SHARE * check.base.force_limit
         pushed = measure(device, duration_s=duration_s * (1.0 - LISTENING_SHARE), push=force, **common)
         check = with_pushes(check, push_response(pushed["kept"]))
     compared = tuple(compare(other, check.numbers, name=name) for name, other in counted_on.items())
-    return replace(check, findings=(*check.findings, *compared))
+    return _with(check, *compared)
+
+
+def _with(check: Check, *findings: Finding) -> Check:
+    return replace(check, findings=(*check.findings, *findings))
 
 
 def judge(listened: Mapping[str, Any]) -> Check:
@@ -163,7 +178,8 @@ def judge(listened: Mapping[str, Any]) -> Check:
         delay_us = listened["delay"]
         samples = max(0, math.ceil(1e-6 * delay_us["p999_us"] / base.period_s - _DELAY_TOLERANCE))
         numbers["delay_samples"] = float(samples)
-        numbers.update({f"round_trip_{name}": value for name, value in listened["round_trip"].items()})
+        for told in ("round_trip", "delay"):
+            numbers.update({f"{told}_{name}": value for name, value in listened[told].items()})
         findings.append(
             Finding(
                 "delay",
@@ -176,21 +192,7 @@ def judge(listened: Mapping[str, Any]) -> Check:
 
 def with_pushes(check: Check, push: Push) -> Check:
     """Add what pushes showed to a check."""
-    step = check.base.encoder_step
-    steps = push.moved / step if step > 0.0 else math.copysign(math.inf, push.moved)
-    if abs(steps) < _SEEN_STEPS:
-        sign = Finding(
-            "sign of the force", f"not seen: a push moved the handle by {steps:.1f} steps", None, "let it go"
-        )
-    else:
-        sign = Finding(
-            "sign of the force",
-            "right" if steps > 0.0 else f"flipped: a push moved the handle {-steps:.0f} steps against it",
-            steps > 0.0,
-            "swap two wires of the motor or mirror its sign in the firmware; do not enable force",
-            True,
-        )
-    findings = [*check.findings, sign]
+    findings = [*check.findings, _sign(push, check.base.encoder_step)]
     numbers = {**check.numbers, "inertia": push.inertia, "viscous_damping": push.damping}
     if push.delay_samples is not None and numbers["delay_samples"] is None:
         numbers["delay_samples"] = float(push.delay_samples)
@@ -204,6 +206,26 @@ def with_pushes(check: Check, push: Push) -> Check:
             )
         )
     return replace(check, findings=tuple(findings), numbers=numbers)
+
+
+def _sign(push: Push, step: float) -> Finding:
+    """Whether pushes moved the handle the way that they should."""
+    told = f"a push moved the handle by {push.moved:.3g}, {push.unsure:.1g} unsure"
+    if abs(push.moved) < max(_SEEN_STEPS * step, _SURE * push.unsure) or push.moved == 0.0:
+        return Finding(_SIGN, f"not seen: {told}", None, "let go of the handle")
+    if push.moved < 0.0:
+        told = f"flipped: {told} the wrong way"
+    elif not push.obeyed:
+        told = "flipped: the device says that it makes the opposite of what it is told to make"
+    else:
+        told = f"right: {told}"
+    return Finding(
+        _SIGN,
+        told,
+        push.moved > 0.0 and push.obeyed,
+        "swap two wires of the motor or mirror its sign in the firmware; do not enable force",
+        True,
+    )
 
 
 def _counted_on(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:

@@ -31,7 +31,6 @@ _REASONS = {
 
 def device_error(device: str, doing: str, error: Any) -> DeviceError:
     """The sentence for an error of pyusb while `doing` something with `device`."""
-    reason, cure = _REASONS.get(
-        getattr(error, "errno", None) or 0, (str(error) or type(error).__name__, "plug it in again")
-    )
+    said = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    reason, cure = _REASONS.get(getattr(error, "errno", None) or 0, (said, "plug it in again"))
     return DeviceError(f"{device}, {doing}: {reason}; {cure}")

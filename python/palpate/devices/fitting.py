@@ -78,7 +78,7 @@ def profile_of(base: CoreProfile, measured: Numbers) -> DeviceProfile:
     inertia, damping = measured["inertia"], measured["viscous_damping"]
     if inertia is None or damping is None:
         raise InputError(
-            "a profile needs inertia and damping: push a handle that nobody holds and that nothing is mounted on"
+            "a profile needs inertia and damping: push a handle that nobody holds and nothing is mounted on"
         )
     period, jitter, delay = measured["period_s"], measured["jitter_s"], measured["delay_samples"]
     assert period is not None

@@ -22,6 +22,9 @@ _REST_S = 0.1
 """Length of a piece in which a handle may be at rest [s]."""
 _MOVED_STEPS = 50.0
 """A handle that moved by less, in encoder steps, tells nothing of signs."""
+_VELOCITY_SAMPLES = 50
+"""Over which a way is compared with a velocity."""
+_VELOCITY_TOLERANCE = 0.25
 _CLEAR = 0.3
 """Correlation of force and position from which on a sign is clear."""
 
@@ -38,6 +41,7 @@ def findings_at_rest(listened: Mapping[str, Any]) -> list[Finding]:
         _clock(ticks, wanted),
         _losses(listened),
         _encoder(ticks["position"], step, wanted),
+        _velocity(ticks, step),
     ]
     if not listened["orderly"]:
         findings.insert(0, Finding("stream", listened["ended"], False, _CABLE, True))
@@ -120,6 +124,25 @@ def _encoder(position: Float1D, step: float, rate_hz: float) -> Finding:
         in_steps <= _QUIET_STEPS,
         "hold the handle still for a second; look at the encoder's cable and ground",
         True,
+    )
+
+
+def _velocity(ticks: Mapping[str, Any], step: float) -> Finding:
+    """The velocity beside the way that it should explain: damping of a wrong sign would give energy."""
+    name = "sign of the velocity"
+    position, time, velocity = (np.asarray(ticks[key]) for key in ("position", "device_time", "velocity"))
+    if np.ptp(position) < _MOVED_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
+        return Finding(name, "not seen", None, "move the handle while this runs")
+    ways = position[_VELOCITY_SAMPLES:] - position[:-_VELOCITY_SAMPLES]
+    integrated = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
+    told = integrated[_VELOCITY_SAMPLES:] - integrated[:-_VELOCITY_SAMPLES]
+    share = float(ways @ told) / float(ways @ ways)
+    return Finding(
+        name,
+        f"{'right' if share > 0.0 else 'flipped'}: {share:.2f} of what the positions show",
+        abs(share - 1.0) <= _VELOCITY_TOLERANCE,
+        "its firmware measures it wrongly; do not enable force",
+        share <= 0.0,
     )
 
 

@@ -38,6 +38,8 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
         Refused before anything moved: with the device, the reason and its cure.
     """
     if object is not None:
+        if device != "simulated":
+            raise InputError(f"an object is mounted on the simulated device only; {device} has its own")
         settings["position_unit"] = object.units["position"]
         settings["force_unit"] = object.units["force"]
         if object.units["force"] == "A":
@@ -46,7 +48,12 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
             raise InputError(
                 f"the object has {object.dimension} inputs: one of the position alone can be mounted"
             )
-    return measure_live(device, object=object, **settings)
+    try:
+        return measure_live(device, object=object, **settings)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def record(
@@ -58,6 +65,8 @@ def record(
     duration_s: float = 10.0,
     rate_hz: float = 1000.0,
     transducer: bool = True,
+    wait_s: float | None = None,
+    lowest_rate_share: float | None = None,
     progress: Progress | None = None,
     **sweep: float | None,
 ) -> dict[str, Any]:
@@ -82,6 +91,10 @@ def record(
         How long (inf: until Ctrl-C) [s], and how often [Hz].
     transducer : bool
         Whether the simulated device has one.
+    wait_s : float, optional
+        How long a packet of a USB device is waited for [s].
+    lowest_rate_share : float, optional
+        Of the rate: less for half a second ends a probe, 0: never; a hand's recording never ends by it.
     progress : callable, optional
         Is told ten times a second: ticks, position, force.
     **sweep
@@ -105,7 +118,9 @@ def record(
             "moves the handle: probe instead"
         )
     if not probe:
-        sweep["lowest_rate_share"] = 0.0  # nothing is rendered: a low rate is told, and no reason to stop
+        lowest_rate_share = 0.0  # nothing makes force: a low rate is told, and no reason to stop
+    if lowest_rate_share is not None:
+        sweep["lowest_rate_share"] = lowest_rate_share
     return measure(
         device,
         object=object,
@@ -114,6 +129,7 @@ def record(
         duration_s=duration_s,
         rate_hz=rate_hz,
         transducer=transducer,
+        wait_s=wait_s,
         progress=progress,
         **sweep,
     )

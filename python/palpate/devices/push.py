@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,14 +14,19 @@ from .._typing import Float1D
 
 _MOST_LEFT = 0.05
 """RMS of what the two numbers leave unexplained, over what they explain; above, they are not told."""
+_FEWEST_PUSHES = 3
 
 
 @dataclass(frozen=True)
 class Push:
-    """How a handle that nobody holds answered."""
+    """How a handle answered."""
 
     moved: float
     """Mean way of a push in the direction that a right sign gives [m or rad]."""
+    unsure: float
+    """Standard error of that mean [m or rad]; infinite where it rests on less than three pushes."""
+    obeyed: bool
+    """Whether the force that the device says it made has the sign of the one that it was told to make."""
     delay_samples: int | None
     """Whole samples from command to force."""
     inertia: float | None
@@ -32,8 +38,9 @@ class Push:
 def push_response(ticks: Mapping[str, Any]) -> Push:
     """Read sign, delay and mechanics from the ticks of alternating pushes.
 
-    A force F > 0 pushes towards smaller positions. The mechanics J dv/dt = -F - b v of a handle at rest,
-    integrated twice so that nothing is differentiated, are linear in both numbers:
+    A force F > 0 pushes towards smaller positions. How far a push moved the handle is counted from where the
+    handle would have gone on to by itself, since a hand may be on it. The mechanics J dv/dt = -F - b v of a
+    handle at rest, integrated twice so that nothing is differentiated, are linear in both numbers:
 
         J (x - x_0) + b int (x - x_0) dt = - int int F dt dt.
 
@@ -45,26 +52,44 @@ def push_response(ticks: Mapping[str, Any]) -> Push:
         ``force`` (sent), ``applied``, ``position``, ``device_time``, ``sequence``: (n,) each.
     """
     fresh = np.concatenate(([True], np.diff(ticks["sequence"].astype(np.int64)) > 0))
-    applied, position, time = (
-        np.asarray(ticks[name])[fresh] for name in ("applied", "position", "device_time")
+    sent, applied, position, time = (
+        np.asarray(ticks[name])[fresh] for name in ("force", "applied", "position", "device_time")
     )
     ways: list[float] = []
+    obedience = 0.0
     columns: list[Float1D] = []
     targets: list[Float1D] = []
     # A reading tells the force that acted until it was taken: a push begins one reading before it is seen.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
-    for begin in begins:
+    for begin in begins[begins > 2]:  # before the first push nobody knows where the handle goes
         held = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
         last = min(begin + 2 * held, len(position))
         rows = slice(begin, last)
+        told = float(np.sign(sent[max(0, begin + 1 - held) : begin + 1 + held].sum()))
+        obedience += told * float(np.sign(applied[begin + 1]))
+        ways.append(-told * _way(time, position, begin, held))
         moved, seconds = position[rows] - position[begin], np.diff(time[rows])
-        ways.append(-float(np.sign(applied[begin + 1]) * moved[min(held, len(moved) - 1)]))
         impulse = np.concatenate(([0.0], np.cumsum(applied[begin + 1 : last] * seconds)))
         columns.append(np.stack([moved, _integral(moved, seconds)], axis=1))
         targets.append(-_integral(impulse, seconds))
     inertia, damping = _mechanics(columns, targets)
-    return Push(float(np.mean(ways)) if ways else 0.0, _delay(ticks), inertia, damping)
+    enough = len(ways) >= _FEWEST_PUSHES
+    return Push(
+        moved=float(np.mean(ways)) if ways else 0.0,
+        unsure=float(np.std(ways, ddof=1)) / math.sqrt(len(ways)) if enough else math.inf,
+        obeyed=obedience >= 0.0,
+        delay_samples=_delay(ticks),
+        inertia=inertia,
+        damping=damping,
+    )
+
+
+def _way(time: Float1D, position: Float1D, begin: int, held: int) -> float:
+    """How far a push moved the handle from where it was going: on a parabola, since hands are slow."""
+    before, end = slice(max(0, begin - 2 * held), begin + 1), min(begin + held, len(position) - 1)
+    hand = np.polynomial.Polynomial.fit(time[before], position[before], 2)
+    return float(position[end] - hand(time[end]))
 
 
 def _mechanics(columns: list[Float1D], targets: list[Float1D]) -> tuple[float | None, float | None]:
@@ -80,7 +105,7 @@ def _mechanics(columns: list[Float1D], targets: list[Float1D]) -> tuple[float | 
 
 
 def _delay(ticks: Mapping[str, Any]) -> int | None:
-    """Samples from a command to the first reading whose force is it, less the one that every command takes."""
+    """Samples from a command to the first reading whose force is it, less the one that each command takes."""
     sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
     begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
     delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]

@@ -139,7 +139,10 @@ class Found:
 def _candidates() -> Iterator[UsbSetup]:
     core = _pyusb()
     try:
-        handles = list(core.find(find_all=True, idVendor=wire.VENDOR, idProduct=wire.PRODUCT))
+        handles = sorted(
+            core.find(find_all=True, idVendor=wire.VENDOR, idProduct=wire.PRODUCT),
+            key=lambda handle: (handle.bus, handle.address),
+        )
     except core.NoBackendError:
         raise DeviceError("USB devices need libusb-1.0: apt-get install libusb-1.0-0") from None
     for handle in handles:

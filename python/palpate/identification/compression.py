@@ -10,8 +10,9 @@ across the cell explains is removed, so that what remains measures noise. With m
 is both fine and small; then a share of the rows, evenly spread over the recording, stands for all.
 """
 
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,11 @@ class Compressed:
     """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
     samples: float
     """Rows of the recording that are stood for, or the sum of their weights"""
+
+    def standing_for(self, samples: float) -> "Compressed":
+        """The same rows, standing for that many samples."""
+        more = samples / self.samples
+        return replace(self, weight=more * self.weight, within=more * self.within, samples=samples)
 
 
 class Compressor:
@@ -88,6 +94,10 @@ class Compressor:
         """How many rows of the recording stand for all."""
         return len(self._force)
 
+    def samples(self, only: NDArray[np.bool_] | None = None) -> float:
+        """Samples that the rows stand for, or only (n,) of them."""
+        return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
+
     def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
         """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart.
 
@@ -109,11 +119,16 @@ class Compressor:
         dy = self._force - y[group]
         within = self._within + float(dy @ (weight * dy))
         spread = np.zeros_like(x)
+        inputs: list[Float1D] = []
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
-            within -= self._explained_by_slopes(dx, dy)
-        merged_side = None if side is None else _mean(group, count, weight * side)
+            inputs.extend(dx.T)
+        merged_side = None
+        if side is not None:
+            merged_side = _mean(group, count, weight * side)
+            inputs.append(side - merged_side[group])
+        within -= self._explained_by_slopes([column for column in inputs if column.any()], dy)
         return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
 
     def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
@@ -125,21 +140,23 @@ class Compressor:
         part._within = self._within * float(part._weight.sum() / self._weight.sum())
         return part
 
-    def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:
+    def _explained_by_slopes(self, inputs: Sequence[Float1D], dy: Float1D) -> float:
         """Part of the within-sum that slopes across the cells explain, from deviations within the groups.
 
         All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same few
         degrees of freedom.
         """
-        d = dx.shape[1]
-        grid = (self._per_axis,) * d
+        if not inputs:
+            return 0.0
+        d = self._positions.shape[1]
+        grid = (self._per_axis or int(self._key.max()) + 1,) * d
         together = max(2, round(POOLED_CELLS ** (1.0 / d)))
         pooled = np.array(np.unravel_index(self._key, grid)) // together
         block, _ = _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)
-        products = [[np.bincount(block, self._weight * a * b) for b in (*dx.T, dy)] for a in dx.T]
+        products = [[np.bincount(block, self._weight * a * b) for b in (*inputs, dy)] for a in inputs]
         table = np.array(products).transpose(2, 0, 1)
-        slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
-        return float(np.sum(slope * table[:, :, d]))
+        slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :-1], hermitian=True), table[:, :, -1])
+        return float(np.sum(slope * table[:, :, -1]))
 
 
 def binning_error(rows: Compressed, curvature: Float2D) -> float:

@@ -213,9 +213,10 @@ def _curvature_bound(
     alpha, beta = basis.alpha[:, 0], basis.beta[:, 0]
     gap = np.abs(0.5 * (left + right)[:, None] - beta) - 0.5 * (right - left)[:, None]
     u = alpha * np.maximum(gap, 0.0)
-    polynomial = u**5 + 10 * u**3 + 15 * u if of_slope else u**4 + 6 * u**2 + 3
+    square = u * u
+    polynomial = u * (square * (square + 10.0) + 15.0) if of_slope else square * (square + 6.0) + 3.0
     highest = _core.wavelet_jerk_bound if of_slope else _core.wavelet_curvature_bound
-    tail = np.minimum(polynomial * np.exp(-0.5 * u * u), highest)
+    tail = np.minimum(polynomial * np.exp(-0.5 * square), highest)
     height = np.where(u < 2.5, highest, tail)
     return np.asarray(height @ np.abs(weights * alpha ** (3 if of_slope else 2)))
 

@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import _core
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
 from .constraints import domain_bounds, impose, moved_to_bounds
-from .frame import resolved_frame
-from .fresh import FreshRows, gain, kept_back
-from .growth import Grown, PathPoint, grow, judge, prune
+from .evidence import Evidence
+from .fresh import kept_back
+from .growth import Grown, PathPoint, judge, prune
+from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
+from .play import PlaySearch
 from .rung import Rung
-from .selection import Library
-from .separable import Basis, SeparableProblem, Solution, problem_of
+from .separable import Basis, SeparableProblem, Solution
 from .stopping import ON_FRESH_ROWS, enough, standard_error
 
 WORTH_REGROWING = 1.01
@@ -84,46 +84,39 @@ class Ladder:
                     f"fixed_force is at {place:g}, outside the positions from {lower:g} to {lower + reach:g}"
                 )
             self._fixed_force = (place - lower) / reach, fixed
-        self._box, self._force, self._side = box, force, side
-        self._starts = starts if side is None and box.shape[1] == 1 else None
-        self._compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
-        self._fresh = kept_back(len(force), starts)
+        fresh = kept_back(len(force), starts)
         if weight is not None:
-            self._fresh &= weight > 0.0
-        if side is None and self._starts is None and "hysteresis" in options.inputs:
+            fresh &= weight > 0.0
+        compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
+        self._evidence = Evidence(box, force, fresh, compressor, options)
+        self._side = side
+        self._play = None
+        if side is None and starts is not None and box.shape[1] == 1:
+            self._play = PlaySearch(self._evidence, starts, options)
+        if side is None and self._play is None and "hysteresis" in options.inputs:
             raise InputError(
                 "inputs names hysteresis, but the recording has neither both directions nor time; "
                 "name a direction column or leave hysteresis out"
             )
         given = len(force) if weight is None else int(np.count_nonzero(weight))
-        if (used := self._compressor.rows_used) < given:
+        if (used := compressor.rows_used) < given:
             self.notes.append(f"{used} of {given} rows, evenly spread, stand for all of them")
 
     def climb(self) -> Rung:
         """The highest rung that earned its place, or the one that the inputs name."""
-        rows = self._rows(None)
+        rows = self._evidence.rows()
         best = self._better(self._constant(rows), self._straight(rows))
         if self._options.max_wavelets > 0:
             best = self._better(best, self._network(rows, self._name, Basis.empty(rows.positions.shape[1])))
         if not (self._options.inputs == "auto" or "hysteresis" in self._options.inputs):
             return best
         if self._side is not None:
-            return self._hysteresis(best, self._side, None)
-        if self._starts is not None:
-            return self._hysteresis(best, *self._best_play(best.solution.basis))
+            return self._hysteresis(best, HysteresisInput.of_strokes(self._side))
+        if self._play is not None:
+            return self._play.with_first_states(
+                self._hysteresis(best, self._play.best_tried(best.solution.basis))
+            )
         return best
-
-    def _rows(self, side: Float1D | None) -> Compressed:
-        """Compressed rows: all of them, or those that are not kept back for the criterion."""
-        only = ~self._fresh if self._options.criterion in ON_FRESH_ROWS else None
-        return self._compressor.rows(side, only)
-
-    def _problem(self, rows: Compressed, side: Float1D | None) -> SeparableProblem:
-        fresh = self._fresh_rows(side) if self._options.criterion in ON_FRESH_ROWS else None
-        return problem_of(rows, resolved_by=self._options.resolved_by, fresh=fresh)
-
-    def _fresh_rows(self, side: Float1D | None) -> FreshRows:
-        return FreshRows.of(self._box, self._force, side, self._fresh)
 
     def _constant(self, rows: Compressed) -> Rung:
         straight = self._straight_solution(rows)
@@ -137,7 +130,7 @@ class Ladder:
         return self._recorded(self._constrained(self._straight_solution(rows)))
 
     def _straight_solution(self, rows: Compressed) -> Rung:
-        problem = self._problem(rows, None)
+        problem = self._evidence.problem(rows)
         solution = problem.solve(Basis.empty(problem.dimension))
         return Rung("linear", rows, problem, solution, problem.n_parameters(0), self._options.criterion)
 
@@ -148,34 +141,29 @@ class Ladder:
         return self._constrained(Rung(name, rows, problem, grown.solution, n_parameters, grown.stop_reason))
 
     def _grown(
-        self, rows: Compressed, side: Float1D | None, name: str, start: Basis
+        self, rows: Compressed, strokes: HysteresisInput | None, name: str, start: Basis
     ) -> tuple[SeparableProblem, Grown]:
-        problem = self._problem(rows, side)
-        library = Library(problem, resolved_frame(problem, self._options))
-        grown = grow(problem, library, start, name, self._options)
+        problem, grown = self._evidence.grown(rows, strokes, name, start, self._options)
         self.path.extend(grown.path)
         return problem, grown
 
-    def _hysteresis(self, below: Rung, side: Float1D, radius: float | None) -> Rung:
+    def _hysteresis(self, below: Rung, strokes: HysteresisInput) -> Rung:
         """g + s h on top of the wavelets of the rung below, if it earns its place or is named.
 
         h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
         not fall at all with these, growing a network would be in vain.
         """
         options, named = self._options, self._options.inputs != "auto"
-        extra = 0 if radius is None else 1
-        rows = self._rows(side)
-        problem = self._problem(rows, side)
+        rows = self._evidence.rows(strokes)
+        problem = self._evidence.problem(rows, strokes)
         first = problem.solve(below.solution.basis)
-
-        def rung(of: SeparableProblem, solution: Solution, stop_reason: str) -> Rung:
-            n_parameters = of.n_parameters(len(solution.basis)) + extra
-            return Rung("hysteresis", rows, of, solution, n_parameters, stop_reason, side, radius)
-
-        free = rung(problem, first, options.criterion)
+        free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
         if named or free.criterion(options) < below.criterion(options):
-            problem, grown = self._grown(rows, side, "hysteresis", first.basis)
-            free = rung(problem, grown.solution, grown.stop_reason)
+            if self._play is not None:
+                strokes = self._play.measured(strokes, first.basis)
+            rows = self._evidence.rows(strokes)
+            problem, grown = self._grown(rows, strokes, "hysteresis", first.basis)
+            free = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
         if not named and self._better(below, free) is below:
             return below
         kept = self._constrained(free)
@@ -196,8 +184,8 @@ class Ladder:
         alone will not do: strokes that a periodic motion samples at different places look like one rapidly
         changing force.
         """
-        rows = self._rows(None)
-        problem = self._problem(rows, None)
+        rows = self._evidence.rows()
+        problem = self._evidence.problem(rows)
         start = problem.solve(hysteresis.solution.basis)
         problem.set_prior(start.rss)
         solution = prune(problem, problem.solve(start.basis), self._options)
@@ -207,19 +195,6 @@ class Ladder:
             self._constrained(Rung(name, rows, problem, solution, n_parameters, hysteresis.stop_reason))
         )
 
-    def _best_play(self, basis: Basis) -> tuple[Float1D, float]:
-        """The hysteresis input (n,) of that play radius [box] which helps most on given wavelets."""
-        assert self._starts is not None
-        motions = np.split(self._box[:, 0], list(self._starts)[1:])
-        tried = []
-        for radius in self._options.play_radius:
-            play = np.concatenate([_core.play(motion, radius) for motion in motions])
-            side = np.clip((self._box[:, 0] - play) / radius, -1.0, 1.0)
-            problem = self._problem(self._rows(side), side)
-            tried.append((problem.total(problem.solve(basis).rss), radius, side))
-        _, radius, side = min(tried, key=lambda candidate: candidate[0])
-        return side, radius
-
     def _better(self, below: Rung, above: Rung) -> Rung:
         """The upper rung if it earns its place, else the lower one; and a note on what it gains."""
         options, name = self._options, self._options.criterion
@@ -228,7 +203,7 @@ class Ladder:
             return below
         falls = below.criterion(options) - above.criterion(options)
         changes = f"falls by {falls:.4g}" if falls > 0 else f"rises by {-falls:.4g}"
-        fresh = self._fresh_rows(above.side)
+        fresh = self._evidence.fresh_rows(above.strokes)
         evidence = options.rung_evidence
         if name in ON_FRESH_ROWS:
             evidence = max(evidence, standard_error(len(fresh.force)))
@@ -237,7 +212,7 @@ class Ladder:
                 f"{above.name} refused: {name} {changes}, it has to fall by {evidence:.4g} or more"
             )
             return below
-        share, error = self._fresh_gain(below, above)
+        share, error = self._evidence.fresh_gain(below, above)
         if share <= 0.0 and len(fresh.force) >= LEAST_FRESH:
             self.notes.append(
                 f"{above.name} refused: {name} {changes}, but the squared error on fresh rows rises by "
@@ -249,15 +224,6 @@ class Ladder:
             f"{100 * share:.4g} +- {100 * error:.2g} %"
         )
         return above
-
-    def _fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
-        """Fall of the squared error on fresh rows as a share, and its standard error."""
-        errors = []
-        for rung in (below, above):
-            kept = self._compressor.rows(rung.side, ~self._fresh)
-            problem = problem_of(kept, resolved_by=self._options.resolved_by)
-            errors.append(rung.fresh_errors(problem, self._fresh_rows(rung.side)))
-        return gain(*errors)
 
     def _constrained(self, rung: Rung) -> Rung:
         """The rung with its constraints, their price in the notes.
@@ -277,7 +243,7 @@ class Ladder:
             return rung
         if options.refine and problem.rmse(kept) > WORTH_REGROWING * rung.rmse and len(kept.basis):
             moved = moved_to_bounds(problem, rung.rows, rung.solution, bounds)
-            compatible, regrown = self._grown(moved, rung.side, rung.name, rung.solution.basis)
+            compatible, regrown = self._grown(moved, rung.strokes, rung.name, rung.solution.basis)
             trial = impose(problem, problem.solve(regrown.solution.basis), bounds)
             if _judged_on(compatible, trial, options) < _judged_on(compatible, kept, options):
                 kept = trial
@@ -296,3 +262,14 @@ class Ladder:
 def _judged_on(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
     """Criterion of a solution on the rows of another problem of the same form."""
     return judge(problem, problem.solution_of(solution), options)
+
+
+def _hysteresis_rung(
+    strokes: HysteresisInput,
+    rows: Compressed,
+    problem: SeparableProblem,
+    solution: Solution,
+    stop_reason: str,
+) -> Rung:
+    n_parameters = problem.n_parameters(len(solution.basis)) + (strokes.play_radius is not None)
+    return Rung("hysteresis", rows, problem, solution, n_parameters, stop_reason, strokes)

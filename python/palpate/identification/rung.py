@@ -10,6 +10,7 @@ from .._typing import Float1D, Float2D
 from .compression import Compressed, binning_error
 from .fresh import FreshRows
 from .growth import fresh_deviance
+from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
 from .separable import SeparableProblem, Solution
 from .stopping import ON_FRESH_ROWS, deviance
@@ -28,10 +29,18 @@ class Rung:
     solution: Solution
     n_parameters: int
     stop_reason: str
-    side: Float1D | None = None
-    """(n,) hysteresis input of every row of the recording, where the rung has one"""
-    play_radius: float | None = None
-    """[box]"""
+    strokes: HysteresisInput | None = None
+    """The hysteresis input, where the rung has one"""
+
+    @property
+    def side(self) -> Float1D | None:
+        """(n,) hysteresis input of every row of the recording."""
+        return None if self.strokes is None else self.strokes.side
+
+    @property
+    def play_radius(self) -> float | None:
+        """[box]"""
+        return None if self.strokes is None else self.strokes.play_radius
 
     @property
     def rmse(self) -> float:
@@ -65,6 +74,14 @@ class Rung:
 
     def modelled(self, positions: Float2D) -> Float1D:
         """The rung's force at every row (n,), positions in the unit box."""
+        return self._modelled(positions, self.side)
+
+    def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
+        """g and h (k,) of a rung with hysteresis at positions (k, d) in the unit box."""
+        middle = self._modelled(positions, np.zeros(len(positions)))
+        return middle, self._modelled(positions, np.ones(len(positions))) - middle
+
+    def _modelled(self, positions: Float2D, side: Float1D | None) -> Float1D:
         readings = self.problem.readout @ self.solution.coefficients
-        rows = FreshRows(positions, np.zeros(len(positions)), self.side)
+        rows = FreshRows(positions, np.zeros(len(positions)), side)
         return -rows.errors(readings, self.solution.basis.alpha, self.solution.basis.beta)

@@ -284,8 +284,15 @@ def _fit_record(fit: Fit) -> dict[str, Any]:
     }
 
 
-def load_model(path: str | os.PathLike[str]) -> Model:
+def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model:
     """Read a model file.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    with_plan : bool
+        False leaves plan and certificate out, and unread: to plan a model again that was changed.
 
     Raises
     ------
@@ -295,6 +302,8 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     """
     file = Path(path)
     content = read_json(file)
+    if not with_plan and isinstance(content, dict):
+        content = {**content, "plan": None, "certificate": None}
     try:
         return Model.from_dict(content)
     except ValueError as error:

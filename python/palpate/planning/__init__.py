@@ -4,7 +4,7 @@
 from .._core import Bench, Certificate, Inequality, explicit_slope_limit
 from .bench import bench_for
 from .comparison import Comparison, compare_structures
-from .device_profile import EXAMPLES, DeviceProfile
+from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
 from .plan import Plan
 from .simulation import ForceError, describe, force_at, force_error, simulate
 from .slope_limit import Loss
@@ -22,8 +22,10 @@ __all__ = [
     "bench_for",
     "compare_structures",
     "describe",
+    "example_profiles",
     "explicit_slope_limit",
     "force_at",
     "force_error",
+    "profile_file",
     "simulate",
 ]

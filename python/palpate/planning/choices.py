@@ -11,6 +11,7 @@ import math
 from .. import _core
 from .._core import DeviceProfile, ForceBounds, Scheme
 from ..model import Model
+from .slope_limit import sliding_bounds
 
 SPARE = 0.95
 """Share of what the device allows that is used where nothing else sets a number [-]"""
@@ -72,8 +73,7 @@ def play_radius_for(model: Model, device: DeviceProfile) -> float:
     r = max(4 Delta, max h / (2 b / T - max(g' + |h'|))), with the delay's and the encoder's share of damping
     and friction taken off as well.
     """
-    travel = float(model.upper[0] - model.lower[0])
-    sliding = _core.force_bounds(model, 1e9 * travel)
+    sliding = sliding_bounds(model)
     delay = device.delay_samples
     held = device.viscous_damping / device.longest_period_s
     room = (held - 0.5 * max(0.0, sliding.slope_max) - delay * sliding.sliding) / (0.5 + delay)

@@ -21,7 +21,27 @@ else:
     import tomli as tomllib
 
 EXAMPLES = Path(__file__).parent / "profiles"
-"""Profiles of published devices, each with its sources."""
+"""Profiles of published devices, each with its sources in the comment at its top."""
+
+
+def example_profiles() -> dict[str, tuple[Path, tuple[str, ...]]]:
+    """The example profiles: name -> file, and the paragraphs that say where its numbers are from."""
+    examples = {}
+    for file in sorted(EXAMPLES.glob("*.toml")):
+        comment = []
+        for line in file.read_text(encoding="utf-8").splitlines()[1:]:  # after the licence
+            if not line.startswith("#"):
+                break
+            comment.append(line.removeprefix("#").strip())
+        paragraphs = "\n".join(comment).split("\n\n")
+        examples[file.stem] = (file, tuple(" ".join(text.split()) for text in paragraphs))
+    return examples
+
+
+def profile_file(name: str) -> Path:
+    """The file of this name where there is one, else the example of this name."""
+    file, example = Path(name), EXAMPLES / f"{name}.toml"
+    return example if not file.exists() and example.exists() else file
 
 
 class DeviceProfile(_core.DeviceProfile):

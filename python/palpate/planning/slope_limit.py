@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from .. import _core
+from .._core import ForceBounds
 from .._typing import Float1D, Float2D
 from ..identification.constraints import domain_bounds, impose, slope_limited
 from ..identification.identified import Readings
@@ -28,8 +30,9 @@ _SAMPLES = 1001
 """Positions over the domain [-]"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
-"""Standard deviation of the kernel [share of the travel], and whether the force has to begin where contact
-does: a free end whose force begins at once needs a steep way there."""
+"""Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both
+ends: one that begins at once where contact does needs a steep way there, and so does the continuation of one
+that is not zero or less at the lower end, or zero or more at the upper one."""
 
 _RESERVE = 0.985
 """Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""
@@ -65,10 +68,16 @@ class Loss:
     rms: float
 
 
-def sliding_slopes(model: Model) -> tuple[float, float]:
-    """Proved (smallest, largest) slope while sliding, continuations included."""
+@lru_cache(maxsize=8)
+def sliding_bounds(model: Model) -> ForceBounds:
+    """Proved bounds while sliding, continuations included: of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
-    bounds = _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0)
+    return _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0)
+
+
+def sliding_slopes(model: Model) -> tuple[float, float]:
+    """The smallest and largest slope of these bounds."""
+    bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
 
@@ -83,8 +92,10 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
         Slopes of either stroke [force/position]; may be infinite.
     """
     travel = float(model.upper[0] - model.lower[0])
-    for smoothing, from_contact in _ATTEMPTS:
-        limited = _limited_once(model, low, high, smoothing * travel, from_contact)
+    for smoothing, restoring in _ATTEMPTS:
+        limited = _limited_once(model, low, high, smoothing * travel, restoring)
+        if limited is None:
+            continue
         found = sliding_slopes(limited)
         if found[0] >= low and found[1] <= high:
             return limited
@@ -126,27 +137,25 @@ def _strokes(model: Model, x: Float1D) -> Float2D:
     return np.array([model.force(x, direction=side) for side in sides])
 
 
-def _limited_once(model: Model, low: float, high: float, sigma: float, from_contact: bool) -> Model:
+def _limited_once(model: Model, low: float, high: float, sigma: float, restoring: bool) -> Model | None:
+    """The model with the change fitted; None where its continuations would be steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
     changes = [
-        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, from_contact) for stroke in strokes
+        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, restoring) for stroke in strokes
     ]
+    wanted = strokes + np.array(changes)
+    middle, travel = wanted.mean(axis=0), x[-1] - x[0]
+    pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
+    if not restoring and pushed_out and np.abs(middle).max() > high * travel:
+        return None
     if len(changes) == 2:  # of g and h
         changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
     alpha, beta = _candidates(x, np.any(np.array(changes) != 0.0, axis=0), sigma)
     close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
     before = model.alpha[:, 0], model.beta[:, 0]
     chosen = _chosen(x, np.array(changes), before, (alpha, beta), sigma, close)
-    wanted = strokes + _strokes_of(np.array(changes))
     return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
-
-
-def _strokes_of(readings: Float2D) -> Float2D:
-    """Pressing and releasing from g and h."""
-    return (
-        readings if len(readings) == 1 else np.array([readings[0] + readings[1], readings[0] - readings[1]])
-    )
 
 
 def _fitted(
@@ -169,22 +178,26 @@ def _fitted(
         Basis(alpha[:, None] * travel, (beta[:, None] - lower) / travel)
     )
     slopes = (low * float(travel[0]), high * float(travel[0]))
-    bounds = domain_bounds(problem, hysteresis=hysteretic and _least_loss(model) >= 0.0, slopes=slopes)
+    lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
+    bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
     found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
     new: dict[str, Any] = {"alpha": found.alpha.tolist(), "beta": found.beta.tolist()}
     for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
         new[f"bias{suffix}"] = float(found.bias[k])
         new[f"linear{suffix}"] = found.linear[k].tolist()
         new[f"weight{suffix}"] = found.weights[k].tolist()
-    return changed_network(model, **new)
-
-
-def _least_loss(model: Model) -> float:
-    return float(_core.force_bounds(model, float(model.upper[0] - model.lower[0])).loss_min)
+    limited = changed_network(model, **new)
+    if not lossy:
+        return limited
+    least = sliding_bounds(limited).loss_min
+    if least >= 0.0:
+        return limited
+    # What is imposed holds but for rounding, and h >= 0 is proved or not: raise it by that much.
+    return changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
 
 
 def _change(
-    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, from_contact: bool
+    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, restoring: bool
 ) -> Float1D:
     """What has to be added to a force for its slopes to lie within limits, kinks rounded; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
@@ -200,8 +213,10 @@ def _change(
         wide = np.pad(force, (before, after))
     grid = x[0] + step * (np.arange(len(wide)) - before)
     nearest = slope_limited(grid, wide, low, high)
-    if from_contact and model.below == "free":
-        nearest = np.minimum(nearest, high * np.maximum(grid - x[0], 0.0))
+    if restoring and model.period is None:
+        rise, fall = high * (grid - x[0]), high * (grid - x[-1])
+        nearest = np.minimum(nearest, np.maximum(rise, 0.0) if model.below == "free" else rise)
+        nearest = np.maximum(nearest, np.minimum(fall, 0.0) if model.above == "free" else fall)
     nearest = _extended(nearest, margin)
     inside = slice(margin + before, margin + before + n)
     smooth = gaussian_filter1d(nearest, sigma / step, mode="nearest")[inside]

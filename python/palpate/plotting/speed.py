@@ -38,6 +38,28 @@ class RenderedForce:
     """RMS of rendered force minus the object's at the handle, at the end of the tick [N*m or N]."""
 
 
+@dataclass(frozen=True)
+class ModelError:
+    """One way to model a force, over its settings."""
+
+    name: str
+    cost: Float1D
+    """Size or time, shape (k,)."""
+    error: Float1D
+    """NRMSE against the truth, shape (k,)."""
+    wavelets: Sequence[int]
+    """Wavelets of each; 0 for what has none."""
+
+
+@dataclass(frozen=True)
+class OverWavelets:
+    """A quantity over the number of wavelets."""
+
+    name: str
+    wavelets: Float1D
+    quantity: Float1D
+
+
 def draw_work_precision(axes: Axes, steps: Sequence[WorkPrecision], position_unit: str) -> None:
     """Error of the motion over computing time, one line for each time step, one marker for each period.
 
@@ -136,3 +158,82 @@ def draw_rendered_force(
     axes.set_xlabel("time of a tick [ns]")
     axes.set_ylabel(label("force error, RMS", force_unit))
     axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)
+
+
+def draw_model_error(axes: Axes, methods: Sequence[ModelError], cost: str) -> None:
+    """Model error over size or time, one line for each method, one marker for each of its settings.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where to draw; both its axes become logarithmic.
+    methods : sequence of ModelError
+        The methods; the numbers of their wavelets stand beside the markers.
+    cost : str
+        What is paid: the label of the lower axis.
+    """
+    for marker, method in zip(_MARKERS, methods, strict=False):
+        filled = any(method.wavelets)
+        axes.plot(
+            method.cost,
+            method.error,
+            color="black" if filled else "0.55",
+            linewidth=1.0 if filled else 0.5,
+            marker=marker,
+            markersize=4.0,
+            markerfacecolor="black" if filled else "white",
+            markeredgecolor="black",
+            markeredgewidth=0.7,
+            label=method.name,
+        )
+        for count, x, y in zip(method.wavelets, method.cost, method.error, strict=True):
+            if count:
+                axes.annotate(
+                    str(count),
+                    (x, y),
+                    xytext=(-3, -3),
+                    textcoords="offset points",
+                    ha="right",
+                    va="top",
+                    fontsize=6.0,
+                )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.margins(x=0.08, y=0.12)
+    axes.grid(color="0.88", linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.set_xlabel(cost)
+    axes.set_ylabel("NRMSE")
+
+
+def draw_over_wavelets(axes: Axes, curves: Sequence[OverWavelets], quantity: str) -> None:
+    """A quantity over the number of wavelets, one line for each way to have it.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where to draw; both its axes become logarithmic.
+    curves : sequence of OverWavelets
+        The lines.
+    quantity : str
+        Label of the vertical axis.
+    """
+    for marker, curve in zip(_MARKERS, curves, strict=False):
+        axes.plot(
+            curve.wavelets,
+            curve.quantity,
+            color="black",
+            linewidth=0.5,
+            marker=marker,
+            markersize=4.0,
+            markerfacecolor="white",
+            markeredgewidth=0.7,
+            label=curve.name,
+        )
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.grid(color="0.88", linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.set_xlabel("wavelets")
+    axes.set_ylabel(quantity)

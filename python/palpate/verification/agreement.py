@@ -55,8 +55,14 @@ def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
     Raises
     ------
     InputError
-        The units differ, or there is no position that both know.
+        A model has several inputs, the units differ, or there is no position that both know.
     """
+    for model in (first, second):
+        if model.dimension > 1:
+            raise InputError(
+                f"a model over {' and '.join(model.inputs)} has several inputs: two models are laid beside "
+                "each other along one position"
+            )
     if dict(first.units) != dict(second.units):
         raise InputError(f"the models have different units, {first.units} and {second.units}")
     lower = max(float(first.lower[0]), float(second.lower[0]))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..errors import InputError
+from ..identification.hysteresis_input import HysteresisInput
 from ..identification.inputs import input_columns
 from ..model import Model
 from ..recording import Recording
@@ -92,8 +93,12 @@ def _static(model: Model, recording: Recording) -> Prediction:
         if left_out := int(np.count_nonzero(~rows)):
             notes = (f"{left_out} rows without a direction (pause, hold) are left out",)
     elif model.play_radius is not None:
-        force = model.force(recording.position, play=model.play(recording.position))
+        known = HysteresisInput.of_play([recording.position], model.play_radius).known
+        rows = known if known.any() else rows
+        force = model.force(recording.position[rows], play=model.play(recording.position)[rows])
         notes = ("there is no direction: the play operator follows the positions",)
+        if left_out := int(np.count_nonzero(~rows)):
+            notes += (f"{left_out} rows before the motion has covered the play are left out",)
     else:
         raise InputError(
             "the model differs between press and release: the recording needs a direction "

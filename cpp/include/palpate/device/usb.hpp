@@ -42,13 +42,13 @@ struct UsbHealth {
 ///
 /// The device paces the host: an exchange sends its command at once and waits for the next packet, in the order in
 /// which they were sampled, but no longer than `UsbOptions::wait`. A host that falls behind by a packet or two
-/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. In the exchange nothing is
-/// allocated or thrown; libusb takes its own locks, and the wait is a futex.
+/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. In
+/// the exchange nothing is allocated or thrown; libusb takes its own locks, and the wait is a futex.
 ///
 /// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
-/// to the device than `UsbOptions::longest_delay_s`; Fault when the
-/// device reports one, was disabled or is gone, and then for good; Lost when a command did not arrive or was not understood; Limited
-/// when it clipped one. Lost and repeated samples speak through Reading::sequence.
+/// to the device than `UsbOptions::longest_delay_s`; Fault when the device reports one, was disabled or is gone, and
+/// then for good; Lost when a command did not arrive or was not understood; Limited when it clipped one. Lost and
+/// repeated samples speak through Reading::sequence.
 class UsbDevice {
   public:
     static constexpr bool paces_host = true;

@@ -11,6 +11,7 @@
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/failure/period_map.hpp"
 #include "palpate/failure/solver_maps.hpp"
+#include "palpate/failure/unused_maps.hpp"
 
 namespace palpate {
 
@@ -20,13 +21,15 @@ struct NamedFailureMap {
 };
 
 /// Every map that can be measured.
-inline constexpr std::array<NamedFailureMap, 10> failure_maps{{{"explicit", explicit_map},
+inline constexpr std::array<NamedFailureMap, 12> failure_maps{{{"explicit", explicit_map},
                                                                {"damping", damping_map},
                                                                {"period", period_map},
                                                                {"encoder", encoder_map},
                                                                {"play", play_map},
                                                                {"coupling", coupling_map},
                                                                {"falling", falling_map},
+                                                               {"coupled-encoder", coupled_encoder_map},
+                                                               {"hand", hand_map},
                                                                {"solver", solver_map},
                                                                {"pole", pole_map},
                                                                {"guard", guard_map}}};

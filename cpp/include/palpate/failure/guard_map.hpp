@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -51,7 +52,9 @@ namespace palpate {
                     squares += tick++ >= 2 * second ? handle.velocity * handle.velocity : 0.0;
                     return true;
                 });
-            line.measured.push_back(std::sqrt(squares / static_cast<double>(second)));
+            // Slower than an encoder step a second is at rest.
+            line.measured.push_back(
+                std::max(std::sqrt(squares / static_cast<double>(second)), device.encoder_step));
             line.theory.push_back(std::numeric_limits<double>::quiet_NaN());
         }
         map.lines.push_back(std::move(line));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/failure/failure_map.hpp"
@@ -57,8 +58,15 @@ namespace palpate {
     return map;
 }
 
-/// The stiffest spring over the encoder's step, K <= min(2b/T, 2 f_c/Delta): Abbott and Okamura 2005. The hands
-/// pace over an edge between two encoder counts, most of them by far less than a count.
+/// Ways over an edge between two encoder counts, most of them far below a count: where friction, damping or the
+/// encoder is what counts.
+[[nodiscard]] inline std::vector<double> ways_over_an_edge(const DeviceProfile& device) {
+    const double balance = device.coulomb_friction * device.period_s / device.viscous_damping;
+    const double step = device.encoder_step;
+    return logarithmic(std::min(1e-3 * balance, 1e-2 * step), std::max(1e3 * balance, 1e3 * step), 24);
+}
+
+/// The stiffest spring over the encoder's step, K <= min(2b/T, 2 f_c/Delta): Abbott and Okamura 2005.
 [[nodiscard]] inline FailureMap encoder_map(int points) {
     FailureMap map{"encoder", "encoder step [rad]", "stiffness K [N*m/rad]", {}};
     for (const double friction : {0.002, 0.02}) {
@@ -70,11 +78,7 @@ namespace palpate {
         };
         const auto fails = [&](double step, double stiffness) {
             const DeviceProfile knob = device(step);
-            const double balance =
-                friction * knob.period_s / knob.viscous_damping;  // of friction and damping
-            const double least = std::min(1e-3 * balance, 1e-2 * step);
-            const double most = std::max(1e3 * balance, 1e3 * step);
-            for (const double reach : logarithmic(least, most, 24)) {
+            for (const double reach : ways_over_an_edge(knob)) {
                 const PacedWork work =
                     work_of_pacing(Direct{LinearObject{stiffness}}, knob, {reach, 1, 1e6, knob.period_s},
                                    0.5 * step - 0.5 * reach, 100);

@@ -61,13 +61,13 @@ namespace detail {
     };
     const std::vector<double> periods = logarithmic(1e-4, 1e-2, points);
     map.lines.push_back(failure_line(
-        "falling, massless: branch jumps", periods, massless,
+        "massless: branch jumps", periods, massless,
         [&](double period, double slope) { return detail::jumps_branches(massless(period), slope); }, 3.0));
     map.lines.push_back(failure_line(
-        "falling, implicit: branch jumps", periods, implicit,
+        "implicit: branch jumps", periods, implicit,
         [&](double period, double slope) { return detail::jumps_branches(implicit(period), slope); }, 3.0));
     map.lines.push_back(failure_line(
-        "rising, massless: fixed point diverges", periods, massless,
+        "massless: fixed point diverges", periods, massless,
         [&](double period, double slope) { return detail::iteration_diverges(massless(period), slope); },
         3.0));
     return map;

@@ -84,10 +84,11 @@ inline constexpr Guards unguarded{.limit = {1e9}};
 template <Structure S>
 [[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
                                    double stiffness, std::size_t ticks) {
-    device.force_limit = 1e9;
+    constexpr double endless = 1e150;  // a limit would end the growth [N*m]
+    device.force_limit = endless;
     const double inertia = device.inertia + hand.mass;
     detail::Growth growth{ticks};
-    (void)closed_loop(std::move(structure), device, hand, ticks, {8, 0.0, 1.0, unguarded},
+    (void)closed_loop(std::move(structure), device, hand, ticks, {8, 0.0, 1.0, Guards{.limit = {endless}}},
                       [&](const Tick& /*tick*/, const Motion& now, const EnergyAccount& /*account*/) {
                           return growth.add(inertia * now.velocity * now.velocity +
                                             (stiffness + hand.stiffness) * now.position * now.position);

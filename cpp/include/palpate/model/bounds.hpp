@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <vector>
+#include <queue>
 
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/parameters.hpp"
-#include "palpate/model/wavelet.hpp"
 
 namespace palpate {
 
@@ -19,220 +19,138 @@ struct Interval {
     double upper = 0.0;
 
     [[nodiscard]] double largest() const noexcept { return std::max(std::abs(lower), std::abs(upper)); }
+    /// The smallest that holds both.
+    [[nodiscard]] Interval with(Interval other) const noexcept {
+        return {std::min(lower, other.lower), std::max(upper, other.upper)};
+    }
 };
 
 namespace detail {
 
-/// A derivative of the Mexican hat with what its range over an interval rests on.
-struct HatDerivative {
-    double (*value)(double u) noexcept;
-    std::array<double, 5> extrema;  ///< where the next derivative vanishes
-    double bound;                   ///< of its absolute value
-};
-
-/// psi' has its extrema at u^2 = 3 -+ sqrt 6 (the fifth place repeats the first).
-inline const HatDerivative hat_slope{
-    [](double u) noexcept { return mexican_hat(u).slope; },
-    {0.7419637843027259, -0.7419637843027259, 2.3344142183389773, -2.3344142183389773, 0.7419637843027259},
-    wavelet_slope_bound};
-
-/// psi'' has its extrema at 0 and u^2 = 5 -+ sqrt 10.
-inline const HatDerivative hat_curvature{
-    [](double u) noexcept { return mexican_hat_curvature(u); },
-    {0.0, 1.3556261799742659, -1.3556261799742659, 2.8569700138728056, -2.8569700138728056},
-    wavelet_curvature_bound};
-
-/// The exact range over [from, to].
-[[nodiscard]] inline Interval range(const HatDerivative& hat, double from, double to) noexcept {
-    const double first = hat.value(from);
-    const double last = hat.value(to);
-    Interval result{std::min(first, last), std::max(first, last)};
-    for (const double u : hat.extrema) {
-        if (u > from && u < to) {
-            const double extreme = hat.value(u);
-            result = {std::min(result.lower, extreme), std::max(result.upper, extreme)};
-        }
-    }
-    return result;
-}
-
-/// One cell of the search: a function g known at both ends, its derivative within `rate` in between.
-struct Cell {
+/// Where g lies over a cell, value and three derivatives known at both ends: no farther from the polynomial of
+/// degree 7 through them than max|g^(8)| h^8 / (256 * 8!), and that polynomial stays between its Bernstein
+/// coefficients. Wavelets that cancel but for a millionth leave cells as wide as a fifth of one, where sums of
+/// ranges would need thousands.
+struct BoundedCell {
     double from, to;
-    double at_from, at_to;
-    Interval rate;
+    Jet at_from, at_to;
+    Interval range;
 
-    /// No function with such a derivative leaves the two cones that open from the ends.
-    [[nodiscard]] Interval range() const noexcept {
-        const double width = to - from;
-        Interval result{std::min(at_from, at_to), std::max(at_from, at_to)};
-        if (rate.lower < 0.0 && rate.upper > 0.0) {
-            const double spread = rate.upper - rate.lower;
-            const double rise = (at_to - at_from - rate.lower * width) / spread;
-            const double fall = (at_from - at_to + rate.upper * width) / spread;
-            result.upper = std::max(result.upper, at_from + rate.upper * rise);
-            result.lower = std::min(result.lower, at_from + rate.lower * fall);
-        }
-        return result;
+    /// `remainder`: of the polynomial, and of rounding.
+    BoundedCell(double left, double right, const Jet& at_left, const Jet& at_right, double remainder) noexcept
+        : from{left}, to{right}, at_from{at_left}, at_to{at_right} {
+        const Interval both = coefficients(at_from, to - from).with(coefficients(at_to, from - to));
+        range = {both.lower - remainder, both.upper + remainder};
+    }
+
+    /// The order of the search: where the largest may be comes first.
+    [[nodiscard]] bool operator<(const BoundedCell& other) const noexcept {
+        return range.largest() < other.range.largest();
+    }
+
+  private:
+    /// The four on one side.
+    [[nodiscard]] static Interval coefficients(const Jet& end, double h) noexcept {
+        const double first = h / 7.0 * end[1];
+        const double second = h * h / 42.0 * end[2];
+        const double third = h * h * h / 210.0 * end[3];
+        const auto [lower, upper] = std::minmax({end[0], end[0] + first, end[0] + (2.0 * first + second),
+                                                 end[0] + (3.0 * first + 3.0 * second + third)});
+        return {lower, upper};
     }
 };
 
-/// Encloses g over [from, to] by bisection: a cell is done when it cannot raise the largest or lower the
-/// smallest value seen by more than `relative` times the largest |g| seen. Cells that are still too coarse
-/// when the budget ends only make the result wider, never wrong.
-template <class Value, class Rate>
-[[nodiscard]] Interval enclose(double from, double to, double relative, Value value, Rate rate) {
+/// The derivative of that order of a network, as one term of what is enclosed.
+struct Term {
+    const NetworkParameters& network;
+    std::size_t order;  ///< 0 or 1
+};
+
+/// Encloses g, the sum of the terms, over [from, to] by bisection: a cell is done when it cannot raise the largest
+/// or lower the smallest value seen by more than `relative` times the largest |g| seen. Cells that are still too
+/// coarse when the budget ends only make the result wider, never wrong.
+template <std::size_t terms>
+[[nodiscard]] Interval enclose(const std::array<Term, terms>& sum, double from, double to, double relative) {
     constexpr int first_cells = 16;
     constexpr int budget = 20'000;
-    std::vector<Cell> open;
-    Interval seen{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-    const auto look = [&](double x) {
-        const double g = value(x);
-        seen = {std::min(seen.lower, g), std::max(seen.upper, g)};
-        return g;
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    const auto add = [](Jet& all, const Derivatives& one, std::size_t order) {
+        for (std::size_t d = 0; d < all.size(); ++d) {
+            all[d] += one[order + d];
+        }
     };
+    const double reach = std::max(std::abs(from), std::abs(to));
+    Jet rounding{};
+    for (const auto& [network, order] : sum) {
+        add(rounding, derivatives_rounding(network, reach), order);
+    }
+    Interval seen{infinity, -infinity};
+    const auto look = [&](double x) {
+        Jet here{};
+        for (const auto& [network, order] : sum) {
+            add(here, derivatives(network, x), order);
+        }
+        seen = seen.with({here[0], here[0]});
+        return here;
+    };
+    const auto cell = [&](double left, double right, const Jet& at_left, const Jet& at_right) {
+        const double h = right - left;
+        double eighth = 0.0;
+        for (const auto& [network, order] : sum) {
+            eighth += derivative_bounds(network, left, right)[order + 8];
+        }
+        double remainder = eighth * std::pow(h, 8) / (256.0 * 40320.0);
+        // The factors of `coefficients`, and some units more for its sums.
+        const Jet factors{1.0, 3.0 / 7.0 * h, 3.0 / 42.0 * h * h, h * h * h / 210.0};
+        for (std::size_t d = 0; d < factors.size(); ++d) {
+            const double size = std::max(std::abs(at_left[d]), std::abs(at_right[d]));
+            remainder += factors[d] * (rounding[d] + 8.0 * epsilon * size);
+        }
+        return BoundedCell{left, right, at_left, at_right, remainder};
+    };
+    std::priority_queue<BoundedCell> open;
     double left = from;
-    double at_left = look(from);
+    Jet at_left = look(from);
     for (int k = 1; k <= first_cells; ++k) {
         const double right = k == first_cells ? to : from + (to - from) * k / first_cells;
-        const double at_right = look(right);
-        open.push_back({left, right, at_left, at_right, rate(left, right)});
+        const Jet at_right = look(right);
+        open.push(cell(left, right, at_left, at_right));
         left = right;
         at_left = at_right;
     }
-    Interval enclosed = seen;
+    Interval enclosed{seen.lower - rounding[0], seen.upper + rounding[0]};
     for (int cells = first_cells; !open.empty(); ++cells) {
-        const Cell cell = open.back();
-        open.pop_back();
-        const Interval possible = cell.range();
-        const double slack = relative * seen.largest();
-        const double middle = 0.5 * (cell.from + cell.to);
+        const BoundedCell one = open.top();
+        open.pop();
+        const Interval possible = one.range;
+        const double slack = relative * seen.largest() + 4.0 * rounding[0];
+        const double middle = 0.5 * (one.from + one.to);
         if ((possible.upper <= seen.upper + slack && possible.lower >= seen.lower - slack) ||
-            cells >= budget || middle <= cell.from || middle >= cell.to) {
-            enclosed = {std::min(enclosed.lower, possible.lower), std::max(enclosed.upper, possible.upper)};
+            cells >= budget || middle <= one.from || middle >= one.to) {
+            enclosed = enclosed.with(possible);
             continue;
         }
-        const double at_middle = look(middle);
-        open.push_back({cell.from, middle, cell.at_from, at_middle, rate(cell.from, middle)});
-        open.push_back({middle, cell.to, at_middle, cell.at_to, rate(middle, cell.to)});
+        const Jet at_middle = look(middle);
+        open.push(cell(one.from, middle, one.at_from, at_middle));
+        open.push(cell(middle, one.to, at_middle, one.at_to));
     }
-    return {std::min(enclosed.lower, seen.lower), std::max(enclosed.upper, seen.upper)};
-}
-
-/// Widens an interval by what rounding may have cost: 64 (N + 8) units of the sum of absolute terms. Each
-/// term is right to a few units: u to 2, u^2/2 in the exponent to 4 u^2 times a hat that has fallen by then.
-[[nodiscard]] inline Interval with_rounding(Interval interval, double absolute_sum,
-                                            std::size_t wavelets) noexcept {
-    const double margin =
-        64.0 * static_cast<double>(wavelets + 8) * std::numeric_limits<double>::epsilon() * absolute_sum;
-    return {interval.lower - margin, interval.upper + margin};
-}
-
-/// Sum of w alpha^order times a hat derivative over [from, to], as an interval.
-[[nodiscard]] inline Interval sum_of_ranges(const NetworkParameters& network, const HatDerivative& hat,
-                                            int order, double from, double to) noexcept {
-    Interval sum{0.0, 0.0};
-    double absolute = 0.0;
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        const double alpha = network.alpha[i];
-        const double factor = network.weight[i] * (order == 1 ? alpha : alpha * alpha);
-        const Interval one = range(hat, alpha * (from - network.beta[i]), alpha * (to - network.beta[i]));
-        sum.lower += factor * (factor > 0.0 ? one.lower : one.upper);
-        sum.upper += factor * (factor > 0.0 ? one.upper : one.lower);
-        absolute += std::abs(factor) * hat.bound;
-    }
-    return with_rounding(sum, absolute, network.weight.size());
+    return enclosed;
 }
 
 }  // namespace detail
 
-/// Highest derivative of f that `derivative_bounds` knows.
-inline constexpr std::size_t highest_derivative = 8;
-
-/// Bounds of |f|, |f'|, ... of a network of one input over [from, to].
-using DerivativeBounds = std::array<double, highest_derivative + 1>;
-
-namespace detail {
-
-/// Suprema of |psi^(n)|, rounded up. psi^(n) = He_{n+2} E up to its sign, so that for even n they stand at 0.
-inline constexpr DerivativeBounds hat_suprema{
-    1.0, wavelet_slope_bound, wavelet_curvature_bound, 5.7831, 15.0, 35.539, 105.0, 288.492, 945.0};
-
-/// Cramer's inequality, |He_n(u)| e^{-u^2/4} <= 1.0865 sqrt(n!): what is left of psi^(n) away from its centre
-/// is at most this times e^{-u^2/4}.
-inline constexpr DerivativeBounds hat_tails{1.5366,  2.6614,   5.3226,   11.9021,  29.1540,
-                                            77.1341, 218.1682, 654.5044, 2069.7211};
-
-}  // namespace detail
-
-/// Proved bounds of f and its first eight derivatives over [from, to]: the sum of what each wavelet can
-/// contribute at its distance. Coarser than `value_bounds` and `slope_bounds`, but without any search.
-[[nodiscard]] inline DerivativeBounds derivative_bounds(const NetworkParameters& network, double from,
-                                                        double to) noexcept {
-    const double c = std::abs(network.linear[0]);
-    DerivativeBounds bounds{std::abs(network.bias) + c * std::max(std::abs(from), std::abs(to)), c};
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        const double alpha = network.alpha[i];
-        const double beta = network.beta[i];
-        const double distance = alpha * std::max({from - beta, beta - to, 0.0});
-        const double decay = std::exp(-0.25 * std::min(distance * distance, 2800.0));
-        double factor = std::abs(network.weight[i]);
-        for (std::size_t n = 0; n <= highest_derivative; ++n) {
-            bounds[n] += factor * std::min(detail::hat_suprema[n], detail::hat_tails[n] * decay);
-            factor *= alpha;
-        }
-    }
-    for (double& bound : bounds) {
-        bound *= 1.0 + 1e-9;  // rounding of the sum of absolute terms
-    }
-    return bounds;
-}
-
-/// Proved bounds of f over [from, to] for a network of one input, at most `relative` times max|f| wider than
-/// the true range (mean-value form: on every cell the range of psi' is known exactly).
+/// Proved bounds of f over [from, to] for a network of one input, rounding included, at most `relative` times
+/// max|f| wider than the true range.
 [[nodiscard]] inline Interval value_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
-    const double c = network.linear[0];
-    double absolute = std::abs(network.bias) + std::abs(c) * std::max(std::abs(from), std::abs(to));
-    for (const double weight : network.weight) {
-        absolute += std::abs(weight);
-    }
-    const auto value = [&](double x) noexcept {
-        double sum = c * x + network.bias;
-        for (std::size_t i = 0; i < network.weight.size(); ++i) {
-            sum += network.weight[i] * mexican_hat(network.alpha[i] * (x - network.beta[i])).value;
-        }
-        return sum;
-    };
-    const auto rate = [&](double a, double b) noexcept {
-        const Interval sum = detail::sum_of_ranges(network, detail::hat_slope, 1, a, b);
-        return Interval{sum.lower + c, sum.upper + c};
-    };
-    return detail::with_rounding(detail::enclose(from, to, relative, value, rate), absolute,
-                                 network.weight.size());
+    return detail::enclose(std::array{detail::Term{network, 0}}, from, to, relative);
 }
 
 /// Proved bounds of f' over [from, to], at most `relative` times max|f'| wider than the true range.
 [[nodiscard]] inline Interval slope_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
-    const double c = network.linear[0];
-    double absolute = std::abs(c);
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        absolute += std::abs(network.weight[i]) * network.alpha[i] * wavelet_slope_bound;
-    }
-    const auto slope = [&](double x) noexcept {
-        double sum = c;
-        for (std::size_t i = 0; i < network.weight.size(); ++i) {
-            const double alpha = network.alpha[i];
-            sum += network.weight[i] * alpha * mexican_hat(alpha * (x - network.beta[i])).slope;
-        }
-        return sum;
-    };
-    const auto rate = [&](double a, double b) noexcept {
-        return detail::sum_of_ranges(network, detail::hat_curvature, 2, a, b);
-    };
-    return detail::with_rounding(detail::enclose(from, to, relative, slope, rate), absolute,
-                                 network.weight.size());
+    return detail::enclose(std::array{detail::Term{network, 1}}, from, to, relative);
 }
 
 }  // namespace palpate

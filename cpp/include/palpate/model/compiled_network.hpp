@@ -8,8 +8,8 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/model/bounds.hpp"
 #include "palpate/model/continuation.hpp"
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/network.hpp"
@@ -26,46 +26,6 @@ struct CompileOptions {
 };
 
 namespace detail {
-
-/// What double precision makes of f^(n)(x), n = 0..3, in units of epsilon times the sum of |w| alpha^n: the
-/// polynomial in u, the exponent u^2/2 and u itself are right to a few units each. Suprema over u of
-/// ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) E, P_n the polynomial of psi^(n) with absolute coefficients.
-inline constexpr std::array<double, 4> hat_rounding{14.47, 40.6, 129.3, 452.5};
-
-/// f, f', f'' and f''' of a network of one input, without continuation.
-[[nodiscard]] inline Jet jet(const NetworkParameters& network, double x) noexcept {
-    const double c = network.linear[0];
-    Jet sum{c * x + network.bias, c, 0.0, 0.0};
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        const double alpha = network.alpha[i];
-        const double u = std::clamp(alpha * (x - network.beta[i]), -wavelet_reach, wavelet_reach);
-        const double square = u * u;
-        double factor = network.weight[i] * std::exp(-0.5 * square);
-        sum[0] += factor * (square - 1.0);
-        sum[1] += (factor *= alpha) * (3.0 - square) * u;
-        sum[2] += (factor *= alpha) * ((square - 6.0) * square + 3.0);
-        sum[3] += (factor *= alpha) * ((10.0 - square) * square - 15.0) * u;
-    }
-    return sum;
-}
-
-/// What rounding may have cost `jet` anywhere in [-reach, reach].
-[[nodiscard]] inline Jet jet_rounding(const NetworkParameters& network, double reach) noexcept {
-    const double c = std::abs(network.linear[0]);
-    const double terms = 0.5 * static_cast<double>(network.weight.size() + 4);
-    Jet sum{(terms + 2.0) * (std::abs(network.bias) + c * reach), (terms + 2.0) * c, 0.0, 0.0};
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        double factor = std::abs(network.weight[i]);
-        for (std::size_t n = 0; n < sum.size(); ++n) {
-            sum[n] += factor * (hat_rounding[n] + terms * hat_suprema[n]);
-            factor *= network.alpha[i];
-        }
-    }
-    for (double& rounding : sum) {
-        rounding *= std::numeric_limits<double>::epsilon();
-    }
-    return sum;
-}
 
 /// Largest effect on a cell's polynomial, and on its slope by t, of a unit error in each derivative by t at
 /// both borders: suprema of the sums of absolute Hermite basis functions.
@@ -140,8 +100,8 @@ class CompiledCurve {
         }
         // One more cell on either side: rounding may take a position that was wrapped past an edge.
         PiecewiseSeptic table{PiecewiseSeptic::cell(lower_, h) - 1, PiecewiseSeptic::cell(upper_, h) + 1, h,
-                              [&](double x) noexcept { return detail::jet(network, x); }};
-        certify(table, eighth, detail::jet_rounding(network, reach));
+                              [&](double x) noexcept { return jet(network, x); }};
+        certify(table, eighth, jet_rounding(network, reach));
         if (!(value_error_ <= asked)) {
             value_error_ = slope_error_ = 0.0;
             return;
@@ -177,7 +137,7 @@ class CompiledCurve {
         double largest = 0.0;
         for (int k = 0; k < cuts; ++k) {
             const double from = lower_ - beyond + k * step;
-            largest = std::max(largest, derivative_bounds(curve_.parameters(), from, from + step).back());
+            largest = std::max(largest, derivative_bounds(curve_.parameters(), from, from + step)[8]);
         }
         return largest;
     }

@@ -36,11 +36,25 @@ struct HatColumns {
     const double *weight_by_width, *weight_width, *weight_width_squared;  ///< w alpha, w / alpha, w / alpha^2
 };
 
+/// Radial hats of several inputs, input by input and each column by column, and the box of their data. Padded as
+/// above.
+struct RadialColumns {
+    std::size_t dimension, size;
+    const double *alpha, *beta, *weight;
+    const double *lower, *upper;
+
+    /// One component of the projection of x onto the box.
+    [[nodiscard]] double projected(const double* x, std::size_t j) const noexcept {
+        return x[j] < lower[j] ? lower[j] : x[j] > upper[j] ? upper[j] : x[j];
+    }
+};
+
 /// The functions of one instruction set.
 struct HatKernel {
     void (*at)(const HatColumns& of, double x, Curve& sum) noexcept;
     std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3>
         batch;  ///< by quantity
+    void (*radial)(const RadialColumns& of, const double* x, double& value, double* gradient) noexcept;
     void (*gaussians)(const double* square, std::size_t n, double* e) noexcept;
 };
 
@@ -108,6 +122,25 @@ void batch(const HatColumns& of, const double* x, std::size_t n, double* sum) no
     }
 }
 
+inline void radial(const RadialColumns& of, const double* x, double& value, double* gradient) noexcept {
+    const auto inputs = static_cast<double>(of.dimension);
+    for (std::size_t i = 0; i < of.size; ++i) {
+        const auto scaled = [&](std::size_t j) {
+            const std::size_t at = j * of.size + i;
+            return std::clamp(of.alpha[at] * (of.projected(x, j) - of.beta[at]), -hat_reach, hat_reach);
+        };
+        double square = 0.0;
+        for (std::size_t j = 0; j < of.dimension; ++j) {
+            square += scaled(j) * scaled(j);
+        }
+        const RadialMexicanHat psi = radial_mexican_hat(square, inputs);
+        value += of.weight[i] * psi.value;
+        for (std::size_t j = 0; gradient != nullptr && j < of.dimension; ++j) {
+            gradient[j] += of.weight[i] * psi.gradient_over_u * of.alpha[j * of.size + i] * scaled(j);
+        }
+    }
+}
+
 inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
     for (std::size_t k = 0; k < n; ++k) {
         e[k] = std::exp(-0.5 * std::min(square[k], hat_reach * hat_reach));
@@ -119,6 +152,7 @@ inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
 [[nodiscard]] inline std::vector<HatKernel> usable_hat_kernels() {
     return {{plain::at,
              {plain::batch<&Curve::value>, plain::batch<&Curve::slope>, plain::batch<&Curve::integral>},
+             plain::radial,
              plain::gaussians}};
 }
 

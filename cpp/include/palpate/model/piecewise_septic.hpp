@@ -11,11 +11,9 @@
 #include <vector>
 
 #include "palpate/model/continuation.hpp"
+#include "palpate/model/derivatives.hpp"
 
 namespace palpate {
-
-/// Value and first three derivatives of a function at one position.
-using Jet = std::array<double, 4>;
 
 /// A function as polynomials of degree 7 on cells of equal width h, a power of two: one look-up, one cache line
 /// and a few multiplications, however the function came about. Value and first three derivatives are continuous.

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/model/hat_sum.hpp"
 #include "palpate/model/parameters.hpp"
+#include "palpate/model/radial_bounds.hpp"
 #include "palpate/model/wavelet.hpp"
 
 namespace palpate {
@@ -22,9 +24,11 @@ namespace palpate {
 /// seen inside].
 class RadialNetwork {
   public:
-    RadialNetwork(NetworkParameters network, Domain domain)
-        : network_{std::move(network)}, domain_{std::move(domain)} {
+    RadialNetwork(NetworkParameters network, Domain domain,
+                  const detail::HatKernel& kernel = detail::hat_kernel())
+        : network_{std::move(network)}, domain_{std::move(domain)}, kernel_{kernel} {
         validate(network_, domain_);
+        fill_columns();
         gradient_cap_ = largest_gradient();
     }
 
@@ -53,17 +57,37 @@ class RadialNetwork {
                 sum += clamped_partial(x, j) * (x[j] - inside);
             }
         }
-        for (std::size_t i = 0; i < size(); ++i) {
-            sum += network_.weight[i] * radial(i, x).value;
+        kernel_.radial(columns(), x.data(), sum, nullptr);
+        return sum;
+    }
+
+    /// Value at x and the gradient there, written to `gradient` (d values each), in one pass, continuation
+    /// included.
+    double at(std::span<const double> x, std::span<double> gradient) const noexcept {
+        double sum = network_.bias;
+        for (std::size_t j = 0; j < dimension(); ++j) {
+            sum += network_.linear[j] * projected(x, j);
+            gradient[j] = network_.linear[j];
+        }
+        kernel_.radial(columns(), x.data(), sum, gradient.data());
+        for (std::size_t j = 0; j < dimension(); ++j) {
+            const double beyond = x[j] - projected(x, j);
+            if (beyond != 0.0) {
+                gradient[j] = std::clamp(gradient[j], 0.0, gradient_cap_[j]);
+                sum += gradient[j] * beyond;
+            }
         }
         return sum;
     }
 
-    /// Gradient at x, written to `gradient` (d values each), continuation included.
-    void gradient(std::span<const double> x, std::span<double> gradient) const noexcept {
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            gradient[j] = x[j] == projected(x, j) ? partial(x, j) : clamped_partial(x, j);
+    /// Proved bounds of the value inside the domain and of the gradient anywhere: outside, its components are
+    /// those at the projection or are clipped towards zero.
+    [[nodiscard]] RadialBounds bounds(double relative = 0.01) const {
+        RadialBounds bounds = radial_bounds(network_, domain_.lower, domain_.upper, relative);
+        for (Interval& component : bounds.gradient) {
+            component = component.with({0.0, 0.0});
         }
+        return bounds;
     }
 
   private:
@@ -76,21 +100,17 @@ class RadialNetwork {
         return network_.alpha[k] * (projected(x, j) - network_.beta[k]);
     }
 
-    [[nodiscard]] RadialMexicanHat radial(std::size_t i, std::span<const double> x) const noexcept {
-        double square = 0.0;
-        for (std::size_t j = 0; j < dimension(); ++j) {
-            const double u = scaled(i, x, j);
-            square += u * u;
-        }
-        return radial_mexican_hat(square, static_cast<double>(dimension()));
-    }
-
     /// df/dx_j at the projection of x.
     [[nodiscard]] double partial(std::span<const double> x, std::size_t j) const noexcept {
         double sum = network_.linear[j];
         for (std::size_t i = 0; i < size(); ++i) {
+            double square = 0.0;
+            for (std::size_t l = 0; l < dimension(); ++l) {
+                square += scaled(i, x, l) * scaled(i, x, l);
+            }
+            const RadialMexicanHat psi = radial_mexican_hat(square, static_cast<double>(dimension()));
             sum += network_.weight[i] * network_.alpha[i * dimension() + j] * scaled(i, x, j) *
-                   radial(i, x).gradient_over_u;
+                   psi.gradient_over_u;
         }
         return sum;
     }
@@ -99,14 +119,45 @@ class RadialNetwork {
         return std::clamp(partial(x, j), 0.0, gradient_cap_[j]);
     }
 
+    void fill_columns() {
+        const std::size_t d = dimension();
+        columns_.assign((2 * d + 1) * padded(), 0.0);
+        std::fill_n(columns_.begin(), d * padded(), 1.0);
+        for (std::size_t i = 0; i < size(); ++i) {
+            for (std::size_t j = 0; j < d; ++j) {
+                columns_[j * padded() + i] = network_.alpha[i * d + j];
+                columns_[(d + j) * padded() + i] = network_.beta[i * d + j];
+            }
+            columns_[2 * d * padded() + i] = network_.weight[i];
+        }
+    }
+
+    [[nodiscard]] std::size_t padded() const noexcept { return (size() + 7) / 8 * 8; }
+
+    [[nodiscard]] detail::RadialColumns columns() const noexcept {
+        const double* first = columns_.data();
+        const std::size_t d = dimension();
+        return {d,
+                padded(),
+                first,
+                first + d * padded(),
+                first + 2 * d * padded(),
+                domain_.lower.data(),
+                domain_.upper.data()};
+    }
+
     /// Largest partial derivatives, at least 0, over the wavelets' centres and 1024 points of an additive
     /// recurrence: multiples of the powers of 1/g, g^(d+1) = g + 1, spread evenly over the box.
     [[nodiscard]] std::vector<double> largest_gradient() const {
         const std::size_t d = dimension();
         std::vector<double> cap(d, 0.0);
+        std::vector<double> gradient;
         const auto visit = [&](std::span<const double> x) {
+            double value = 0.0;
+            gradient = network_.linear;
+            kernel_.radial(columns(), x.data(), value, gradient.data());
             for (std::size_t j = 0; j < d; ++j) {
-                cap[j] = std::max(cap[j], partial(x, j));
+                cap[j] = std::max(cap[j], gradient[j]);
             }
         };
         for (std::size_t i = 0; i < size(); ++i) {
@@ -132,7 +183,9 @@ class RadialNetwork {
 
     NetworkParameters network_;
     Domain domain_;
+    detail::HatKernel kernel_;
     std::vector<double> gradient_cap_;
+    std::vector<double> columns_;
 };
 
 }  // namespace palpate

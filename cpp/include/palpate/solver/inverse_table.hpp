@@ -12,6 +12,7 @@
 
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/compiled_network.hpp"
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/parameters.hpp"
 #include "palpate/model/piecewise_septic.hpp"
 
@@ -130,7 +131,7 @@ class InverseCells {
         double high = above ? infinity : below ? force_.positions.lower : force_.positions.upper;
         double y = first_guess(q, low, high);
         for (int evaluations = 0; evaluations < 100; ++evaluations) {
-            at.forward = detail::jet(force_.network, y);
+            at.forward = jet(force_.network, y);
             at.forward[0] += force_.p * y;
             at.forward[1] += force_.p;
             at.residual = at.forward[0] - q;
@@ -171,7 +172,7 @@ class InverseCells {
 
     /// |P - F^-1| on one cell; infinite where nothing is proved.
     [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
-        constexpr std::size_t order = highest_derivative;
+        constexpr std::size_t order = 8;
         const auto c = table_.coefficients(k);
         if (!std::all_of(c.begin(), c.end(), [](double one) { return std::isfinite(one); })) {
             return std::numeric_limits<double>::infinity();
@@ -190,8 +191,7 @@ class InverseCells {
         }
         const double spread = 0.5 * inner[1] + asked_;
         const DerivativeBounds outer = derivative_bounds(force_.network, c[0] - spread, c[0] + spread);
-        const double least_slope =
-            force_.p + detail::jet(force_.network, c[0])[1] - of_f[1] - outer[2] * spread;
+        const double least_slope = force_.p + jet(force_.network, c[0])[1] - of_f[1] - outer[2] * spread;
         if (!(least_slope > 0.0)) {
             return std::numeric_limits<double>::infinity();
         }

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "palpate/model/bounds.hpp"
-#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/solver/inverse_table.hpp"
 #include "palpate/solver/load_line.hpp"
@@ -277,7 +277,7 @@ class Resolvent {
     }
 
     [[nodiscard]] double total(const PiecewiseForce& force, double y) const noexcept {
-        return detail::jet(force.network, y)[0] + slope_ * y;
+        return jet(force.network, y)[0] + slope_ * y;
     }
 
     /// The tables of a rising stretch, and what they leave to Newton's method.
@@ -285,7 +285,7 @@ class Resolvent {
         const Interval values{total(force, positions.lower), total(force, positions.upper)};
         const bool folds_below = positions.lower > force.lower;
         const bool folds_above = positions.upper < force.upper;
-        const auto bend = [&](double y) { return std::abs(detail::jet(force.network, y)[2]); };
+        const auto bend = [&](double y) { return std::abs(jet(force.network, y)[2]); };
         Branch gap;
         gap.values = values;
         gap.positions = positions;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "palpate/model/bounds.hpp"
-#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/parameters.hpp"
 
 namespace palpate {
@@ -24,9 +24,9 @@ namespace palpate {
                                                                            double upper) {
     constexpr int first_cells = 61;
     constexpr int budget = 20'000;
-    const Jet rounding = detail::jet_rounding(network, std::max(std::abs(lower), std::abs(upper)));
+    const Jet rounding = jet_rounding(network, std::max(std::abs(lower), std::abs(upper)));
     const double margin = rounding[1] + std::numeric_limits<double>::epsilon() * std::abs(p);
-    const auto slope = [&](double y) { return p + detail::jet(network, y)[1]; };
+    const auto slope = [&](double y) { return p + jet(network, y)[1]; };
 
     std::vector<Interval> cells;  // the leftmost last
     for (int k = first_cells; k > 0; --k) {
@@ -45,7 +45,7 @@ namespace palpate {
         cells.pop_back();
         const double middle = 0.5 * (cell.lower + cell.upper);
         const double radius = 0.5 * (cell.upper - cell.lower);
-        const Jet here = detail::jet(network, middle);
+        const Jet here = jet(network, middle);
         const double jerk = derivative_bounds(network, cell.lower, cell.upper)[3];
         const double bend = std::abs(here[2]);
         if (std::abs(p + here[1]) > (bend + rounding[2] + 0.5 * jerk * radius) * radius + margin) {

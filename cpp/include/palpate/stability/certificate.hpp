@@ -118,13 +118,15 @@ namespace detail {
 
 }  // namespace detail
 
-/// What is proved of any force within bounds.
-[[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
-                                         const DeviceProfile& device) {
+/// The bounds of the force that a scheme renders: those of the model, the coupling taken out where it says so.
+[[nodiscard]] inline ForceBounds rendered_bounds(const ForceBounds& bounds, const Scheme& scheme) noexcept {
+    return scheme.compensated ? compensated(bounds, scheme.coupling.stiffness) : bounds;
+}
+
+/// What is proved of any rendered force within bounds. Wider bounds never prove more.
+[[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
+                                                  const DeviceProfile& device) {
     Certificate certificate{scheme, device, "", bounds, {}, Verdict::Refused, "", 0.0};
-    if (scheme.compensated) {
-        certificate.bounds = compensated(bounds, scheme.coupling.stiffness);
-    }
     std::vector<Inequality> lines = inequalities_of(certificate.bounds, scheme, device);
     const auto all = [&](const auto& condition) {
         return std::all_of(lines.begin(), lines.end(), condition);
@@ -142,6 +144,12 @@ namespace detail {
     certificate.why = detail::reason(lines, certificate.verdict);
     certificate.inequalities = std::move(lines);
     return certificate;
+}
+
+/// What is proved of any force within bounds, rendered by a scheme on a device.
+[[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
+                                         const DeviceProfile& device) {
+    return certify_rendered(rendered_bounds(bounds, scheme), scheme, device);
 }
 
 /// What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason; a scheme

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -57,7 +58,7 @@ namespace detail {
 
 /// How much wider than the true range the bounds of a slope may be [of the steepest]: what they are wider by is
 /// stiffness that is not rendered.
-inline constexpr double slope_slack = 0.002;
+inline constexpr double slope_slack = 1e-4;
 
 /// Proved bounds over [from, to] of a g' + b h' + c h, where h shares the wavelets of g.
 struct SlopeReading {
@@ -79,29 +80,7 @@ struct SlopeReading {
     slope_of.linear[0] = reading.of_force_slope * force.linear[0] + reading.of_loss_slope * loss.linear[0];
     value_of.linear[0] = reading.of_loss * loss.linear[0];
     value_of.bias = reading.of_loss * loss.bias;
-    const double c = slope_of.linear[0];
-    const double d = value_of.linear[0];
-    double absolute =
-        std::abs(c) + std::abs(value_of.bias) + std::abs(d) * std::max(std::abs(from), std::abs(to));
-    for (std::size_t i = 0; i < slope_of.weight.size(); ++i) {
-        absolute += std::abs(slope_of.weight[i]) * slope_of.alpha[i] * wavelet_slope_bound +
-                    std::abs(value_of.weight[i]);
-    }
-    const auto value = [&](double x) noexcept {
-        double sum = c + d * x + value_of.bias;
-        for (std::size_t i = 0; i < slope_of.weight.size(); ++i) {
-            const double alpha = slope_of.alpha[i];
-            const MexicanHat hat = mexican_hat(alpha * (x - slope_of.beta[i]));
-            sum += slope_of.weight[i] * alpha * hat.slope + value_of.weight[i] * hat.value;
-        }
-        return sum;
-    };
-    const auto rate = [&](double left, double right) noexcept {
-        const Interval bend = sum_of_ranges(slope_of, hat_curvature, 2, left, right);
-        const Interval tilt = sum_of_ranges(value_of, hat_slope, 1, left, right);
-        return Interval{bend.lower + tilt.lower + d, bend.upper + tilt.upper + d};
-    };
-    return with_rounding(enclose(from, to, relative, value, rate), absolute, force.weight.size());
+    return enclose(std::array{Term{slope_of, 1}, Term{value_of, 0}}, from, to, relative);
 }
 
 /// The slopes that a continuation can have: its line's, and none beyond its reach.
@@ -115,7 +94,7 @@ struct SlopeReading {
 /// is small beside its largest value.
 [[nodiscard]] inline Interval loss_bounds(const NetworkParameters& loss, double from, double to) {
     Interval bounds;
-    for (const double relative : {1e-2, 1e-4, 1e-6}) {
+    for (const double relative : {1e-4, 1e-6}) {
         bounds = value_bounds(loss, from, to, relative);
         if (bounds.lower >= 0.0) {
             break;

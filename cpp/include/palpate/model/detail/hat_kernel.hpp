@@ -127,6 +127,53 @@ PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, 
     }
 }
 
+/// Adds the sum of radial hats of several inputs at the projection of x onto the box to `value`, and its gradient,
+/// unless that is null, to `gradient`.
+PALPATE_TARGET inline void radial(const RadialColumns& of, const double* x, double& value,
+                                  double* gradient) noexcept {
+    constexpr std::size_t block = 64;  // a multiple of all lanes
+    const auto inputs = static_cast<double>(of.dimension);
+    const Lanes reach = Lanes{} + hat_reach;
+    double factors[block];  // of u in the gradient by u: w (d + 2 - r^2) E
+    Lanes values{};
+    for (std::size_t first = 0; first < of.size; first += block) {
+        const std::size_t count = of.size - first < block ? of.size - first : block;
+        for (std::size_t k = 0; k < count; k += PALPATE_LANES) {
+            Lanes square{};
+            Lanes weight, e;
+            for (std::size_t j = 0; j < of.dimension; ++j) {
+                Lanes alpha, beta;
+                load(alpha, of.alpha + j * of.size + first + k);
+                load(beta, of.beta + j * of.size + first + k);
+                const Lanes u = alpha * (of.projected(x, j) - beta);
+                square += u * u;
+            }
+            gaussian(square, e);
+            load(weight, of.weight + first + k);
+            const Lanes weighted = weight * e;
+            values += (square - inputs) * weighted;
+            const Lanes factor = (inputs + 2.0 - square) * weighted;
+            __builtin_memcpy(factors + k, &factor, sizeof(factor));
+        }
+        for (std::size_t j = 0; gradient != nullptr && j < of.dimension; ++j) {
+            const double at = of.projected(x, j);
+            Lanes along{};
+            for (std::size_t k = 0; k < count; k += PALPATE_LANES) {
+                Lanes alpha, beta, factor;
+                load(alpha, of.alpha + j * of.size + first + k);
+                load(beta, of.beta + j * of.size + first + k);
+                load(factor, factors + k);
+                Lanes u = alpha * (at - beta);
+                u = u > reach ? reach : u;
+                u = u < -reach ? -reach : u;
+                along += factor * alpha * u;
+            }
+            gradient[j] += total(along);
+        }
+    }
+    value += total(values);
+}
+
 /// e^{-s/2} for many s >= 0.
 PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
     for (std::size_t k = 0; k < n; k += PALPATE_LANES) {
@@ -145,8 +192,10 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
 }
 
 [[nodiscard]] inline HatKernel kernel() noexcept {
-    return {
-        at, {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>}, gaussians};
+    return {at,
+            {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},
+            radial,
+            gaussians};
 }
 
 }  // namespace PALPATE_KERNEL

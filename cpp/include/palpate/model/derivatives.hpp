@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "palpate/model/parameters.hpp"
+#include "palpate/model/wavelet.hpp"
+
+namespace palpate {
+
+/// Value and first three derivatives of a function at one position.
+using Jet = std::array<double, 4>;
+
+/// Value and first four derivatives.
+using Derivatives = std::array<double, 5>;
+
+/// Of a network of one input, without continuation.
+[[nodiscard]] inline Derivatives derivatives(const NetworkParameters& network, double x) noexcept {
+    const double c = network.linear[0];
+    Derivatives sum{c * x + network.bias, c, 0.0, 0.0, 0.0};
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        const double alpha = network.alpha[i];
+        const double u = std::clamp(alpha * (x - network.beta[i]), -wavelet_reach, wavelet_reach);
+        const double square = u * u;
+        double factor = network.weight[i] * std::exp(-0.5 * square);
+        sum[0] += factor * (square - 1.0);
+        sum[1] += (factor *= alpha) * (3.0 - square) * u;
+        sum[2] += (factor *= alpha) * ((square - 6.0) * square + 3.0);
+        sum[3] += (factor *= alpha) * ((10.0 - square) * square - 15.0) * u;
+        sum[4] += (factor *= alpha) * (((square - 15.0) * square + 45.0) * square - 15.0);
+    }
+    return sum;
+}
+
+[[nodiscard]] inline Jet jet(const NetworkParameters& network, double x) noexcept {
+    const Derivatives f = derivatives(network, x);
+    return {f[0], f[1], f[2], f[3]};
+}
+
+/// Highest derivative of f that `derivative_bounds` knows.
+inline constexpr std::size_t highest_derivative = 9;
+
+/// Bounds of |f|, |f'|, ... of a network of one input over [from, to].
+using DerivativeBounds = std::array<double, highest_derivative + 1>;
+
+namespace detail {
+
+/// Suprema of |psi^(n)|, rounded up. psi^(n) = He_{n+2} E up to its sign, so that for even n they stand at 0.
+inline constexpr DerivativeBounds hat_suprema{
+    1.0, wavelet_slope_bound, wavelet_curvature_bound, 5.7831, 15.0, 35.539, 105.0, 288.492, 945.0, 2913.41};
+
+/// Cramer's inequality, |He_n(u)| e^{-u^2/4} <= 1.0865 sqrt(n!): what is left of psi^(n) away from its centre
+/// is at most this times e^{-u^2/4}.
+inline constexpr DerivativeBounds hat_tails{1.5366,  2.6614,   5.3228,   11.9021,   29.1540,
+                                            77.1341, 218.1682, 654.5044, 2069.7211, 6864.48};
+
+/// What double precision makes of f^(n)(x), in units of epsilon times the sum of |w| alpha^n: the polynomial in
+/// u, the exponent u^2/2 and u itself are right to a few units each. Suprema over u of
+/// ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) E, P_n the polynomial of psi^(n) with absolute coefficients.
+inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
+
+}  // namespace detail
+
+/// What rounding may have cost `derivatives` anywhere in [-reach, reach].
+[[nodiscard]] inline Derivatives derivatives_rounding(const NetworkParameters& network,
+                                                      double reach) noexcept {
+    const double c = std::abs(network.linear[0]);
+    const double terms = 0.5 * static_cast<double>(network.weight.size() + 4);
+    Derivatives sum{(terms + 2.0) * (std::abs(network.bias) + c * reach), (terms + 2.0) * c, 0.0, 0.0, 0.0};
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        double factor = std::abs(network.weight[i]);
+        for (std::size_t n = 0; n < sum.size(); ++n) {
+            sum[n] += factor * (detail::hat_rounding[n] + terms * detail::hat_suprema[n]);
+            factor *= network.alpha[i];
+        }
+    }
+    for (double& rounding : sum) {
+        rounding *= std::numeric_limits<double>::epsilon();
+    }
+    return sum;
+}
+
+[[nodiscard]] inline Jet jet_rounding(const NetworkParameters& network, double reach) noexcept {
+    const Derivatives f = derivatives_rounding(network, reach);
+    return {f[0], f[1], f[2], f[3]};
+}
+
+/// Proved bounds of f and its first nine derivatives over [from, to]: the sum of what each wavelet can
+/// contribute at its distance. Coarser than `value_bounds` and `slope_bounds`, but without any search.
+[[nodiscard]] inline DerivativeBounds derivative_bounds(const NetworkParameters& network, double from,
+                                                        double to) noexcept {
+    const double c = std::abs(network.linear[0]);
+    DerivativeBounds bounds{std::abs(network.bias) + c * std::max(std::abs(from), std::abs(to)), c};
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        const double alpha = network.alpha[i];
+        const double beta = network.beta[i];
+        const double distance = alpha * std::max({from - beta, beta - to, 0.0});
+        const double decay = std::exp(-0.25 * std::min(distance * distance, 2800.0));
+        double factor = std::abs(network.weight[i]);
+        for (std::size_t n = 0; n <= highest_derivative; ++n) {
+            bounds[n] += factor * std::min(detail::hat_suprema[n], detail::hat_tails[n] * decay);
+            factor *= alpha;
+        }
+    }
+    for (double& bound : bounds) {
+        bound *= 1.0 + 1e-9;  // rounding of the sum of absolute terms
+    }
+    return bounds;
+}
+
+}  // namespace palpate

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Story 3: a switch is recorded, identified, rendered, recorded again. Also told in 03_there_and_back.cpp.
+
+python examples/03_there_and_back.py
+
+Everything here is simulated. With a real switch on a real knob the same is five commands:
+
+palpate record real.csv --device usb --probe --upper 0.3
+palpate identify real.csv -o real.json
+palpate-control real.json --device usb --uncertified --record rendered.csv
+palpate identify rendered.csv -o again.json
+palpate show real.json --beside again.json
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import palpate
+from palpate.planning import bench_for, force_at
+from palpate.verification import compare
+
+folder = tempfile.TemporaryDirectory()
+real_csv, rendered_csv = (Path(folder.name) / name for name in ("real.csv", "rendered.csv"))
+
+# 1. Obtain data: the switch of story 2 is pressed and let go four times, slowly, under a 16-bit encoder.
+switch = palpate.load_model(Path(__file__).with_name("02_click.json"))
+bench = bench_for(switch)
+time = np.arange(8000) * bench.device.period_s
+travel, step = switch.upper[0] - switch.lower[0], bench.device.encoder_step
+pressed = switch.lower[0] + travel * (0.5 - 0.5 * np.cos(np.pi * time))
+position = step * np.floor(pressed / step + 0.5)
+exact = palpate.Plan(switch, bench.scheme(switch, structure="direct"))
+palpate.Recording.from_arrays(
+    position, force_at(exact, position), time, units={"position": "rad", "force": "N*m"}
+).write(real_csv)
+
+# 2. Identify.
+real = palpate.identify(palpate.read_recording(real_csv))
+strokes = "press and release differ" if real.hysteretic else "one stroke"
+print(f"identified: {real.fit.n_wavelets} wavelets, {strokes}")
+
+# 3. Implement: rendered by a knob with nothing on it, in a hand that sweeps. The coupling softens the click.
+bench = bench_for(real)
+rendered = palpate.simulate(palpate.Plan(real, bench.scheme(real)), bench.device, bench.hand, 8.0)
+rendered.write(rendered_csv)
+
+# 4. Once more, from what was felt.
+again = palpate.identify(palpate.read_recording(rendered_csv))
+
+# 5. Compare: the largest difference between the real force and the rendered one, stroke by stroke.
+for stroke in compare(real, again):
+    difference, largest = np.max(np.abs(stroke.second - stroke.first)), np.max(np.abs(stroke.first))
+    print(f"{stroke.name or 'both ways'}: {difference:.3f} N*m apart, of {largest:.2f} N*m")
+folder.cleanup()

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate plan: the simplest structure that is certified for a model on a device."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .arguments import PATH, json_option, plot_option
+from .ending import WorkError
+from .figures import require_figure_name
+from .output import (
+    finishing,
+    number,
+    print_json,
+    print_numbers,
+    print_paragraph,
+    require_distinct,
+    require_writable,
+    talk,
+)
+from .verb import Verb
+
+if TYPE_CHECKING:
+    from .._core import Certificate, DeviceProfile
+    from ..planning import Plan
+
+
+def _list_examples(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
+    """Print every example profile with its file and its sources, and end."""
+    if not wanted:
+        return
+    from ..planning import example_profiles
+
+    for name, (file, sources) in example_profiles().items():
+        click.echo(f"{name}  {file}")
+        for paragraph in sources:
+            print_paragraph(paragraph, indent="  ")
+    ctx.exit()
+
+
+@click.command(
+    cls=Verb,
+    no_args_is_help=True,
+    epilog="Example: palpate plan press.json --device knob.toml -o press.json",
+)
+@click.argument("model_file", metavar="MODEL.json", type=PATH)
+@click.option(
+    "--device",
+    metavar="PROFILE.toml",
+    required=True,
+    help="Profile of the device, or the name of an example.",
+)
+@click.option("-o", "--output", type=PATH, metavar="OUT.json", default=None, help="Write model and plan.")
+@click.option("--coupling", is_flag=True, help="Render through a virtual coupling.")
+@click.option("--coupling-stiffness", type=float, default=None, help="K_c; chosen from the device.")
+@click.option("--coupling-damping", type=float, default=None, help="B_c; chosen from the device.")
+@click.option("--mass", type=float, default=None, help="m; the model's own. 0 leaves it out.")
+@click.option("--damping", type=float, default=None, help="B_o; the model's own. 0 leaves it out.")
+@click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
+@plot_option("the root locus of the explicit structure over its damping")
+@click.option(
+    "--examples",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_list_examples,
+    help="List the example profiles with their sources, and end.",
+)
+@json_option
+def plan(
+    model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
+) -> None:
+    """Choose how a model is rendered on a device, and prove what can be proved of it.
+
+    The simplest structure that is certified is taken: direct; direct with its slope limited to what the
+    device can render; massless behind a coupling; implicit; explicit, which is stable at best. Every refusal
+    says which inequality failed and by how much. Exit code 1: no structure holds, and nothing is written.
+    """
+    from ..model import load_model
+    from ..planning import DeviceProfile, profile_file
+    from ..planning.plan import plan as choose
+
+    profile_path = profile_file(device)
+    if plot is not None:
+        require_figure_name(plot)
+        require_writable(plot, inputs=(model_file, profile_path))
+    if output is not None:  # the model's own file may be written anew
+        require_writable(output, inputs=(profile_path,))
+    require_distinct(output, plot)
+    profile = DeviceProfile.load(profile_path)
+    model = load_model(model_file, with_plan=False)
+    talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
+    began = time.perf_counter()
+    chosen = choose(model, profile, **wishes)
+    seconds = time.perf_counter() - began
+    certificate = chosen.certificate
+    assert certificate is not None
+    if certificate.refused:
+        raise WorkError("no structure holds on this device: " + "; ".join(chosen.refused))
+    with finishing():
+        if output is not None:
+            chosen.stored().save(output)
+        if plot is not None:
+            _picture(plot, chosen, profile)
+        if as_json:
+            from ..model.certified import certificate_record
+
+            record = certificate_record(certificate)
+            felt, steepest = _felt_slopes(chosen, certificate)
+            slopes = {"steepest_slope": steepest, "felt_slope": felt}
+            print_json({"plan": chosen.record(), "certificate": record, **slopes, "seconds": seconds})
+        else:
+            _tell(chosen, certificate, seconds)
+
+
+def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
+    """The plan first, then what was refused on the way to it, then every inequality."""
+    scheme = plan.scheme
+    unit = plan.model.units["force"] or "in the model's unit"
+    rows = {"structure": plan.structure + (", compensated" if scheme.compensated else "")}
+    if plan.solver is not None:
+        rows["solver"] = plan.solver
+    if plan.structure != "direct":
+        rows["coupling"] = (
+            f"K_c = {number(scheme.coupling_stiffness)}, B_c = {number(scheme.coupling_damping)}"
+        )
+    if plan.structure not in ("direct", "massless"):
+        rows["object"] = f"m = {number(scheme.mass)}, B_o = {number(scheme.damping)}"
+    if scheme.play_radius:
+        rows["play radius"] = number(scheme.play_radius)
+    felt, steepest = _felt_slopes(plan, certificate)
+    if felt < steepest:
+        rows["softer"] = f"slopes up to {number(steepest)} are felt as up to {number(felt)}"
+    lost = plan.loss
+    rows["force lost"] = (
+        "none" if lost is None else f"up to {number(lost.largest)}, {number(lost.rms)} RMS ({unit})"
+    )
+    rows["verdict"] = certificate.verdict
+    rows["holds for"] = f"up to {number(1e3 * certificate.longest_period_s)} ms between two samples"
+    rows["planned in"] = f"{seconds:.1f} s"
+    print_numbers(rows)
+    if plan.refused:
+        click.echo("\nrefused")
+        for sentence in plan.refused:
+            print_paragraph(sentence, indent="  ")
+    click.echo("\ninequalities")
+    for line in certificate.inequalities:
+        word = "holds" if line.holds else "fails"
+        print_paragraph(f"{line.name}: {word}, {line.rests_on}", indent="  ")
+        print_paragraph(line.formula, indent="    ")
+        print_paragraph(
+            f"{number(line.left)} against {number(line.right)}, margin {number(line.margin)}", indent="    "
+        )
+    print_paragraph(certificate.why)
+
+
+def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
+    """The steepest slope that is felt, and that of the model: a coupling in between is soft.
+
+    Where it was taken out of the model, the certificate's bounds are of what is left.
+    """
+    from .._core import felt_slope
+
+    steepest = max(0.0, certificate.bounds.slope_max)
+    if plan.structure == "direct":
+        return steepest, steepest
+    felt = felt_slope(steepest, plan.scheme.coupling_stiffness)
+    return felt, felt if plan.scheme.compensated else steepest
+
+
+def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
+    """The locus of the plan's explicit structure, or of the one that the device would need."""
+    import numpy as np
+
+    from .._core import force_bounds
+    from ..planning.choices import explicit_scheme, usual_play_radius
+    from ..planning.root_locus import root_locus
+    from ..plotting import draw_root_locus
+    from .figures import figure_file
+
+    radius = usual_play_radius(plan.model, profile)
+    bounds = force_bounds(plan.model, radius)
+    scheme = plan.scheme
+    if plan.structure != "explicit":
+        scheme = explicit_scheme(
+            bounds,
+            profile,
+            mass=plan.model.mass,
+            damping=None,
+            coupling_stiffness=None,
+            coupling_damping=None,
+            play_radius=radius,
+        )
+    slopes = np.unique([max(bounds.slope_min, -0.9 * scheme.coupling_stiffness), bounds.slope_max])
+    units = plan.model.units
+    unit = f"{units['force']}/{units['position']}".replace("*", "\u00b7") if units["force"] else ""
+    with figure_file(path, height_inches=3.6) as (axes,):
+        locus = root_locus(scheme, slopes, profile.period_s)
+        draw_root_locus(axes, locus, damping=scheme.damping, slope_unit=unit)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the rungs of a ladder are made of and judged on: the rows of one recording in the unit box."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D, Float2D
+from .compression import Compressed, Compressor
+from .frame import resolved_frame
+from .fresh import FreshRows, gain
+from .growth import Grown, grow
+from .hysteresis_input import HysteresisInput
+from .options import IdentifyOptions
+from .rung import Rung
+from .selection import Library
+from .separable import Basis, SeparableProblem, problem_of
+from .stopping import ON_FRESH_ROWS
+
+
+class Evidence:
+    """Compressed rows, and the rows of the recording that are kept back to judge on.
+
+    Parameters
+    ----------
+    box : (n, d)
+        Positions in the unit box.
+    force : (n,)
+    fresh : (n,)
+        Rows that are kept back.
+    compressor : Compressor
+        Of the same rows.
+    options : IdentifyOptions
+    """
+
+    def __init__(
+        self,
+        box: Float2D,
+        force: Float1D,
+        fresh: NDArray[np.bool_],
+        compressor: Compressor,
+        options: IdentifyOptions,
+    ) -> None:
+        self.box, self.force = box, force
+        self._fresh, self._compressor, self._options = fresh, compressor, options
+        self._judges_on_fresh = options.criterion in ON_FRESH_ROWS
+
+    def rows(self, strokes: HysteresisInput | None = None) -> Compressed:
+        """Compressed rows: all of them, or those that are not kept back for the criterion.
+
+        Rows whose hysteresis input is unknown are stood for by the others, so that all rungs are judged on
+        as many.
+        """
+        only = ~self._fresh if self._judges_on_fresh else None
+        if strokes is None:
+            return self._compressor.rows(only=only)
+        rows = self._compressor.rows(strokes.side, strokes.known if only is None else only & strokes.known)
+        return rows if strokes.known.all() else rows.standing_for(self._compressor.samples(only))
+
+    def problem(self, rows: Compressed, strokes: HysteresisInput | None = None) -> SeparableProblem:
+        """Least squares over compressed rows."""
+        fresh = self.fresh_rows(strokes) if self._judges_on_fresh else None
+        return problem_of(rows, resolved_by=self._options.resolved_by, fresh=fresh)
+
+    def fresh_rows(
+        self, strokes: HysteresisInput | None, known: NDArray[np.bool_] | None = None
+    ) -> FreshRows:
+        """Rows that are kept back, of those whose hysteresis input is known."""
+        known = strokes.known if strokes is not None else known
+        rows = self._fresh if known is None else self._fresh & known
+        return FreshRows.of(self.box, self.force, None if strokes is None else strokes.side, rows)
+
+    def fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
+        """Fall of the squared error on fresh rows as a share, and its standard error."""
+        errors = []
+        known = None if above.strokes is None else above.strokes.known
+        for rung in (below, above):
+            kept = self._compressor.rows(rung.side, ~self._fresh if known is None else ~self._fresh & known)
+            problem = problem_of(kept, resolved_by=self._options.resolved_by)
+            errors.append(rung.fresh_errors(problem, self.fresh_rows(rung.strokes, known)))
+        return gain(*errors)
+
+    def grown(
+        self,
+        rows: Compressed,
+        strokes: HysteresisInput | None,
+        name: str,
+        start: Basis,
+        options: IdentifyOptions,
+    ) -> tuple[SeparableProblem, Grown]:
+        """A network grown from the wavelets of start, and the problem that it solves."""
+        problem = self.problem(rows, strokes)
+        library = Library(problem, resolved_frame(problem, options))
+        return problem, grow(problem, library, start, name, options)

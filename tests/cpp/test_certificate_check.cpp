@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a certificate that stood in a file is believed: nothing, and bounds that are wider than necessary.
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/stability/certificate_check.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+ForceModel hysteretic() {
+    test::Random random{5};
+    const NetworkParameters network = test::random_network(random, 4);
+    LossParameters loss;
+    loss.weight.assign(4, 0.0);
+    loss.bias = 0.05;
+    return {network, loss, test::unit_domain(), 0.02};
+}
+
+Scheme direct() {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    return scheme;
+}
+
+/// Enough of everything for any of the models here.
+DeviceProfile strong() {
+    DeviceProfile device;
+    device.viscous_damping = 1e4;
+    device.coulomb_friction = 1e4;
+    device.jitter_s = 1e-4;
+    return device;
+}
+
+/// What would stand in a file if the bounds had been these: every line follows from them.
+Certificate with_bounds(const Certificate& certificate, const std::function<void(ForceBounds&)>& change) {
+    ForceBounds bounds = certificate.bounds;
+    change(bounds);
+    Certificate changed = certify_rendered(bounds, certificate.scheme, certificate.device);
+    changed.model = certificate.model;
+    return changed;
+}
+
+const std::vector<std::pair<std::string, std::function<void(ForceBounds&, double)>>> wider{
+    {"slope_min", [](ForceBounds& b, double by) { b.slope.lower -= by; }},
+    {"slope_max", [](ForceBounds& b, double by) { b.slope.upper += by; }},
+    {"steepest", [](ForceBounds& b, double by) { b.steepest += by; }},
+    {"sliding", [](ForceBounds& b, double by) { b.sliding += by; }},
+    {"loss_min", [](ForceBounds& b, double by) { b.loss.lower -= by; }},
+    {"loss_max", [](ForceBounds& b, double by) { b.loss.upper += by; }},
+    {"loss_per_play", [](ForceBounds& b, double by) { b.loss_per_play += by; }},
+    {"mean_force", [](ForceBounds& b, double by) { b.mean_force += by; }},
+};
+
+TEST(CertificateCheck, BelievesWhatItWouldSayItself) {
+    const ForceModel model = hysteretic();
+    EXPECT_EQ(disagreement(certify(model, direct(), strong()), model), "");
+}
+
+// An older release bounded less sharply: what it proved is still true.
+TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter) {
+    const ForceModel model = hysteretic();
+    const Certificate certificate = certify(model, direct(), strong());
+    ASSERT_TRUE(certificate.certified()) << certificate.why;
+    for (const auto& [name, widen] : wider) {
+        const auto by = [&widen = widen](double amount) {
+            return [&widen, amount](ForceBounds& bounds) { widen(bounds, amount); };
+        };
+        EXPECT_EQ(disagreement(with_bounds(certificate, by(1e-3)), model), "") << name;
+        if (name != "mean_force") {  // of which there is none to understate
+            const std::string wrong = disagreement(with_bounds(certificate, by(-1e-3)), model);
+            EXPECT_EQ(wrong.rfind("certificate.bounds." + name + " is ", 0), 0U) << name << ": " << wrong;
+        }
+    }
+}
+
+TEST(CertificateCheck, TakesNoBoundThatIsNotANumber) {
+    const ForceModel model = hysteretic();
+    const Certificate certificate = certify(model, direct(), strong());
+    for (const double none :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+        for (const auto& [name, widen] : wider) {
+            const Certificate changed =
+                with_bounds(certificate, [&widen = widen, none](ForceBounds& b) { widen(b, none); });
+            EXPECT_NE(disagreement(changed, model), "") << name;
+        }
+    }
+    EXPECT_FALSE(agree(1.0, std::numeric_limits<double>::infinity()));
+    EXPECT_FALSE(agree(std::numeric_limits<double>::quiet_NaN(), 1.0));
+}
+
+// Wider bounds, and the lines of the tighter ones: the lines are what is proved, and they follow from the bounds.
+TEST(CertificateCheck, RefusesLinesThatAreNotThoseOfTheStoredBounds) {
+    const ForceModel model = hysteretic();
+    Certificate certificate = certify(model, direct(), strong());
+    certificate.bounds.slope.upper += 1.0;
+    const std::string wrong = disagreement(certificate, model);
+    EXPECT_EQ(wrong.rfind("certificate.inequalities[1].right is ", 0), 0U) << wrong;
+}
+
+TEST(CertificateCheck, RefusesAWideBoundThatProvesNothingAnyMore) {
+    const ForceModel model = hysteretic();
+    const Certificate certificate = certify(model, direct(), strong());
+    Certificate weak = with_bounds(certificate, [](ForceBounds& bounds) { bounds.slope.upper = 1e9; });
+    weak.verdict = Verdict::Certified;
+    const std::string wrong = disagreement(weak, model);
+    EXPECT_EQ(wrong.rfind("certificate.verdict is ", 0), 0U) << wrong;
+}
+
+TEST(CertificateCheck, NamesTheFirstFieldOfADeviceThatIsAnother) {
+    const DeviceProfile device = strong();
+    EXPECT_EQ(device_difference(device, device), "");
+    const auto difference = [&](const std::function<void(DeviceProfile&)>& change) {
+        DeviceProfile other = device;
+        change(other);
+        return device_difference(device, other);
+    };
+    const auto names = [](const std::string& sentence, const char* field) {
+        return sentence.find(field) != std::string::npos;
+    };
+    EXPECT_TRUE(names(difference([](auto& d) { d.id = "other"; }), "this is other"));
+    EXPECT_TRUE(names(difference([](auto& d) { d.period_s *= 1.001; }), "period_s"));
+    EXPECT_TRUE(names(difference([](auto& d) { d.viscous_damping *= 1.001; }), "viscous_damping"));
+    EXPECT_TRUE(names(difference([](auto& d) { d.delay_samples = 1; }), "delay_samples"));
+    EXPECT_TRUE(names(difference([](auto& d) { d.position_unit = "m"; }), "in rad"));
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate check-device: what is seen of a device, and that nothing is pushed where a sign is wrong."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conftest import ROOT
+from palpate import DeviceProfile, InputError, load_model
+from palpate.devices import Check, check, check_device, judge, push_response
+from usb_emulation import emulated, frames, needs_emulation
+
+SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
+STEP = 2 * np.pi / 65536
+SHARE_OF_FORCE = 0.005
+
+
+def heard(**changed: Any) -> dict[str, Any]:
+    """What `measure` says of a faultless device in a hand against a spring, for `judge`."""
+    time = 1e-3 * np.arange(2000)
+    moves = np.where(time > 0.5, 0.2 * (1.0 - np.cos(2 * np.pi * (time - 0.5))), 0.0)
+    position = STEP * np.round(moves / STEP)
+    ticks = {
+        "position": position,
+        "velocity": np.gradient(moves, time),
+        "measured": 3.0 * moves,
+        "device_time": time,
+        "sequence": np.arange(2000, dtype=np.uint64),
+    }
+    ticks.update({key: changed.pop(key) for key in list(changed) if key in ticks})
+    percentiles = {"p50_us": 1000.0, "p99_us": 1010.0, "p999_us": 1020.0, "max_us": 1030.0}
+    profile = DeviceProfile(id="knob", period_s=1e-3, encoder_step=STEP)
+    return {
+        "device": "knob",
+        "kept": ticks,
+        "profile": profile,
+        "wanted_rate_hz": 1000.0,
+        "rate_hz": 1000.0,
+        "period": percentiles,
+        "ticks": 2000,
+        "lost_samples": 0,
+        "repeated_samples": 0,
+        "orderly": True,
+        "ended": "ran its time",
+        "transducer": True,
+        "round_trip": percentiles,
+        "delay": percentiles,
+        **dict.fromkeys(("malformed", "stalls", "bus_errors", "timeouts", "skipped_commands"), 0),
+        **changed,
+    }
+
+
+def finding(found: Check, name: str) -> Any:
+    return next(one for one in found.findings if one.name == name)
+
+
+def test_a_faultless_device_is_ok_and_all_numbers_are_told() -> None:
+    found = judge(heard())
+    assert found.verdict == "OK: knob is fit to render force"
+    assert found.may_push
+    assert {one.name for one in found.findings} >= {
+        "rate",
+        "period",
+        "round trip",
+        "samples",
+        "encoder",
+        "delay",
+    }
+    assert found.numbers["delay_samples"] == 1
+    assert found.numbers["round_trip_p99_us"] == 1010.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "name", "forbids"),
+    [
+        ({"rate_hz": 480.0}, "rate", False),
+        ({"period": {"p50_us": 1e3, "p99_us": 2e3, "p999_us": 5e3, "max_us": 9e3}}, "period", False),
+        ({"device_time": 2.08e-3 * np.arange(2000)}, "clock of the device", False),
+        ({"lost_samples": 30}, "samples", False),
+        ({"repeated_samples": 30}, "samples", False),
+        ({"stalls": 1}, "wire", False),
+        ({"orderly": False, "ended": "stopped by a fault"}, "stream", True),
+        ({"measured": -3.0 * heard()["kept"]["position"]}, "sign of the transducer", True),
+        ({"velocity": -heard()["kept"]["velocity"]}, "sign of the velocity", True),
+        (
+            {
+                "position": heard()["kept"]["position"]
+                + STEP * np.random.default_rng(1).normal(0.0, 9.0, 2000)
+            },
+            "encoder",
+            True,
+        ),
+    ],
+)
+def test_what_is_wrong_is_named_and_forbids_force_where_it_must(
+    changed: dict[str, Any], name: str, forbids: bool
+) -> None:
+    found = judge(heard(**changed))
+    wrong = finding(found, name)
+    assert wrong.right is False
+    assert found.verdict.startswith(f"NOT SUITABLE: knob: {name}: ")
+    assert wrong.advice in found.verdict
+    assert found.may_push is not forbids
+
+
+@pytest.mark.parametrize("what", ["measured", "velocity"])
+def test_a_flipped_sign_is_caught_before_any_force(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[dict[str, Any]] = []
+
+    def measured(device: str, **settings: Any) -> dict[str, Any]:
+        calls.append(settings)
+        return heard(**{what: -heard()["kept"][what]})
+
+    monkeypatch.setattr(check, "measure", measured)
+    found = check_device(push=True)
+    assert not found.suitable
+    assert all("push" not in settings for settings in calls)
+    assert finding(found, "sign of the force").told == "not looked at: what was heard forbids any force"
+
+
+def pushed(
+    obeys: float = 1.0, says: float = 1.0, moves: Callable[[np.ndarray], np.ndarray] | None = None
+) -> dict[str, np.ndarray]:
+    """Ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
+    sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
+    sent[np.arange(2000) % 200 >= 170] = 0.025
+    sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
+    x = 0.0
+    for k in range(1, 2000):
+        for _ in range(20):
+            speed += 5e-5 / 2e-4 * (-obeys * sent[k - 1] - 0.06 * speed)
+            x += 5e-5 * speed
+        position[k] = x
+    time = 1e-3 * np.arange(2000)
+    position += moves(time) if moves is not None else 0.0
+    return {
+        "force": sent,
+        "applied": says * np.concatenate(([0.0], sent[:-1])),
+        "position": STEP * np.round(position / STEP),
+        "device_time": time,
+        "sequence": np.arange(2000, dtype=np.uint64),
+    }
+
+
+def test_pushes_show_sign_delay_and_mechanics() -> None:
+    push = push_response(pushed())
+    assert push.moved > 10 * push.unsure
+    assert push.obeyed
+    assert push.delay_samples == 0
+    assert push.inertia == pytest.approx(2e-4, rel=0.02)
+    assert push.damping == pytest.approx(0.06, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("ticks", "told"),
+    [
+        (pushed(), "right: "),
+        (pushed(obeys=-1.0), "flipped: a push moved the handle by -"),
+        (pushed(obeys=-1.0, says=-1.0), "flipped: a push moved the handle by -"),
+        (pushed(says=-1.0), "flipped: the device says that it makes the opposite"),
+        (pushed(obeys=0.0), "not seen: "),
+        (
+            pushed(moves=lambda t: 0.3 * np.sin(2 * np.pi * 4.0 * t) * np.sin(2 * np.pi * 1.3 * t)),
+            "not seen: ",
+        ),
+        (pushed(moves=lambda t: 0.5 * t), "right: "),
+    ],
+    ids=["right", "motor", "firmware", "report", "no motor", "a hand", "drift"],
+)
+def test_the_sign_of_the_force_is_what_moved_the_handle(ticks: dict[str, np.ndarray], told: str) -> None:
+    found = check.with_pushes(judge(heard()), push_response(ticks))
+    assert finding(found, "sign of the force").told.startswith(told)
+    assert found.suitable is not told.startswith("flipped")
+
+
+def test_a_check_without_pushes_says_that_the_sign_of_the_force_was_not_seen() -> None:
+    found = check_device(duration_s=2.0)
+    assert finding(found, "sign of the force").right is None
+    if found.suitable:  # as far as this machine is punctual
+        assert found.verdict.endswith("not seen: sign of the force")
+
+
+def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
+    profile = DeviceProfile()
+    found = check_device(duration_s=4.0, push=True, profile=profile)
+    assert finding(found, "sign of the force").right
+    measured = found.profile()
+    assert measured.inertia == pytest.approx(profile.inertia, rel=0.05)
+    assert measured.viscous_damping == pytest.approx(profile.viscous_damping, rel=0.3)
+    assert measured.delay_samples == profile.delay_samples
+    path = measured.save(tmp_path / "knob.toml")
+    assert DeviceProfile.load(path).encoder_step == measured.encoder_step
+
+
+@pytest.mark.parametrize(
+    ("changed", "wrong"),
+    [
+        ({"period_s": 0.5e-3}, "its period gets "),
+        ({"encoder_step": 1e-5}, "its encoder step is "),
+        ({"force_limit": 9.0}, "its largest force is 5, 9 is counted on"),
+    ],
+)
+def test_a_profile_that_promises_more_than_the_device_keeps_does_not_hold(
+    changed: dict[str, float], wrong: str
+) -> None:
+    found = check_device(duration_s=2.0, profile=DeviceProfile(**changed))
+    assert finding(found, "profile").right is False
+    assert wrong in finding(found, "profile").told
+
+
+def test_a_model_without_a_certificate_cannot_be_held_against_a_device() -> None:
+    with pytest.raises(InputError, match="the model has no certificate; make one with `palpate plan`"):
+        check_device(duration_s=2.0, model=load_model(SPRING))
+    with pytest.raises(InputError, match=r"duration_s is 1, must be at least 2"):
+        check_device(duration_s=1.0)
+
+
+def checked(*words: Any, device: list[str], seconds: float = 3.0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "palpate", "check-device", "--device", "usb", "--duration-s", seconds]
+    return emulated(*command, "--wait-ms", 2000, "--json", *words, device=["--lock-step", *device])
+
+
+def told_of(answer: subprocess.CompletedProcess[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    assert answer.returncode in (0, 1), answer.stderr
+    result = json.loads(answer.stdout)
+    return result, {one["name"]: one for one in result["findings"]}
+
+
+@needs_emulation
+def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> None:
+    profile, trace = tmp_path / "knob.toml", tmp_path / "trace.csv"
+    answer = checked(
+        "--push", "--yes", "--write-profile", profile, device=["--no-hand", "--trace", str(trace)]
+    )
+    result, findings = told_of(answer)
+    assert findings["sign of the force"]["right"], answer.stdout
+    assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
+    assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
+    assert result["delay_p50_us"] == pytest.approx(1000.0, rel=0.02)
+    assert result["delay_samples"] in (1, 2)  # that of the latest in a thousand: the machine may be busy
+    assert result["round_trip_p50_us"] > 0.0
+    assert (result["lost_samples"], result["repeated_samples"]) == (0, 0)
+    written = DeviceProfile.load(profile)
+    assert (written.id, written.force_limit) == ("EMU-1", 5.0)
+    assert written.delay_samples == result["delay_samples"]
+    felt = frames(trace)
+    assert max(abs(frame.torque) for frame in felt) <= 1.001 * SHARE_OF_FORCE * 5.0
+    assert felt[-1].torque == 0.0
+    assert not felt[-1].enabled
+
+
+@needs_emulation
+@pytest.mark.parametrize(("hand", "seconds"), [(["--no-hand"], 2.0), ([], 6.0)], ids=["free", "held"])
+def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
+    hand: list[str], seconds: float, tmp_path: Path
+) -> None:
+    trace = tmp_path / "trace.csv"
+    answer = checked("--push", "--yes", device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
+    result, findings = told_of(answer)
+    assert answer.returncode == 1
+    assert findings["sign of the force"]["right"] is False
+    assert "sign of the force: flipped" in result["verdict"]
+    assert "do not enable force" in result["verdict"]
+    assert max(abs(frame.torque) for frame in frames(trace)) <= 1.001 * SHARE_OF_FORCE * 5.0
+
+
+@needs_emulation
+def test_a_device_that_is_only_listened_to_is_never_enabled(tmp_path: Path) -> None:
+    trace = tmp_path / "trace.csv"
+    answer = checked(device=["--spring", "3", "--flipped", "--trace", str(trace)])
+    _, findings = told_of(answer)
+    assert findings["sign of the transducer"]["right"]
+    assert findings["sign of the velocity"]["right"]
+    assert findings["sign of the force"]["right"] is None
+    assert not any(frame.enabled for frame in frames(trace))
+
+
+@needs_emulation
+def test_pushing_asks_first() -> None:
+    answer = checked("--push", device=["--no-hand"])
+    assert answer.returncode == 2
+    assert "--push moves the handle; at no terminal it needs --yes" in answer.stdout

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate-control on a Haply Inverse3: a real WebSocket, and a server of the documented messages."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("websockets")
+
+from conftest import ROOT
+from control_program import PATIENT, control, needs_program
+from inverse3_service import Service, serving
+from palpate import read_recording
+
+pytestmark = needs_program
+
+STIFFNESS = 100.0
+MODEL = ROOT / "tests" / "models" / "good" / "spring.json"
+
+
+@pytest.fixture
+def spring(tmp_path: Path) -> Path:
+    """A spring of 100 N/m over 20 mm."""
+    model = json.loads(MODEL.read_text(encoding="utf-8"))
+    model["units"] = {"position": "m", "force": "N"}
+    model["network"]["linear"] = [STIFFNESS]
+    model["domain"] = {"lower": [0.0], "upper": [0.02]}
+    model["slope_bounds"] = {"min": STIFFNESS, "max": STIFFNESS}
+    path = tmp_path / "spring.json"
+    path.write_text(json.dumps(model), encoding="utf-8")
+    return path
+
+
+@contextmanager
+def rendered(
+    model: Path, *words: Any, axis: str = ":z", service: Service | None = None
+) -> Iterator[tuple[subprocess.CompletedProcess[str], Service]]:
+    with serving(service or Service()) as served:
+        device = ["--device", f"inverse3{axis}@{served.port}", "--uncertified", *PATIENT, "--priority", 0]
+        yield control(model, *device, *words), served
+
+
+def test_a_spring_is_rendered_along_one_axis_and_pushes_back(spring: Path, tmp_path: Path) -> None:
+    out = tmp_path / "felt.csv"
+    words = ["--structure", "direct", "--duration-s", 1, "--record", out, "--json"]
+    with rendered(spring, *words) as (answer, service):
+        assert answer.returncode == 0, answer.stderr
+    summary = json.loads(answer.stdout)
+    assert summary["inverse3"] == {"force_gate": 0.3, "damping": 0.5}
+    assert "(the service's force gate 0.3, damping 0.5), uncertified, at 1000 Hz" in answer.stderr
+    recording = read_recording(out)
+    assert recording.units == {"position": "m", "force": "N"}
+    assert recording.metadata["service"] == "force gate 0.3, damping 0.5"
+    assert recording.position.max() > 0.003
+    late = slice(300, None)
+    felt = STIFFNESS * recording.position[late]
+    assert recording.force[late] == pytest.approx(felt, abs=1e-6)
+    # Along the axis only, out of the object, and nothing any longer at the end.
+    assert all(force["x"] == force["y"] == 0.0 for force in service.forces)
+    assert min(force["z"] for force in service.forces) < -0.2
+    assert service.forces[-1]["z"] == 0.0
+    assert service.closed
+
+
+def test_the_first_message_alone_names_the_program_and_sends_no_force(spring: Path) -> None:
+    with rendered(spring, "--duration-s", 0.1, "--json") as (answer, service):
+        assert answer.returncode == 0, answer.stderr
+    ticks = json.loads(answer.stdout)["ticks"]
+    first, *others = service.messages
+    assert first["session"] == {"configure": {"profile": {"name": "palpate"}}}
+    assert first["inverse3"][0]["device_id"] == "049D"
+    assert service.forces[0] == {"x": 0.0, "y": 0.0, "z": 0.0}
+    assert all(set(message) == {"inverse3"} for message in others)
+    assert (
+        ticks <= len(others) <= ticks + 2
+    )  # one message a tick, since the host paces; the last ones are zero
+
+
+def test_an_axis_may_point_the_other_way(spring: Path) -> None:
+    with rendered(spring, "--duration-s", 0.6, axis=":-z", service=Service(sweep=-0.01)) as (answer, service):
+        assert answer.returncode == 0, answer.stderr
+    assert max(force["z"] for force in service.forces) > 0.2
+
+
+@pytest.mark.parametrize(
+    ("service", "ended"),
+    [
+        (Service(unplug_after=300), "fault of the device"),
+        (Service(close_after=300), "fault of the device"),
+        (Service(garbage_after=300), "fault of the device"),
+        (Service(silent_after=300), "Timeout"),
+        (Service(force_key="values"), "fault of the device"),
+    ],
+    ids=["unplugged", "closed", "garbage", "silent", "force unheeded"],
+)
+def test_a_fault_ends_the_run_with_a_record(
+    spring: Path, tmp_path: Path, service: Service, ended: str
+) -> None:
+    out = tmp_path / "felt.csv"
+    with rendered(spring, "--duration-s", 2, "--record", out, service=service) as (answer, _):
+        assert answer.returncode == 1, answer.stderr
+    assert ended in answer.stderr
+    assert "zero force sent, device closed" in answer.stderr
+    assert out.exists()
+    assert service.closed
+
+
+@pytest.mark.parametrize(
+    ("service", "reason"),
+    [
+        (Service(devices=0), "sees no Inverse3: plug it in"),
+        (Service(calibrated=False), "Inverse3 049D is not calibrated"),
+    ],
+    ids=["no device", "not calibrated"],
+)
+def test_what_cannot_be_used_is_refused_with_its_cure(spring: Path, service: Service, reason: str) -> None:
+    with rendered(spring, service=service) as (answer, _):
+        assert answer.returncode == 2
+    assert reason in answer.stderr
+    assert not service.messages
+
+
+@pytest.mark.parametrize(
+    ("device", "reason"),
+    [
+        ("inverse3:w", "must be inverse3[:AXIS[@PORT]], AXIS of x, y, z, -x, -y, -z"),
+        ("inverse3:z@0", "must be inverse3[:AXIS[@PORT]]"),
+        ("inverse3:", "--device is 'inverse3:', must be simulated, usb[:SERIAL] or inverse3"),
+        ("inverse3:z@1", "no Haply Inverse Service answers at 127.0.0.1:1 (Connection refused)"),
+    ],
+)
+def test_a_device_that_is_not_there_is_refused(spring: Path, device: str, reason: str) -> None:
+    answer = control(spring, "--device", device, "--uncertified")
+    assert answer.returncode == 2
+    assert reason in answer.stderr
+
+
+def test_a_certificate_or_the_risk_typed_in_full_is_needed(spring: Path) -> None:
+    with serving(Service()) as service:
+        answer = control(spring, "--device", f"inverse3@{service.port}")
+        assert answer.returncode == 2
+        assert "or inverse3[:AXIS[@PORT]]" in answer.stderr
+        answer = control(spring, "--device", f"inverse3:z@{service.port}")
+        assert answer.returncode == 2
+        assert "has no certificate" in answer.stderr
+        answer = control(MODEL, "--device", f"inverse3:z@{service.port}", "--uncertified")
+        assert answer.returncode == 2
+        assert "an Inverse3 moves along a line: it takes models in m and N" in answer.stderr
+    assert all(force == {"x": 0.0, "y": 0.0, "z": 0.0} for force in service.forces)

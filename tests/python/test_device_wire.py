@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""GET_INFO as Python reads it: strictly, and every refusal says what it is about."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import pytest
+
+from palpate import InputError
+from palpate.devices import decode_info
+
+RIGHT: dict[str, Any] = {
+    "magic": ord("I"),
+    "version": 1,
+    "firmware": 0x0203,
+    "counts": 4096,
+    "torque": 250_000,
+    "rate": 1000,
+    "watchdog": 20,
+    "capabilities": 1,
+    "in_size": 32,
+    "out_size": 16,
+    "dof": 1,
+    "reserved": 0,
+    "uid": 7,
+}
+
+
+def info(**changed: Any) -> bytes:
+    return struct.pack("<BBHIiHHIBBBBQ", *{**RIGHT, **changed}.values())
+
+
+def test_what_a_device_says_comes_in_si_units() -> None:
+    read = decode_info(info())
+    assert (read.max_torque, read.rate_hz, read.watchdog_ms) == (0.25, 1000, 20)
+    assert read.encoder_step == pytest.approx(2 * 3.14159265358979 / 4096)
+    assert (read.transducer, read.measures_velocity) == (True, False)
+
+
+@pytest.mark.parametrize("size", [0, 31, 33])
+def test_another_size_is_refused(size: int) -> None:
+    with pytest.raises(InputError, match=f"has {size} bytes, must have 32"):
+        decode_info(bytes(size))
+
+
+@pytest.mark.parametrize(
+    ("changed", "sentence"),
+    [
+        ({"magic": ord("H")}, "begins with 0x48, must begin with 'I'"),
+        ({"version": 2}, "version is 2, must be 1"),
+        ({"in_size": 64}, "in_size is 64, must be 32"),
+        ({"out_size": 0}, "out_size is 0, must be 16"),
+        ({"dof": 3}, "dof is 3, must be 1"),
+        ({"reserved": 1}, "the reserved byte is 1, must be 0"),
+        ({"capabilities": 4}, "capabilities beyond bits 0 and 1 is 4, must be 0"),
+        ({"counts": 0}, "counts_per_rev is 0, must be > 0"),
+        ({"torque": -1}, "max_torque_uNm is -1, must be > 0"),
+        ({"rate": 0}, "rate_hz is 0, must be > 0"),
+        ({"watchdog": 0}, "watchdog_ms is 0, must be > 0"),
+    ],
+)
+def test_what_no_device_of_this_protocol_says_is_refused(changed: dict[str, int], sentence: str) -> None:
+    with pytest.raises(InputError, match="the answer to GET_INFO") as caught:
+        decode_info(info(**changed))
+    assert sentence in str(caught.value)

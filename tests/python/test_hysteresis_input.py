@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hysteresis from a motion whose beginning nobody saw."""
+
+import os
+
+import numpy as np
+import pytest
+
+from palpate import InputError, identify, verify
+from palpate.identification.compression import Compressor
+from palpate.identification.hysteresis_input import HysteresisInput
+from palpate.recording import Recording
+from palpate.verification import compare
+
+RADIUS = 0.0137
+MOTIONS = 20 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
+
+
+def wandering(n: int, seed: int) -> np.ndarray:
+    """A motion in [0, 1] that turns at random places, starting anywhere."""
+    rng = np.random.default_rng(seed)
+    turns = rng.uniform(0.0, 1.0, n // 200 + 2)
+    return np.interp(np.arange(n) / 200.0, np.arange(len(turns)), turns)
+
+
+def test_where_the_input_is_known_no_history_before_the_motion_changes_it() -> None:
+    rng = np.random.default_rng(3)
+    for seed in range(MOTIONS):
+        motion, radius = wandering(1500, seed), float(rng.uniform(0.001, 0.3))
+        one = HysteresisInput.of_play([motion], radius, [float(rng.uniform(-1, 1))])
+        other = HysteresisInput.of_play([motion], radius, [float(rng.uniform(-1, 1))])
+        assert np.array_equal(one.known, other.known)
+        np.testing.assert_allclose(one.side[one.known], other.side[other.known], atol=1e-12)
+        edge = HysteresisInput.of_play([motion], radius, [1.0])
+        far = HysteresisInput.of_play([motion], radius, [-1.0])
+        first = int(np.argmax(edge.known))
+        if first:  # and not one row is left out for nothing
+            assert edge.side[first - 1] != pytest.approx(far.side[first - 1], abs=1e-9)
+
+
+def test_of_a_force_linear_in_the_input_cells_leave_nothing_unexplained() -> None:
+    x = np.round(wandering(20_000, 5) * 400) / 400
+    strokes = HysteresisInput.of_play([x], RADIUS)
+    force = np.sin(5 * x) + strokes.side * (0.3 + 0.2 * x)
+    rows = Compressor(x[:, None], force, max_positions=1000).rows(strokes.side)
+    assert len(rows.force) < 0.5 * len(force)
+    assert np.sqrt(rows.within / rows.samples) < 1e-3 * np.std(strokes.side * 0.3)
+
+
+def test_a_play_radius_between_those_that_are_tried_is_measured() -> None:
+    x = wandering(20_000, 1)
+    side = HysteresisInput.of_play([x], RADIUS, [-0.6]).side
+    noise = np.random.default_rng(2).normal(0.0, 0.005, len(x))
+    force = np.tanh(6 * (x - 0.5)) + side * (0.2 + 0.1 * x) + noise
+    recording = Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x)))
+    model = identify(recording)
+    assert model.play_radius == pytest.approx(RADIUS, rel=0.01)
+    assert verify(model, recording).rmse < 1.1 * 0.005
+
+
+def test_models_of_several_inputs_are_not_laid_beside_each_other() -> None:
+    rng = np.random.default_rng(0)
+    X = rng.uniform(0.0, 1.0, (400, 2))
+    recording = Recording.from_arrays(X[:, 0], X.sum(axis=1), inputs={"temperature": X[:, 1]})
+    model = identify(recording, inputs=("position", "temperature"))
+    with pytest.raises(InputError, match="several inputs"):
+        compare(model, model)

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Device profiles, the ladder of the plan, its certificate in the model file, and the verb."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
+from palpate.cli.main import main
+from palpate.model.certified import device_record
+from palpate.planning import example_profiles, profile_file
+from palpate.planning.root_locus import root_locus
+from test_planning import keyswitch_by_hand, model_by_hand
+
+KNOB = DeviceProfile(id="knob", coulomb_friction=0.005, jitter_s=1e-4)
+WEAK = DeviceProfile(id="weak knob", viscous_damping=0.003, coulomb_friction=0.005)
+SMOOTH = DeviceProfile(id="smooth knob", encoder_step=0.0)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    model_by_hand().save("m.json")
+    KNOB.save("knob.toml")
+    WEAK.save("weak.toml")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", example_profiles())
+def test_every_example_loads_under_its_name_and_says_where_its_numbers_are_from(name: str) -> None:
+    file, sources = example_profiles()[name]
+    assert DeviceProfile.load(file).id == name
+    assert profile_file(name) == file
+    told = " ".join(sources)
+    assert "data sheet" in told or "EVERY NUMBER IS AN ASSUMPTION" in told
+
+
+def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
+    again = DeviceProfile.load(KNOB.save(tmp_path / "knob.toml"))
+    assert device_record(again) == device_record(KNOB)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("period_s", "-1e-3", "period_s is -0.001"),
+        ("period_s", "nan", "period_s is nan"),
+        ("inertia", "0.0", "inertia is 0"),
+        ("viscous_damping", "-0.1", "viscous_damping is -0.1"),
+        ("coulomb_friction", "inf", "coulomb_friction is inf"),
+        ("encoder_step", "-1e-6", "encoder_step is -1e-06"),
+        ("force_step", '"fine"', "force_step is 'fine', must be a number"),
+        ("delay_samples", "1.5", "delay_samples is 1.5, must be a whole number"),
+        ("delay_samples", "17", "delay_samples is 17"),
+        ("force_limit", "0", "force_limit is 0"),
+        ("position_unit", '"deg"', "position_unit is 'deg'"),
+        ("colour", "1", "colour is not a field of a device profile"),
+        ("inertia", None, "inertia is missing"),
+        ("id", None, "id is missing"),
+    ],
+)
+def test_what_no_device_can_have_is_refused_with_file_and_field(
+    tmp_path: Path, field: str, value: str | None, sentence: str
+) -> None:
+    path = KNOB.save(tmp_path / "knob.toml")
+    kept = [line for line in path.read_text("utf-8").splitlines() if not line.startswith(f"{field} =")]
+    path.write_text("\n".join([*kept, *([] if value is None else [f"{field} = {value}"])]), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        DeviceProfile.load(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert sentence in str(refused.value)
+
+
+def test_the_simplest_structure_that_holds_is_taken() -> None:
+    chosen = plan(model_by_hand(), KNOB)
+    assert (chosen.structure, chosen.refused, chosen.loss) == ("direct", (), None)
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+
+
+def test_a_weak_device_gets_a_force_whose_slope_it_holds_and_is_told_the_loss() -> None:
+    model = model_by_hand()
+    chosen = plan(model, WEAK)
+    assert chosen.structure == "direct"
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert chosen.loss is not None
+    assert chosen.refused[0].startswith("direct: viscous damping against hold and delay: ")
+    assert "short by" in chosen.refused[0]
+    limit = 2.0 * WEAK.viscous_damping / WEAK.period_s
+    x = np.linspace(0.0, 0.5, 5001)
+    assert np.gradient(model.force(x), x).max() > limit
+    rendered = chosen.model.force(x)
+    assert np.gradient(rendered, x).max() <= limit * (1.0 + 1e-9)
+    assert np.abs(rendered - model.force(x)).max() <= chosen.loss.largest * 1.001
+
+
+def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
+    model = model_by_hand()
+    rendered = plan(model, WEAK).model
+    x = np.linspace(0.0, 0.5, 2001)
+    steep = np.gradient(model.force(x), x) > 2.0 * WEAK.viscous_damping / WEAK.period_s
+    away = np.abs(x[:, None] - x[steep]).min(axis=1) > 0.06
+    assert away.any()
+    assert np.abs(rendered.force(x) - model.force(x))[away].max() < 2e-4 * np.ptp(model.force(x))
+
+
+def test_press_and_release_are_rendered_with_a_play_that_is_proved() -> None:
+    slide = DeviceProfile(
+        id="slide",
+        position_unit="m",
+        inertia=0.05,
+        viscous_damping=6.0,
+        coulomb_friction=0.2,
+        encoder_step=1e-6,
+        force_limit=20.0,
+    )
+    chosen = plan(keyswitch_by_hand(), slide)
+    assert chosen.structure == "direct"
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert 4e-6 <= chosen.scheme.play_radius <= 4e-4
+    assert chosen.certificate.inequalities[0].formula == "min h >= 0"
+
+
+def test_a_coupling_is_taken_only_when_asked_for_and_its_spring_is_taken_out() -> None:
+    chosen = plan(model_by_hand(), SMOOTH, coupling_stiffness=100.0)
+    assert (chosen.structure, chosen.scheme.compensated) == ("massless", True)
+    assert chosen.refused[0] == "direct: a coupling was asked for"
+
+
+def test_an_object_with_mass_is_implicit_where_the_encoder_has_no_steps_and_else_stable_only() -> None:
+    assert plan(model_by_hand(), SMOOTH, mass=1e-3).structure == "implicit"
+    chosen = plan(model_by_hand(), KNOB, mass=1e-3)
+    assert chosen.structure == "explicit"
+    assert chosen.certificate is not None
+    assert chosen.certificate.verdict == "stable (local), passivity not certified"
+    reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
+    assert list(reasons) == ["direct", "direct, slope limited", "massless", "implicit", "energy-consistent"]
+    assert "no bound is known" in reasons["implicit"]
+
+
+def test_a_plan_is_stored_and_holds_for_its_device_alone(tmp_path: Path) -> None:
+    path = plan(model_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
+    again = Plan.of(load_model(path))
+    again.check_for(KNOB)
+    slower = DeviceProfile(id="knob", coulomb_friction=0.005, jitter_s=1e-4, period_s=2e-3)
+    for other, field in ((slower, "period_s"), (WEAK, "weak knob")):
+        with pytest.raises(InputError, match=field):
+            again.check_for(other)
+
+
+def test_an_edited_model_is_refused_when_it_is_read(tmp_path: Path) -> None:
+    path = plan(model_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["network"]["weight"][0] *= 1.0 + 1e-15
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=r"certificate\.model is .*changed after it was certified"):
+        load_model(path)
+    assert load_model(path, with_plan=False).plan is None
+
+
+def test_what_is_planned_survives_hands_on_the_device_it_was_planned_for() -> None:
+    """As proved, so simulated: the plan for a weak device keeps its error, the model itself shakes there."""
+    from palpate import Hand, simulate
+    from palpate.planning import force_error
+
+    model = model_by_hand(linear=[60.0], weight=[0.0])
+    weak = DeviceProfile(id="weak", viscous_damping=0.01, coulomb_friction=0.02)
+    hand = Hand(stiffness=15.0, damping=0.0, lower=0.02, upper=0.1)
+    chosen = plan(model, weak)
+    calm = simulate(chosen, weak, hand, 2.0)
+    shaking = simulate(Plan(model, Scheme(structure="direct")), weak, hand, 2.0)
+    jerks = [float(np.abs(np.diff(each.position, 2))[-1000:].max()) for each in (calm, shaking)]
+    assert jerks[0] < 3.0 * weak.encoder_step
+    assert jerks[1] > 100.0 * weak.encoder_step
+    assert force_error(chosen, calm).end < 0.01
+
+
+def test_the_poles_are_those_of_the_step_and_leave_the_circle_where_the_certificate_says() -> None:
+    T = 1e-3
+    scheme = Scheme(
+        structure="explicit", coupling_stiffness=60.0, coupling_damping=0.01, mass=1e-3, damping=0.5
+    )
+    limit = (4.0 * 1e-3 - 2.0 * 0.51 * T) / T**2 - 60.0
+    locus = root_locus(scheme, np.array([0.5 * limit, limit, 1.001 * limit]), T)
+    reach = np.abs(locus.chosen).max(axis=1)
+    assert reach[0] < 1.0
+    assert reach[1] == pytest.approx(1.0, abs=1e-9)
+    assert reach[2] > 1.0
+    # z^2 + a z + b: b is the product, and 1 - T (B_o + B_c) / m.
+    assert np.prod(locus.chosen[0]).real == pytest.approx(1.0 - T * 0.51 / 1e-3)
+    # Where two poles meet there is a sample: the drawn path has its corner.
+    assert np.abs(np.diff(locus.poles[0], axis=-1)).min() < 1e-6
+    # The step itself, undriven: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
+    a, b = -np.sum(locus.chosen[0]).real, np.prod(locus.chosen[0]).real
+    assert a == pytest.approx(T**2 / 1e-3 * (0.5 * limit + 60.0) - 1.0 - b)
+
+
+def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "-o", "m.json", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    stored = json.loads((here / "m.json").read_text(encoding="utf-8"))
+    assert list(told) == ["plan", "certificate", "steepest_slope", "felt_slope", "seconds"]
+    assert (told["plan"], told["certificate"]) == (stored["plan"], stored["certificate"])
+    assert told["felt_slope"] == told["steepest_slope"]
+    for line in told["certificate"]["inequalities"]:
+        assert line["margin"] == line["left"] - line["right"]
+        assert line["holds"] == (line["left"] >= line["right"])
+    assert Plan.of(load_model("m.json")).certificate is not None
+
+
+def test_a_model_with_a_plan_is_simulated_as_planned_on_its_device(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "m.json", "--device", "weak.toml", "-o", "planned.json"]) == 0
+    for words, structure in (([], "direct"), (["--structure", "implicit"], "implicit")):
+        capsys.readouterr()
+        assert main(["simulate", "planned.json", "--duration-s", "0.2", "--json", *words]) == 0
+        told = capsys.readouterr()
+        assert json.loads(told.out)["structure"] == structure
+        assert ("weak knob" in told.err) == (structure == "direct")
+
+
+def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    stiffness = told["plan"]["coupling"]["stiffness"]
+    assert 1.0 / told["felt_slope"] == pytest.approx(1.0 / told["steepest_slope"] + 1.0 / stiffness)
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
+    assert f"slopes up to {told['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("model", "arguments"),
+    [
+        (model_by_hand(), ["--device", "knob.toml"]),
+        (model_by_hand(), ["--device", "weak.toml"]),
+        (model_by_hand(), ["--device", "knob.toml", "--mass", "1e-3"]),
+        (model_by_hand(linear=[0.1], weight=[0.01]), ["--device", "knob.toml", "--coupling-damping", "0.01"]),
+        (keyswitch_by_hand(), ["--device", "touch"]),
+    ],
+)
+def test_the_plan_can_be_read_on_80_columns(
+    here: Path, capsys: pytest.CaptureFixture[str], model: Model, arguments: list[str]
+) -> None:
+    model.save("m.json")
+    assert main(["plan", "m.json", *arguments]) == 0
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    for word in ("structure", "verdict", "holds for", "inequalities", "margin"):
+        assert word in text
+
+
+def test_a_device_that_holds_nothing_is_refused_and_nothing_is_written(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    DeviceProfile(id="ice", viscous_damping=0.0).save("ice.toml")
+    assert main(["plan", "m.json", "--device", "ice.toml", "-o", "planned.json"]) == 1
+    refusal = capsys.readouterr().err
+    assert "no structure holds on this device: direct: " in refusal
+    assert "short by" in refusal
+    assert not Path("planned.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--device", "nothing.toml"], "there is no file nothing.toml"),
+        (["--device", "touch"], "moves in m, the model in rad"),
+        (["--device", "m.json"], "m.json is not TOML"),
+        ([], "Missing option '--device'"),
+        (["--device", "knob.toml", "-o", "knob.toml"], "is an input as well"),
+        (["--device", "knob.toml", "--plot", "locus.txt"], "is no figure file"),
+        (["--device", "knob.toml", "--coupling-stiffness", "-1"], "coupling_stiffness is -1"),
+    ],
+)
+def test_what_is_wrong_is_refused_in_one_sentence(
+    here: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
+) -> None:
+    assert main(["plan", "m.json", *arguments]) == 2
+    told = capsys.readouterr().err
+    assert sentence in told
+    assert len([line for line in told.splitlines() if line.startswith("error: ")]) == 1
+
+
+def test_the_examples_are_listed_with_their_sources(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--examples"]) == 0
+    text = capsys.readouterr().out
+    for name, (file, _) in example_profiles().items():
+        assert f"{name}  {file}\n" in text
+    assert "data sheet" in text
+
+
+def test_the_locus_is_drawn(here: Path) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--plot", "locus.png"]) == 0
+    assert Path("locus.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_velocity_has_no_structure_and_is_refused() -> None:
+    with pytest.raises(InputError, match="inputs"):
+        plan(two_inputs(), KNOB)
+
+
+def two_inputs(**changes: Any) -> Model:
+    """A force of position and velocity."""
+    return model_by_hand(
+        kind="position_velocity",
+        inputs=("position", "velocity"),
+        alpha=[[20.0, 1.0]],
+        beta=[[0.3, 0.0]],
+        linear=[5.0, 0.01],
+        lower=[0.0, -1.0],
+        upper=[0.5, 1.0],
+        **changes,
+    )

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The set-up of a device through real pyusb and libusb, with an emulated device below both."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import ROOT
+from palpate.devices.errors import device_error
+from usb_emulation import emulated, needs_emulation
+
+USBError = pytest.importorskip("usb.core", reason="needs pyusb").USBError
+
+pytestmark = needs_emulation
+
+COUNTS_A_TURN = 65536
+
+
+@pytest.fixture(scope="module")
+def told() -> dict[str, Any]:
+    """One session with the device, by what was done."""
+    answer = emulated(sys.executable, "-W", "error", ROOT / "tests" / "usb" / "set_up_over_pyusb.py")
+    assert answer.returncode == 0, answer.stderr
+    result: dict[str, Any] = json.loads(answer.stdout)
+    return result
+
+
+def devices(*words: str, device: list[str]) -> subprocess.CompletedProcess[str]:
+    return emulated(sys.executable, "-m", "palpate", "devices", *words, device=device)
+
+
+def test_a_device_is_found_and_says_who_it_is(told: dict[str, Any]) -> None:
+    (found,) = told["found"]
+    assert (found["product"], found["serial"], found["problem"]) == ("emulated knob", "EMU-1", "")
+    assert found["info"]["counts_per_rev"] == COUNTS_A_TURN
+    assert found["info"]["max_torque"] == pytest.approx(5.0)
+    assert found["info"]["rate_hz"] == 1000
+    assert found["info"]["transducer"]
+    assert told["name"].startswith("emulated knob EMU-1 (USB bus ")
+
+
+def test_a_serial_number_that_nobody_has_is_refused_by_name(told: dict[str, Any]) -> None:
+    assert told["another serial"] == (
+        "no haptic USB device with serial number OTHER is plugged in; `palpate devices` lists what there is"
+    )
+
+
+def test_the_watchdog_is_set_and_read_back(told: dict[str, Any]) -> None:
+    assert told["watchdog before"] == 20
+    assert told["watchdog after"] == 137
+    assert told["watchdog out of range"] == "watchdog is 1 ms, must be 2 to 1000"
+
+
+def test_the_present_position_becomes_zero(told: dict[str, Any]) -> None:
+    few_ms_of_motion = 0.03 * COUNTS_A_TURN / 6.28
+    assert told["count before"] > 0.15 * COUNTS_A_TURN / 6.28
+    assert abs(told["count after"]) < few_ms_of_motion
+
+
+def test_force_is_enabled_and_disabled(told: dict[str, Any]) -> None:
+    enabled, status = told["enabled"]
+    assert enabled
+    assert status & 1
+    enabled, status = told["disabled"]
+    assert not enabled
+    assert not status & 1
+
+
+def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(told: dict[str, Any]) -> None:
+    assert "enabling its force: it refuses the request (stall)" in told["enabled after an emergency stop"]
+    assert told["enabled after it was cleared"]
+
+
+def test_a_halted_endpoint_stalls_until_it_is_cleared(told: dict[str, Any]) -> None:
+    assert told["stalls"][0] == errno.EPIPE
+    assert len(told["stalls"]) == 2  # reading again brings nothing
+    assert told["bytes after the stall"] == 32
+
+
+def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(told: dict[str, Any]) -> None:
+    assert told["unplugged"].endswith("asking who it is: it is gone; plug it in again")
+    assert told["found without it"] == 0
+    assert told["opened without it"].startswith("no haptic USB device is plugged in")
+    assert told["found again"] == "EMU-1"
+
+
+def test_devices_lists_what_is_plugged_in() -> None:
+    answer = devices(device=["--serial", "A", "--serial", "B", "--no-transducer"])
+    assert answer.returncode == 0, answer.stderr
+    assert "emulated knob A (USB bus 1 address 2)" in answer.stdout
+    assert "--device usb:B" in answer.stdout
+    assert "torque up to 5 N*m, 1000 Hz, watchdog 20 ms" in answer.stdout
+    assert "force transducer: no; velocity: measured; firmware 1.0, uid 00005041" in answer.stdout
+
+
+@pytest.mark.parametrize(
+    ("device", "sentence"),
+    [
+        (["--no-device"], "no haptic USB device is plugged in; --device simulated needs none"),
+        (["--somebody-elses"], "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
+    ],
+)
+def test_devices_says_what_keeps_it_from_a_device(device: list[str], sentence: str) -> None:
+    answer = devices(device=device)
+    assert answer.returncode == 0, answer.stderr
+    assert sentence in answer.stdout
+
+
+def nobody_may_run(program: Path) -> bool:
+    return os.getuid() == 0 and any(not folder.stat().st_mode & stat.S_IXOTH for folder in program.parents)
+
+
+@pytest.mark.skipif(
+    nobody_may_run(Path(sys.executable).resolve()), reason="needs a Python that nobody may run"
+)
+def test_without_permission_the_command_that_gives_it_is_said() -> None:
+    answer = devices(device=["--denied"])
+    assert "permission denied; run `sudo palpate devices --install-udev-rule` once" in answer.stdout
+
+
+@pytest.mark.parametrize(
+    ("number", "sentence"),
+    [
+        (
+            errno.EACCES,
+            "knob, asking: permission denied; run `sudo palpate devices --install-udev-rule` once",
+        ),
+        (errno.EBUSY, "knob, asking: another program holds it; close palpate-control"),
+        (errno.ETIMEDOUT, "knob, asking: it does not answer; plug it in again"),
+        (errno.EIO, "knob, asking: the transfer failed; try another cable or port"),
+        (None, "knob, asking: Other error; plug it in again"),
+    ],
+)
+def test_an_error_of_the_system_becomes_device_reason_and_cure(number: int | None, sentence: str) -> None:
+    assert str(device_error("knob", "asking", USBError("Other error", errno=number))).startswith(sentence)
+
+
+def test_devices_sets_one_up() -> None:
+    answer = devices("--clear", "--zero", "--disable", "--watchdog-ms", "50", "--json", device=[])
+    assert answer.returncode == 0, answer.stderr
+    assert "emulated knob EMU-1" in answer.stderr
+    assert "disabled, faults cleared, zeroed, watchdog set" in answer.stderr
+    assert json.loads(answer.stdout)["devices"][0]["info"]["watchdog_ms"] == 50
+
+
+def test_what_is_set_needs_one_device_to_be_meant() -> None:
+    answer = devices("--zero", device=["--serial", "A", "--serial", "B"])
+    assert answer.returncode == 1
+    assert "there are 2 USB devices (A, B); choose with usb:SERIAL" in answer.stderr

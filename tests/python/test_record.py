@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate record: an object on a device becomes a recording, and what is identified from it pushes back."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import palpate
+from conftest import ROOT
+from control_program import PATIENT, PROGRAM, needs_program
+from palpate import InputError, Model, identify, load_model, read_recording
+from palpate.devices import record
+from usb_emulation import emulated, frames, needs_emulation
+
+OBJECT = ROOT / "tests" / "models" / "good" / "position.json"
+STIFFNESS = 3.0
+SPRING = ["--lock-step", "--spring", str(STIFFNESS)]
+
+
+def recorded(out: Path, *words: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "palpate", "record", out, "--device", "usb", "--duration-s", 3]
+    return emulated(*command, "--wait-ms", 2000, *words, device=device)
+
+
+def stiffness(model: Model) -> float:
+    """Over the inner four fifths of the range; the mean of both strokes."""
+    lower, upper = model.lower[0], model.upper[0]
+    ends = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
+    near, far = np.mean([model.force(ends, direction=way) for way in (1, -1)], axis=0)
+    return float(far - near) / float(np.ptp(ends))
+
+
+@needs_emulation
+@needs_program
+def test_a_spring_is_identified_with_its_own_stiffness_and_rendered_back_pushes_the_right_way(
+    tmp_path: Path,
+) -> None:
+    felt, again, model_file, trace = (tmp_path / name for name in ("a.csv", "b.csv", "m.json", "t.csv"))
+    answer = recorded(felt, "--json", device=[*SPRING, "--trace", str(trace)])
+    assert answer.returncode == 0, answer.stderr
+    summary = json.loads(answer.stdout)
+    assert summary["recorded"] == summary["ticks"] == 3000
+    assert not any(frame.enabled for frame in frames(trace))  # a hand moved it: nothing was to make force
+    recording = read_recording(felt)
+    assert recording.metadata["force"].endswith("from the device's force transducer")
+    model = identify(recording)
+    assert stiffness(model) == pytest.approx(STIFFNESS, rel=0.002)
+    model.save(model_file)
+
+    device = [
+        PROGRAM,
+        model_file,
+        "--device",
+        "usb",
+        "--structure",
+        "direct",
+        "--uncertified",
+        *PATIENT,
+        "--wait-ms",
+        2000,
+    ]
+    answer = emulated(
+        *device, "--duration-s", 3, "--record", again, device=["--lock-step", "--trace", str(trace)]
+    )
+    assert answer.returncode == 0, answer.stderr
+    # A torque towards smaller positions, in proportion, as the device itself felt it.
+    pressed = [frame for frame in frames(trace) if 400 < frame.started < 2900 and frame.position > 0.1]
+    assert len(pressed) > 500
+    assert all(-4.0 < frame.torque / frame.position < -2.0 for frame in pressed)
+    assert stiffness(identify(read_recording(again))) == pytest.approx(STIFFNESS, rel=0.02)
+
+
+@needs_emulation
+def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: Path) -> None:
+    out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
+    probe = ["--probe", "--upper", 0.3, "--force-limit", 1.2, "--speed", 0.3, "--lowest-rate-share", 0]
+    nobody = [*SPRING, "--no-hand", "--no-transducer", "--trace", str(trace)]
+    answer = recorded(out, *probe, device=nobody)
+    assert answer.returncode == 0, answer.stderr
+    recording = read_recording(out)
+    assert "the friction of the device is in it" in recording.metadata["force"]
+    assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
+    # The motor holds the handle's damping too: 0.018 N*m at this speed, of 0.72 N*m between the ends.
+    assert stiffness(identify(recording)) == pytest.approx(STIFFNESS, rel=2 * 0.018 / 0.72)
+    assert max(abs(frame.torque) for frame in frames(trace)) <= 1.2
+    assert frames(trace)[-1].torque == 0.0
+
+
+@needs_emulation
+@pytest.mark.parametrize(
+    ("words", "device", "reason"),
+    [
+        ([], ["--no-transducer"], "EMU-1 has no force transducer"),
+        (["--probe"], [], "a probe on a real device needs upper"),
+        (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6, the device makes 5"),
+        (["--object", OBJECT], [], "an object is mounted on the simulated device only; usb has its own"),
+        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused_before_anything_moves(
+    words: list[Any], device: list[str], reason: str, tmp_path: Path
+) -> None:
+    trace = tmp_path / "trace.csv"
+    answer = recorded(tmp_path / "a.csv", *words, device=["--lock-step", *device, "--trace", str(trace)])
+    assert answer.returncode == 2, answer.stderr
+    assert reason in answer.stderr
+    assert not list(tmp_path.glob("a.csv*"))
+    assert all(frame.torque == 0.0 for frame in frames(trace))
+
+
+@needs_emulation
+def test_a_device_that_is_unplugged_leaves_what_was_recorded(tmp_path: Path) -> None:
+    out = tmp_path / "a.csv"
+    answer = recorded(out, device=[*SPRING, "--fault", "unplug@1500"])
+    assert answer.returncode == 1
+    assert "a fault of the device" in answer.stderr
+    assert 1000 < len(read_recording(out)) < 1500
+
+
+def test_a_simulated_object_is_recorded_and_found_again(tmp_path: Path) -> None:
+    knob = load_model(OBJECT)
+    ticks: list[int] = []
+    summary = record(
+        tmp_path / "a.csv",
+        object=knob,
+        probe=True,
+        duration_s=2.0,
+        speed=0.5,
+        lowest_rate_share=0.0,
+        progress=lambda rows, position, force: ticks.append(rows),
+    )
+    assert summary["orderly"]
+    assert ticks == sorted(ticks)
+    assert len(ticks) > 5
+    recording = read_recording(tmp_path / "a.csv")
+    assert recording.metadata["simulated"].startswith("yes")
+    assert recording.metadata["moved_by"].startswith("the device itself: a sweep from ")
+    assert palpate.verify(knob, recording).nrmse < 0.01
+
+
+def test_without_an_object_or_a_way_to_see_its_force_nothing_is_recorded(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nothing is mounted on the simulated device"):
+        record(tmp_path / "a.csv")
+    with pytest.raises(InputError, match="this device has no force transducer"):
+        record(tmp_path / "a.csv", object=load_model(OBJECT), transducer=False)
+    with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
+        record(tmp_path / "a.csv", device="knob")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small Linux in QEMU in which commands meet the emulated USB device through a real kernel.
+
+usbfs, usbcore, a host-controller driver (vhci_hcd), enumeration and unplugging are the kernel's own; the
+device is `usbip_emulator` behind them. The guest's clock counts instructions, so that its times are exact
+whatever the load of this machine. Everything stands in one initial file system; what the guest leaves behind
+comes back over its second serial line.
+"""
+
+from __future__ import annotations
+
+import io
+import lzma
+import platform
+import re
+import shutil
+import subprocess
+import tarfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+CACHE = ROOT / "build" / "guest"
+MODULES = ["common/usb-common", "core/usbcore", "usbip/usbip-core", "usbip/vhci-hcd"]
+NEEDED = {
+    "qemu-system-x86_64": "qemu-system-x86",
+    "busybox": "busybox-static",
+    "cpio": "cpio",
+    "apt-get": "apt",
+    "dpkg": "dpkg",
+    "ldd": "libc-bin",
+}
+LONGEST_S = 1800
+
+
+def missing() -> str:
+    """What the guest lacks, as the reason of a skipped test; empty where it can be run."""
+    if platform.machine() != "x86_64":
+        return f"needs a machine that is x86_64, not {platform.machine()}"
+    lacking = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
+    if lacking:
+        return f"needs {' '.join(sorted(lacking))}"
+    return "" if kernel() else "needs the package linux-image-amd64 from Debian's archive"
+
+
+def kernel() -> Path | None:
+    """The unpacked kernel package, fetched once; not installed."""
+    place = CACHE / "kernel"
+    if not place.exists():
+        CACHE.mkdir(parents=True, exist_ok=True)
+        asked = subprocess.run(
+            ["apt-cache", "depends", "linux-image-amd64"], capture_output=True, text=True, check=False
+        )
+        found = re.search(r"Depends: (linux-image-\S+)", asked.stdout)
+        if found is None:
+            return None
+        fetched = subprocess.run(
+            ["apt-get", "-qq", "download", found[1]], cwd=CACHE, capture_output=True, check=False
+        )
+        package = next(CACHE.glob("linux-image-*.deb"), None)
+        if fetched.returncode or package is None:
+            return None
+        subprocess.run(["dpkg", "-x", package, CACHE / "unpacking"], check=True)
+        (CACHE / "unpacking").rename(place)
+        package.unlink()
+    return place if next((place / "boot").glob("vmlinuz-*"), None) else None
+
+
+def libraries(program: Path) -> list[Path]:
+    """The shared libraries of a program, where it looks for them."""
+    told = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
+    return [Path(path) for path in re.findall(r"(/\S+) \(0x", told)]
+
+
+def install_module(driver: Path, folder: Path) -> None:
+    """Copy a driver, which newer kernels bring compressed."""
+    packed = Path(f"{driver}.xz")
+    content = driver.read_bytes() if driver.exists() else lzma.decompress(packed.read_bytes())
+    (folder / driver.name).write_bytes(content)
+
+
+@dataclass
+class Left:
+    """What a guest left behind."""
+
+    console: str
+    files: dict[str, str]
+    """Text by name, of everything in its folder /out."""
+
+
+def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Left:
+    """Boot, run a shell script in the guest, come back with what it left in /out.
+
+    `programs` stand in /bin, with their libraries; `files` in /in. The script has to write down what it
+    finds: QEMU ends with 0 whatever happened inside.
+    """
+    folder = CACHE / "work"
+    shutil.rmtree(folder, ignore_errors=True)
+    tree = folder / "tree"
+    for name in ("bin", "dev", "etc", "in", "out", "proc", "sys", "tmp", "modules"):
+        (tree / name).mkdir(parents=True)
+    busybox = shutil.which("busybox")
+    unpacked = kernel()
+    assert busybox is not None
+    assert unpacked is not None
+    shutil.copy(busybox, tree / "bin" / "busybox")
+    for name, program in programs.items():
+        shutil.copy(program, tree / "bin" / name)
+        for library in libraries(program):
+            target = tree / library.relative_to("/")
+            if not target.exists():
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(library, target)
+    for name, path in files.items():
+        shutil.copy(path, tree / "in" / name)
+    drivers = next((unpacked / "lib" / "modules").iterdir()) / "kernel" / "drivers" / "usb"
+    for module in MODULES:
+        install_module(drivers / f"{module}.ko", tree / "modules")
+    loading = "\n".join(f"insmod /modules/{Path(module).name}.ko" for module in MODULES)
+    (tree / "etc" / "passwd").write_text("root:x:0:0::/:/bin/sh\nnobody:x:65534:65534::/:/bin/sh\n")
+    init = tree / "init"
+    init.write_text(
+        f"""#!/bin/busybox sh
+/bin/busybox --install -s /bin
+export PATH=/bin
+mount -t proc proc /proc
+mount -t sysfs sysfs /sys
+mount -t devtmpfs devtmpfs /dev
+{loading}
+mkdir -p /dev/bus/usb
+cd /out
+{script}
+dmesg > /out/dmesg
+stty raw -F /dev/ttyS1
+tar -c -C /out . | gzip > /dev/ttyS1
+poweroff -f
+"""
+    )
+    init.chmod(0o755)
+    image, came_back = folder / "initramfs", folder / "out.tar.gz"
+    with image.open("wb") as archive:
+        names = subprocess.run(["find", "."], cwd=tree, capture_output=True, check=True).stdout
+        subprocess.run(
+            ["cpio", "--quiet", "-o", "-H", "newc"], cwd=tree, input=names, stdout=archive, check=True
+        )
+    boot = next((unpacked / "boot").glob("vmlinuz-*"))
+    machine = ["-accel", "tcg", "-smp", "1", "-icount", "shift=1,sleep=off,align=off", "-m", "256"]
+    shown = ["-nographic", "-no-reboot", "-monitor", "none"]
+    lines = ["-serial", "stdio", "-serial", f"file:{came_back}"]
+    started = ["-kernel", str(boot), "-initrd", str(image), "-append", "console=ttyS0 quiet panic=-1"]
+    ran = subprocess.run(
+        ["qemu-system-x86_64", *machine, *shown, *lines, *started],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=LONGEST_S,
+    )
+    left: dict[str, str] = {}
+    try:
+        with tarfile.open(fileobj=io.BytesIO(came_back.read_bytes())) as archive:
+            for member in archive:
+                content = archive.extractfile(member)
+                if content is not None:
+                    left[member.name.removeprefix("./")] = content.read().decode(errors="replace")
+    except tarfile.TarError:
+        pass  # the guest died before it could tell; its console shows how
+    return Left(ran.stdout, left)

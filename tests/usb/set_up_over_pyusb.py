@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sets the emulated device up through pyusb and libusb, and prints what came of it as one JSON object.
+
+tests/usb/run_emulated.py -- python tests/usb/set_up_over_pyusb.py
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import usb.core
+
+from palpate import InputError
+from palpate.devices import DeviceError, find_devices, open_usb
+
+STREAM_IN = 0x81
+
+
+def order(words: str) -> str:
+    """A word to the emulated device itself, past the libraries."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
+        asking.bind("")
+        asking.sendto(words.encode(), os.environ["PALPATE_EMULATOR"])
+        return asking.recv(4096).decode()
+
+
+def state() -> dict[str, Any]:
+    told: dict[str, Any] = json.loads(order("state"))
+    return told
+
+
+def refusal(action: Callable[[], Any]) -> str:
+    try:
+        action()
+    except (DeviceError, InputError) as error:
+        return str(error)
+    return ""
+
+
+def wait_until(is_so: Callable[[], Any]) -> None:
+    until = time.monotonic() + 10.0
+    while not is_so():
+        assert time.monotonic() < until
+        time.sleep(0.005)
+
+
+def raw() -> usb.core.Device:
+    return usb.core.find(idVendor=0x1209, idProduct=0x0001)
+
+
+def packet() -> tuple[int, int]:
+    """Count and status of a packet: one transfer, as pyusb can."""
+    device = raw()
+    fields = struct.unpack("<BBHIiiiHHHHi", bytes(device.read(STREAM_IN, 64, timeout=1000)))
+    usb.util.dispose_resources(device)
+    return fields[4], fields[7]
+
+
+def main() -> dict[str, Any]:
+    told: dict[str, Any] = {"found": [asdict(device) for device in find_devices()]}
+    told["another serial"] = refusal(lambda: open_usb("OTHER"))
+
+    with open_usb() as device:
+        told["name"] = device.name
+        told["watchdog before"] = device.identify().watchdog_ms
+        device.set_watchdog(137)
+        told["watchdog after"] = device.identify().watchdog_ms
+        told["watchdog out of range"] = refusal(lambda: device.set_watchdog(1))
+
+        wait_until(lambda: state()["position_rad"] > 0.2)
+        told["count before"] = packet()[0]
+        device.zero()
+        told["count after"] = packet()[0]
+
+        device.enable()
+        told["enabled"] = state()["enabled"], packet()[1]
+        device.disable()
+        told["disabled"] = state()["enabled"], packet()[1]
+
+        order("fault emergency-stop 1")
+        wait_until(lambda: packet()[1] & 64)
+        told["enabled after an emergency stop"] = refusal(device.enable)
+        device.clear()
+        device.enable()
+        told["enabled after it was cleared"] = state()["enabled"]
+        device.disable()
+
+    # The stream's endpoint halts; a halted endpoint says so until it is cleared.
+    order("fault stall-in 1")
+    handle = raw()
+    stalls = []
+    for _ in range(2):
+        try:
+            handle.read(STREAM_IN, 64, timeout=200)
+        except usb.core.USBError as error:
+            stalls.append(error.errno)
+    handle.clear_halt(STREAM_IN)
+    told["stalls"] = stalls
+    told["bytes after the stall"] = len(handle.read(STREAM_IN, 64, timeout=1000))
+    usb.util.dispose_resources(handle)
+
+    with open_usb() as device:
+        order("fault unplug 1")
+        wait_until(lambda: raw() is None)
+        told["unplugged"] = refusal(device.identify)
+    told["found without it"] = len(find_devices())
+    told["opened without it"] = refusal(open_usb)
+    order("plug")
+    wait_until(raw)
+    with open_usb() as device:
+        told["found again"] = device.serial
+    return told
+
+
+if __name__ == "__main__":
+    print(json.dumps(main()))

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate-control on the emulated device behind a real kernel's USB stack, in a guest whose clock is exact.
+
+`make test-full` runs it; by hand: .venv/bin/python -m pytest tests/usb -s
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import guest
+from palpate import load_model
+from palpate._core import Hand, Scheme
+from palpate.planning import DeviceProfile, Plan, force_at, simulate
+
+ROOT = Path(__file__).resolve().parents[2]
+CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
+MODEL = ROOT / "bench" / "click_and_wall.json"
+SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
+LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) >= 100
+SWEEP_S = 2.0
+DURATION_S = 30.0 if LONG else 6.0
+UNPLUGGED_AT = 500
+SLOW_FROM = 2000
+DIRECT = "--uncertified --structure direct"
+UNSTOPPED = "--uncertified --lowest-rate-share 0"
+
+# What GET_INFO and the echoes say of the emulated device; mechanics and hand are the defaults of both.
+KNOWN: dict[str, Any] = {"id": "EMU-1", "delay_samples": 1, "force_step": 1e-6}
+DEVICE = DeviceProfile(**KNOWN)
+# A certificate spends friction. The emulated device has none, but this is about what a certificate forbids.
+WITH_FRICTION = DeviceProfile(**KNOWN, coulomb_friction=1e-3)
+
+RENDER = """
+name=$1
+model=$2
+shift 2
+palpate-control /in/$model --device usb --record $name.csv --json "$@" > $name.json 2> $name.told
+echo $? > $name.code
+"""
+FACTS = """
+cd $(dirname $(grep -l 1209 /sys/bus/usb/devices/*/idVendor))
+for fact in manufacturer product serial speed 1-1:1.0/bInterfaceClass 1-1:1.0/ep_81/bInterval; do
+    echo "$(basename $fact) $(cat $fact)" >> /out/facts
+done
+"""
+
+
+@dataclass
+class Told:
+    """What the guest left of its runs."""
+
+    left: guest.Left
+    felt: Plan
+    """What the run `whole` renders."""
+
+    def text(self, name: str) -> str:
+        assert name in self.left.files, f"no {name} came back\n{self.left.console[-3000:]}"
+        return self.left.files[name]
+
+    def summary(self, run: str) -> dict[str, Any]:
+        told = self.text(f"{run}.json")
+        assert told, self.text(f"{run}.told")
+        summary: dict[str, Any] = json.loads(told)
+        return summary
+
+    def table(self, name: str) -> pd.DataFrame:
+        return pd.read_csv(io.StringIO(self.text(name)), comment="#")
+
+
+def usbip_emulator() -> Path:
+    program = guest.CACHE / "usbip_emulator"
+    compiler = [os.environ.get("CXX", "g++"), "-std=c++20", "-O2"]
+    source = ROOT / "tests" / "usb" / "usbip_emulator.cpp"
+    subprocess.run([*compiler, str(source), "-o", str(program), "-lpthread"], check=True)
+    return program
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+    missing = guest.missing() or ("" if CONTROL.exists() else "needs palpate-control, run make control")
+    if missing:
+        pytest.skip(missing)
+    folder = tmp_path_factory.mktemp("guest")
+    felt = Plan(load_model(MODEL), Scheme(structure="direct"))
+    spring = Plan(load_model(SPRING), Scheme(structure="direct")).certified_for(WITH_FRICTION)
+    assert spring.certificate is not None
+    assert spring.certificate.certified, spring.certificate.why
+    spring.stored().save(folder / "spring.json")
+    (folder / "render").write_text(RENDER, encoding="utf-8")
+    (folder / "facts").write_text(FACTS, encoding="utf-8")
+    script = f"""
+usbip_emulator -- sh /in/facts
+sleep 1
+usbip_emulator --trace whole.trace -- sh /in/render whole {MODEL.name} --duration-s {DURATION_S} {DIRECT}
+sleep 1
+usbip_emulator --fault unplug@{UNPLUGGED_AT} -- sh /in/render cut spring.json
+sleep 1
+grep -l 1209 /sys/bus/usb/devices/*/idVendor > left
+usbip_emulator -- sh /in/render again spring.json --duration-s 1
+sleep 1
+usbip_emulator --rate-hz 900 -- sh /in/render slow spring.json
+sleep 1
+usbip_emulator --fault slow@{SLOW_FROM}x9999 -- sh /in/render slowed spring.json
+sleep 1
+usbip_emulator --rate-hz 900 -- sh /in/render told_slow spring.json --duration-s 0.9 {UNSTOPPED}
+"""
+    programs = {"usbip_emulator": usbip_emulator(), "palpate-control": CONTROL}
+    left = guest.run(script, programs, {path.name: path for path in (MODEL, *folder.iterdir())})
+    return Told(left, felt)
+
+
+def test_the_kernel_enumerates_the_device(told: Told) -> None:
+    facts = dict(line.split(" ", 1) for line in told.text("facts").splitlines())
+    assert facts["manufacturer"] == "palpate"
+    assert facts["product"] == "emulated knob"
+    assert facts["serial"] == "EMU-1"
+    assert facts["speed"] == "12"
+    assert facts["bInterfaceClass"] == "ff"
+    assert facts["bInterval"] == "01"
+    assert "new full-speed USB device number 2" in told.text("dmesg")
+
+
+def test_the_loop_runs_at_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
+    summary = told.summary("whole")
+    with capsys.disabled():
+        print(
+            f"\nguest: {summary['rate_hz']:.2f} Hz over {summary['ticks']} ticks, "
+            f"period {summary['period']}, round trip {summary['usb']['round_trip']}, "
+            f"delay {summary['usb']['delay_samples']}, {summary['lost_samples']} samples lost"
+        )
+    assert told.text("whole.code").strip() == "0", told.text("whole.told")
+    assert summary["rate_hz"] == pytest.approx(1000.0, rel=5e-3)
+    assert summary["lost_samples"] == summary["repeated_samples"] == 0
+    assert summary["ticks"] == summary["recorded"] == round(1e3 * DURATION_S)
+    assert summary["usb"]["bus_errors"] == summary["usb"]["timeouts"] == 0
+
+
+def test_the_force_is_as_close_to_the_model_as_on_the_simulated_device(
+    told: Told, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweeps = round(SWEEP_S / DEVICE.period_s) * int((DURATION_S - 1.0) / SWEEP_S)
+    trace = told.table("whole.trace")
+    trace = trace[(trace["status"] & 1).eq(1) & trace["started"].gt(0)][-sweeps - 1 - 10 : -10]
+    # A torque stands in the row of the frame in which it arrived, and acts in the next one.
+    emulated = force_error(told.felt, -trace["torque_Nm"].to_numpy()[:-1], trace["position_rad"].to_numpy())
+    rendering = simulate(told.felt, DEVICE, Hand(), DURATION_S)
+    ends = rendering.columns["handle_end_rad"]
+    simulated = force_error(told.felt, rendering.force[-sweeps:], ends[-sweeps - 1 :])
+    with capsys.disabled():
+        print(
+            f"\nguest: force error {1e3 * emulated:.3f} mN*m RMS, simulated device {1e3 * simulated:.3f}, "
+            f"ratio {emulated / simulated:.3f}; largest torque {trace['torque_Nm'].abs().max():.2f} N*m"
+        )
+    assert trace["position_rad"].max() > 0.4  # the wall was felt
+    assert emulated <= 2.0 * simulated
+
+
+def force_error(plan: Plan, force: np.ndarray, ends: np.ndarray) -> float:
+    """RMS of what acted in each tick, less the model at the tick's end; `ends` has one more in front."""
+    return float(np.sqrt(np.mean(np.square(force - force_at(plan, ends)[1:]))))
+
+
+def test_unplugged_it_ends_with_a_fault_and_a_complete_record_and_plugged_in_it_goes_on(told: Told) -> None:
+    summary = told.summary("cut")
+    assert told.text("cut.code").strip() == "1"
+    # The kernel notices by and by: until then, nothing answers.
+    assert summary["status"] in ("Fault", "Timeout")
+    assert summary["ended"].startswith("stopped by a fault of the device")
+    assert len(told.table("cut.csv")) == summary["ticks"] == summary["recorded"]
+    assert summary["ticks"] == pytest.approx(UNPLUGGED_AT, abs=10)
+    assert told.text("left") == ""
+    assert "USB disconnect, device number" in told.text("dmesg")
+    assert told.text("again.code").strip() == "0", told.text("again.told")
+    assert told.summary("again")["ticks"] == 1000
+
+
+def test_a_rate_lower_than_asked_stops_a_certified_run_within_a_second(told: Told) -> None:
+    for run, ticks_before, rate_hz in (("slow", 0, 900.0), ("slowed", SLOW_FROM, 1000.0 / 3.0)):
+        summary = told.summary(run)
+        assert told.text(f"{run}.code").strip() == "1"
+        assert "did not hold its rate" in summary["ended"]
+        assert "did not hold its rate" in told.text(f"{run}.told")
+        assert summary["ticks"] <= ticks_before + rate_hz + 1
+        assert len(told.table(f"{run}.csv")) == summary["ticks"]
+
+
+def test_a_rate_lower_than_asked_is_said_within_a_second_where_nothing_is_certified(told: Told) -> None:
+    summary = told.summary("told_slow")
+    assert summary["ticks"] == 900  # which take a second
+    assert told.text("told_slow.code").strip() == "0"
+    assert "warning: the loop runs at 90" in told.text("told_slow.told")
+    assert summary["rate_hz"] == pytest.approx(900.0, rel=5e-3)
