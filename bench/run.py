@@ -33,6 +33,7 @@ def leave(path: Path | None, results: Any) -> None:
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "commit": commit or "unknown",
         "scale": SCALE,
+        "load": round(os.getloadavg()[0], 1),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps({"where": where, "results": results}, indent=1) + "\n", encoding="utf-8")

@@ -161,12 +161,19 @@ def test_refuses_what_is_no_benchmark_output(results: Path, capsys: pytest.Captu
 
 
 def _left(folder: Path, name: str, results: Any) -> None:
-    where = {"machine": "2 cores", "python": "3", "date": "2026-01-02", "commit": "abc", "scale": 1.0}
+    where = {
+        "machine": "2 cores",
+        "python": "3",
+        "date": "2026-01-02",
+        "commit": "abc",
+        "scale": 1.0,
+        "load": 0.5,
+    }
     (folder / f"{name}.json").write_text(json.dumps({"where": where, "results": results}))
 
 
 def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict[str, Any]:
-    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0}
+    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0, "draws": 7}
     return {"problem": problem, "method": method, "nrmse": nrmse, "n_parameters": n_parameters, **times}
 
 
@@ -188,7 +195,9 @@ def identified(tmp_path: Path) -> Path:
 def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: Path) -> None:
     names = ("identification", "filters", "parsimony", "real_data", "dynamic")
     page = identified / "identification.md"
-    page.write_text("".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names))
+    tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
+    # the first time a table is filled there is none
+    page.write_text(tables.replace("old filters\n", ""))
     assert main(["chart", "identification", str(identified), "--to", str(identified)]) == 0
     for name in ("parameters", "time", "filters"):
         assert (identified / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
@@ -196,10 +205,11 @@ def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: P
     assert "| P1, splines | 5.00e-04 | 44 | 0.25 | 0.5 | 3 |" in text
     assert "MARS" not in text
     assert "| no wavelet | 99 | 100 |" in text
-    assert "2026-01-02, 2 cores, Python 3, commit abc" in text
+    assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; noise draws: 7" in text
     # what was not measured this time stays as it was
     assert "old real_data" in text
     assert "old parsimony" not in text
+    assert text.count("| matched |") == 1
 
 
 def test_identification_without_its_benchmark_is_refused(

@@ -32,7 +32,10 @@ def _results(folder: Path, name: str) -> tuple[Any, str] | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         where = content["where"]
-        told = f"{where['date']}, {where['machine']}, Python {where['python']}, commit {where['commit']}"
+        told = (
+            f"{where['date']}, {where['machine']}, load {where['load']:g}, Python {where['python']}, "
+            f"commit {where['commit']}"
+        )
         if where["scale"] < 1.0:
             told += f", scale {where['scale']:g}: not for comparison"
         return content["results"], told
@@ -182,7 +185,8 @@ def chart_identification(folder: Path, to: Path) -> None:
     rows, where = found["identification"]
     _draw_reached(figures / "identification-parameters.png", rows, "parameters", "parameters")
     _draw_reached(figures / "identification-time.png", rows, "fit and tuning [s]", "seconds")
-    tables = {"identification": f"{_problems(rows)}\n{where}\n"}
+    draws = max(row["draws"] for row in rows if "nrmse" in row)
+    tables = {"identification": f"{_problems(rows)}\n{where}; noise draws: {draws}\n"}
     for name, table in _TABLES.items():
         if (results := found[name]) is not None:
             tables[name] = f"{table(results[0])}\n{results[1]}\n"
