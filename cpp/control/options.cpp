@@ -153,9 +153,10 @@ void add_guards(CLI::App& app, Options& options) {
 
 void add_running(CLI::App& app, Options& options) {
     app.add_option("--device", options.device,
-                   has_usb() ? "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z"
-                             : "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built "
-                               "without libusb: no usb[:SERIAL]")
+                   has_usb()
+                       ? "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z"
+                       : "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built "
+                         "without libusb: no usb[:SERIAL]")
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")

@@ -90,7 +90,6 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        owes_answer_ = owes_answer_ && endpoint == 0x81;  // what it sent was lost, whether it knows or not
     }
 
     /// One frame of the bus.

@@ -82,8 +82,8 @@ class UsbDevice {
         }
         detail::UsbTransfers& transfers = *open_->transfers;
         discard_old();
-        // A host that is behind takes what comes, and sends what follows from it at once afterwards; but not twice.
-        open_->catches_up = !open_->catches_up && is_behind();
+        // A host that is behind takes what waits, and sends what follows from it at once afterwards; but not twice.
+        open_->catches_up = transfers.arrived() > 0 && !open_->catches_up;
         if (open_->catches_up) {
             ++open_->skipped_commands;
         } else {
@@ -245,15 +245,10 @@ class UsbDevice {
         open_->stream.pause();
     }
 
-    /// Whether a newer packet than the last one is there, or about to come: the end of the last command and the packet
-    /// that wakes a host come in the same frame, in any order and close together. A command that is still on its way
-    /// goes with the next frame, and one that followed it would be a frame behind from then on.
-    [[nodiscard]] bool is_behind() noexcept {
-        const bool has_ended = open_->transfers->wait_for_write(monotonic_now() + open_->frame / 4);
-        return !has_ended || open_->transfers->arrived() > 0;
-    }
-
+    /// The end of the last command and the packet that wakes a host come in the same frame, in any order: up to a
+    /// frame of waiting keeps every frame a command. A device that takes longer is not taking commands.
     void send(double force) noexcept {
+        (void)open_->transfers->wait_for_write(monotonic_now() + open_->frame);
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
         const int code = open_->transfers->write(packet);
