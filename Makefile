@@ -21,7 +21,7 @@ PYTHON ?= python3
 # numbers that are published, 0.01 to see that all run and that their answers are right. Both can be set from outside.
 # The sanitizers slow a program ten times and get a tenth of the cases.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
-test-full: export PALPATE_TEST_SCALE ?= 100
+test-full test-full-native: export PALPATE_TEST_SCALE ?= 100
 bench: export PALPATE_BENCH_SCALE ?= 1
 
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
@@ -38,7 +38,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree hold absolute paths: in a folder that was moved, start again.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs \
         setup clean moved
 
 help:
@@ -87,12 +87,15 @@ control: $(stamps)/develop
 test-cpp: setup
 	tools/cpp_tests.sh dev
 
-test-full: setup
+test-full: test-full-native
+	$(MAKE) --no-print-directory test-python
+
+# What `make test` does not do at any size: sanitizers, the package as installed, a USB device below a kernel.
+test-full-native: setup control
 	tools/cpp_tests.sh release
 	sanitized=$$(( (PALPATE_TEST_SCALE + 9) / 10 )); for preset in asan tsan; do \
 	  PALPATE_TEST_SCALE=$$sanitized tools/cpp_tests.sh $$preset; done
 	tools/install_tests.sh
-	$(MAKE) --no-print-directory test-python
 	$(python) -m pytest tests/usb
 
 bench: setup

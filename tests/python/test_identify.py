@@ -153,9 +153,12 @@ def test_nothing_diverges_on_other_measured_files(data: Path, folder: str) -> No
         model = identify(recording)
         assert np.isfinite(model.weight).all(), path.name
         assert model.fit.nrmse <= 1.0, path.name
-        x = np.linspace(model.domain[0][0], model.domain[1][0], 5001)
-        side = {} if model.kind == "position" else {"direction": np.ones_like(x)}
-        force = model.force(x, **side)
+        low, high = model.domain
+        x = np.linspace(low[0], high[0], 5001)
+        if model.dimension > 1:
+            force = model.predict(np.random.default_rng(0).uniform(low, high, (5001, model.dimension)))
+        else:
+            force = model.force(x, **({"direction": np.ones_like(x)} if model.kind == "hysteresis" else {}))
         margin = np.ptp(recording.force)
         assert recording.force.min() - margin < force.min(), path.name
         assert force.max() < recording.force.max() + margin, path.name

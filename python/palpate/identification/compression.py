@@ -10,7 +10,6 @@ across the cell explains is removed, so that what remains measures noise. With m
 is both fine and small; then a share of the rows, evenly spread over the recording, stands for all.
 """
 
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -119,16 +118,11 @@ class Compressor:
         dy = self._force - y[group]
         within = self._within + float(dy @ (weight * dy))
         spread = np.zeros_like(x)
-        inputs: list[Float1D] = []
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
-            inputs.extend(dx.T)
-        merged_side = None
-        if side is not None:
-            merged_side = _mean(group, count, weight * side)
-            inputs.append(side - merged_side[group])
-        within -= self._explained_by_slopes([column for column in inputs if column.any()], dy)
+            within -= self._explained_by_slopes(dx, dy)
+        merged_side = None if side is None else _mean(group, count, weight * side)
         return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
 
     def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
@@ -140,23 +134,21 @@ class Compressor:
         part._within = self._within * float(part._weight.sum() / self._weight.sum())
         return part
 
-    def _explained_by_slopes(self, inputs: Sequence[Float1D], dy: Float1D) -> float:
+    def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:
         """Part of the within-sum that slopes across the cells explain, from deviations within the groups.
 
         All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same few
         degrees of freedom.
         """
-        if not inputs:
-            return 0.0
-        d = self._positions.shape[1]
-        grid = (self._per_axis or int(self._key.max()) + 1,) * d
+        d = dx.shape[1]
+        grid = (self._per_axis,) * d
         together = max(2, round(POOLED_CELLS ** (1.0 / d)))
         pooled = np.array(np.unravel_index(self._key, grid)) // together
         block, _ = _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)
-        products = [[np.bincount(block, self._weight * a * b) for b in (*inputs, dy)] for a in inputs]
+        products = [[np.bincount(block, self._weight * a * b) for b in (*dx.T, dy)] for a in dx.T]
         table = np.array(products).transpose(2, 0, 1)
-        slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :-1], hermitian=True), table[:, :, -1])
-        return float(np.sum(slope * table[:, :, -1]))
+        slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
+        return float(np.sum(slope * table[:, :, d]))
 
 
 def binning_error(rows: Compressed, curvature: Float2D) -> float:

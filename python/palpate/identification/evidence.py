@@ -32,6 +32,9 @@ class Evidence:
     compressor : Compressor
         Of the same rows.
     options : IdentifyOptions
+    single : bool
+        Whether the force is known to be one: two strokes that a motion samples at different places look like
+        one that wants ever more wavelets.
     """
 
     def __init__(
@@ -41,8 +44,10 @@ class Evidence:
         fresh: NDArray[np.bool_],
         compressor: Compressor,
         options: IdentifyOptions,
+        *,
+        single: bool,
     ) -> None:
-        self.box, self.force = box, force
+        self.box, self.force, self._single = box, force, single
         self._fresh, self._compressor, self._options = fresh, compressor, options
         self._judges_on_fresh = options.criterion in ON_FRESH_ROWS
 
@@ -92,4 +97,4 @@ class Evidence:
         """A network grown from the wavelets of start, and the problem that it solves."""
         problem = self.problem(rows, strokes)
         library = Library(problem, resolved_frame(problem, options))
-        return problem, grow(problem, library, start, name, options)
+        return problem, grow(problem, library, start, name, options, again=self._single)

@@ -85,7 +85,13 @@ def fresh_deviance(criterion: str, fresh: FreshRows, errors: Float1D) -> float:
 
 
 def grow(
-    problem: SeparableProblem, library: Library, start: Basis, rung: str, options: IdentifyOptions
+    problem: SeparableProblem,
+    library: Library,
+    start: Basis,
+    rung: str,
+    options: IdentifyOptions,
+    *,
+    again: bool = True,
 ) -> Grown:
     """Grow from the wavelets of start; where that pays, again from what is left of them, then finer.
 
@@ -95,13 +101,13 @@ def grow(
     """
     found = _grown(problem, library, start, rung, options)
     once = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
-    if once or problem.n_channels > 1 or len(found.solution.basis) == 0:
+    if once or not again or problem.n_channels > 1 or len(found.solution.basis) == 0:
         return found
     for _ in range(REGROWTHS):
-        again = _grown(problem, library, found.solution.basis, rung, options)
-        if again.criterion >= found.criterion:
+        regrown = _grown(problem, library, found.solution.basis, rung, options)
+        if regrown.criterion >= found.criterion:
             break
-        found = replace(again, path=(*found.path[:-1], again.path[-1]))
+        found = replace(regrown, path=(*found.path[:-1], regrown.path[-1]))
     if problem.resolved_by > WITHOUT_NOISE and problem.evenness(found.solution) < EVEN:
         before, problem.resolved_by = problem.resolved_by, WITHOUT_NOISE
         fine = Library(problem, resolved_frame(problem, options))

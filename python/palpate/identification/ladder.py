@@ -88,7 +88,8 @@ class Ladder:
         if weight is not None:
             fresh &= weight > 0.0
         compressor = Compressor(box, force, weight=weight, max_positions=max_positions, within=within)
-        self._evidence = Evidence(box, force, fresh, compressor, options)
+        single = side is None and starts is None
+        self._evidence = Evidence(box, force, fresh, compressor, options, single=single)
         self._side = side
         self._play = None
         if side is None and starts is not None and box.shape[1] == 1:
@@ -159,9 +160,6 @@ class Ladder:
         first = problem.solve(below.solution.basis)
         free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
         if named or free.criterion(options) < below.criterion(options):
-            if self._play is not None:
-                strokes = self._play.measured(strokes, first.basis)
-            rows = self._evidence.rows(strokes)
             problem, grown = self._grown(rows, strokes, "hysteresis", first.basis)
             free = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
         if not named and self._better(below, free) is below:

@@ -3,31 +3,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from .evidence import Evidence
 from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
 from .rung import Rung
-from .separable import TINY, Basis
+from .separable import Basis
 
 LEAST_KNOWN = 0.5
 """Share of the rows whose hysteresis input must be known, for a play radius to be considered."""
-
-MEASURING_WAVELETS = 8
-MEASURING_ROUNDS = 2
-"""Wavelets with which, and times that, the radius is measured before the network is grown."""
-
-PLAY_FACTOR = 2.0
-"""How far from a tried radius a better one is looked for."""
-
-PLAY_TOLERANCE = 1e-4
-"""Of the radius, relative."""
 
 
 class PlaySearch:
@@ -51,15 +39,6 @@ class PlaySearch:
         judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN] or tried
         return min(judged, key=lambda strokes: self._left_by(strokes, basis))
 
-    def measured(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
-        """That of a radius between those of the options, on a network of a few wavelets more."""
-        few = replace(self._options, max_wavelets=len(basis) + MEASURING_WAVELETS)
-        for _ in range(MEASURING_ROUNDS):
-            rows = self._evidence.rows(strokes)
-            _, grown = self._evidence.grown(rows, strokes, "hysteresis", basis, few)
-            strokes = self._closest(strokes, grown.solution.basis)
-        return strokes
-
     def with_first_states(self, rung: Rung) -> Rung:
         """The rung with each motion's play begun where its first force says."""
         if rung.play_radius is None:
@@ -68,18 +47,6 @@ class PlaySearch:
         force = self._evidence.force[self._starts]
         first = np.clip((force - g) / np.where(h == 0.0, np.inf, h), -1.0, 1.0)
         return replace(rung, strokes=self._of(rung.play_radius, first.tolist()))
-
-    def _closest(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
-        """That of the radius around the given one that leaves least on a basis."""
-        assert strokes.play_radius is not None
-
-        def left(log_radius: float) -> float:
-            return math.log(self._left_by(self._of(math.exp(log_radius)), basis) + TINY)
-
-        middle, around = math.log(strokes.play_radius), math.log(PLAY_FACTOR)
-        bounds = middle - around, middle + around
-        found = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": PLAY_TOLERANCE})
-        return self._of(math.exp(found.x))
 
     def _of(self, radius: float, first: Sequence[float] | None = None) -> HysteresisInput:
         motions = np.split(self._evidence.box[:, 0], self._starts[1:])
