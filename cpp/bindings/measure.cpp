@@ -130,7 +130,7 @@ class Watcher {
 /// summary when it has been closed.
 template <Device D, class Told>
 py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSettings>& probe,
-                     Metadata metadata, Measurement& wanted, Told told) {
+                     const Metadata& metadata, Measurement& wanted, Told told) {
     const double period_s = 1.0 / wanted.session.loop.rate_hz;
     GuardSettings guards = bench.guards();
     guards.ramp_s = probe || wanted.push ? guards.ramp_s : 0.0;  // what makes no force has none to begin with
@@ -205,7 +205,7 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
                                           wanted.transducer, wanted.session.loop.rate_hz);
     metadata.insert(metadata.begin() + 1,
                     {"simulated", "yes: device, hand and object; nothing here was measured"});
-    return measured_on(device, bench, probe, std::move(metadata), wanted, [](py::dict&) {});
+    return measured_on(device, bench, probe, metadata, wanted, [](py::dict&) {});
 }
 
 #ifdef PALPATE_HAS_USB
@@ -241,7 +241,7 @@ py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
     UsbDevice device{options};
     Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
-    return measured_on(device, bench, probe, std::move(metadata), wanted, [&](py::dict& summary) {
+    return measured_on(device, bench, probe, metadata, wanted, [&](py::dict& summary) {
         const UsbHealth health = device.health();
         summary["device"] = device.name().text();
         summary["round_trip"] = microseconds(health.stream.round_trip);

@@ -18,7 +18,7 @@ struct ClosedLoopSettings {
     int substeps = 20;            ///< of a tick
     double start_position = 0.0;  ///< [m or rad]
     double start_velocity = 0.0;  ///< of handle and hand [m/s or rad/s]
-    Guards guards{};                ///< default: the device's force limit and nothing else
+    Guards guards{};              ///< default: the device's force limit and nothing else
 };
 
 /// How a closed loop ended.

@@ -81,6 +81,7 @@ struct EnergyAccount {
 /// takes what speed is left.
 class Midpoint : public PlainPlant {
   public:
+    // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): known by its type, never through the base
     void start() noexcept { account_ = {}; }
 
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,

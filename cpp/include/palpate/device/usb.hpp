@@ -64,8 +64,11 @@ class UsbDevice {
         close();
         open_ = std::make_unique<OpenDevice>();
         std::string reason = open_->connection.open(options_.serial).reason;
-        if (reason.empty() && !(reason = start()).empty()) {
-            reason = name().text() + " " + reason;
+        if (reason.empty()) {
+            reason = start();
+            if (!reason.empty()) {
+                reason = name().text() + " " + reason;
+            }
         }
         if (!reason.empty()) {
             const UsbName tried = name();

@@ -32,17 +32,15 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
 /// Bits of InPacket::status.
-enum Bit : std::uint16_t {
-    enabled = 1,
-    watchdog_tripped = 2,
-    torque_saturated = 4,
-    bad_packet = 8,
-    encoder_fault = 16,
-    over_temperature = 32,
-    emergency_stop = 64,
-};
+inline constexpr unsigned enabled = 1;
+inline constexpr unsigned watchdog_tripped = 2;
+inline constexpr unsigned torque_saturated = 4;
+inline constexpr unsigned bad_packet = 8;
+inline constexpr unsigned encoder_fault = 16;
+inline constexpr unsigned over_temperature = 32;
+inline constexpr unsigned emergency_stop = 64;
 /// The bits after which nothing that the device says or does is to be relied on.
-inline constexpr std::uint16_t fault_bits = encoder_fault | over_temperature | emergency_stop;
+inline constexpr unsigned fault_bits = encoder_fault | over_temperature | emergency_stop;
 
 /// Bits of Info::capabilities.
 inline constexpr std::uint32_t has_transducer = 1;

@@ -27,7 +27,7 @@ struct ResolventOptions {
 /// What is inverted: F(y) = f(y) + p y where it rises, f a network of one input without continuation.
 struct RisingForce {
     const NetworkParameters& network;
-    double p;
+    double p = 0.0;
     Interval positions;
     Interval values;           ///< F at both ends
     bool folds_below = false;  ///< F has a fold at the lower end; else it goes on rising there
@@ -264,10 +264,9 @@ class InverseCells {
     const double left_out = force.folds_below || force.folds_above ? 1.0 / 32.0 : 0.0;
     std::vector<InverseTable> best;
     double covered = 0.0;
-    for (double width = std::exp2(std::floor(std::log2(range / 128.0)));
-         range / width + 2.0 <= static_cast<double>(largest_table) && size / width < 0x1p40 &&
-         PiecewiseSeptic::is_sound(width);
-         width *= 0.5) {
+    double width = std::exp2(std::floor(std::log2(range / 128.0)));
+    while (range / width + 2.0 <= static_cast<double>(largest_table) && size / width < 0x1p40 &&
+           PiecewiseSeptic::is_sound(width)) {
         const detail::InverseCells cells{force, asked, width};
         const auto share = [&](std::size_t count) {
             return static_cast<double>(count) / static_cast<double>(cells.size());
@@ -279,6 +278,7 @@ class InverseCells {
         if (share(cells.curable()) <= left_out) {
             break;
         }
+        width *= 0.5;
     }
     return best;
 }

@@ -60,8 +60,10 @@ namespace palpate {
                 if ((at_left > 0.0) == (at_right > 0.0)) {
                     continue;
                 }
-                for (double fold = middle; fold > left && fold < right; fold = 0.5 * (left + right)) {
+                double fold = middle;
+                while (fold > left && fold < right) {
                     ((slope(fold) > 0.0) == (at_left > 0.0) ? left : right) = fold;
+                    fold = 0.5 * (left + right);
                 }
                 rises = at_right > 0.0;
                 if (rises) {

@@ -158,6 +158,7 @@ class UsbConnection {
         };
         if (!fitting.empty()) {
             std::vector<std::string> serials;
+            serials.reserve(fitting.size());
             for (const Candidate& candidate : fitting) {
                 serials.push_back(candidate.name.serial);
             }
