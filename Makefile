@@ -77,7 +77,7 @@ test: lint test-cpp | setup
 	$(MAKE) --no-print-directory test-python
 
 test-python: setup control
-	$(python) -m pytest --numprocesses 2
+	$(python) -m pytest
 
 # The real-time program; the build tool knows what is up to date.
 control: $(stamps)/develop
