@@ -192,9 +192,9 @@ int run(const Options& options) {
     }
     ModelFile file = load_model_file(options.model);
     const RecordUnits units = units_of(file);
-    if (file.inputs.size() != 1) {
+    if (file.inputs.size() != 1 && file.model.velocity() == nullptr) {
         refuse(options.model + " has " + std::to_string(file.inputs.size()) +
-               " inputs: a model of the position alone can be rendered");
+               " inputs: a model of the position, or of position and velocity, can be rendered");
     }
     const auto run_on = kind == "usb" ? run_on_usb : kind == "inverse3" ? run_on_inverse3 : run_on_simulated;
     return run_on(options, std::move(file), units);

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -300,22 +299,3 @@ def test_the_examples_are_listed_with_their_sources(capsys: pytest.CaptureFixtur
 def test_the_locus_is_drawn(here: Path) -> None:
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--plot", "locus.png"]) == 0
     assert Path("locus.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_velocity_has_no_structure_and_is_refused() -> None:
-    with pytest.raises(InputError, match="inputs"):
-        plan(two_inputs(), KNOB)
-
-
-def two_inputs(**changes: Any) -> Model:
-    """A force of position and velocity."""
-    return model_by_hand(
-        kind="position_velocity",
-        inputs=("position", "velocity"),
-        alpha=[[20.0, 1.0]],
-        beta=[[0.3, 0.0]],
-        linear=[5.0, 0.01],
-        lower=[0.0, -1.0],
-        upper=[0.5, 1.0],
-        **changes,
-    )

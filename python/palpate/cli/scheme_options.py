@@ -75,5 +75,4 @@ def chosen_plan(model: Model, bench: Bench, scheme: Mapping[str, Any]) -> Plan:
 
     if model.plan is not None and all(value is None or value is False for value in scheme.values()):
         return Plan.of(model)
-    structure = scheme["structure"] or _DEFAULT.structure
-    return Plan(model, bench.scheme(model, **{**scheme, "structure": structure}))
+    return Plan(model, bench.scheme(model, **scheme))

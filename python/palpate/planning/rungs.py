@@ -80,7 +80,7 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
         return _no_slope(device)
     rendered = _balanced(model)
     if model.hysteretic:
-        limited = _hysteresis_limited(rendered, device, wishes, low, high)
+        limited = _hysteresis_limited(rendered, device, wishes)
     else:
         limited = _within(rendered, low, high)
     if limited is None:
@@ -147,13 +147,27 @@ def explicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     return Plan(model, scheme).certified_for(device)
 
 
-RUNGS: Mapping[str, Callable[[Model, DeviceProfile, Wishes], Outcome]] = {
+Rung = Callable[[Model, DeviceProfile, Wishes], Outcome]
+
+
+def _of_position(rung: Rung) -> Rung:
+    """The rung, refused to a force of velocity."""
+
+    def guarded(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+        if not model.of_velocity:
+            return rung(model, device, wishes)
+        return "of a force of position and velocity no bound is known but for direct rendering as it is"
+
+    return guarded
+
+
+RUNGS: Mapping[str, Rung] = {
     "direct": direct,
-    "direct, slope limited": direct_limited,
-    "massless": massless,
-    "implicit": implicit,
-    "energy-consistent": energy_consistent,
-    "explicit": explicit,
+    "direct, slope limited": _of_position(direct_limited),
+    "massless": _of_position(massless),
+    "implicit": _of_position(implicit),
+    "energy-consistent": _of_position(energy_consistent),
+    "explicit": _of_position(explicit),
 }
 
 
@@ -191,24 +205,23 @@ def _balanced(model: Model) -> Model:
     return changed_network(model, bias=model.bias - turn / model.period)
 
 
-def _hysteresis_limited(
-    model: Model, device: DeviceProfile, wishes: Wishes, low: float, high: float
-) -> Model | None:
+def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model | None:
     """Slopes limited so that a stick has room, then as much of the loss h as the widest play can carry."""
 
     def holds(candidate: Model) -> bool:
         scheme = _direct_scheme(candidate, device, wishes)
         return not _core.certify(candidate, scheme, device).refused
 
-    travel = float(model.upper[0] - model.lower[0])
-    widest = _core.force_bounds(model, LONGEST_PLAY * travel)
-    room = max(0.5 * high, high - 2.0 * widest.loss_per_play)
-    limited = model
-    if not holds(scale_loss(model, _LEAST_LOSS)):
-        nearest = _within(model, max(low, -room) if low > -math.inf else low, room)
-        if nearest is None:
-            return None
-        limited = nearest
+    radius = wishes.play_radius or model.play_radius
+    if radius is None:
+        radius = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
+    bare = renderable_slopes(device)
+    # Half of what the device can hold goes to the stick at most: the rest of h is left out.
+    stick = min(_core.force_bounds(model, radius).loss_per_play, 0.5 * bare[1])
+    low, high = renderable_slopes(device, stick)
+    limited = _within(model, low, high)
+    if limited is None:
+        limited = model
     if holds(limited):
         return limited
     kept, refused = 0.0, 1.0
