@@ -63,7 +63,7 @@ int render_on(D& device, const std::string& called, const Options& options, cons
               << describe(job.scheme) << "; " << called << " at " << readable(job.settings.loop.rate_hz)
               << " Hz " << (std::isfinite(seconds) ? "for " + readable(seconds) + " s" : "until Ctrl-C")
               << "\n";
-    if (!job.file.plan && !chooses_scheme(options)) {
+    if (!job.file.plan && !chooses_scheme(options) && job.scheme.structure != StructureKind::Direct) {
         std::cerr
             << "no plan in the model: rendered behind the default coupling, which is felt; 'palpate plan' "
                "finds the simplest rendering that is not\n";
