@@ -51,6 +51,12 @@ def renderable_slopes(device: DeviceProfile, stick: float = 0.0) -> tuple[float,
     return (-highest if device.delay_samples else -friction), highest
 
 
+def steepest_stick(device: DeviceProfile) -> float:
+    """The slope h/r that leaves half of what the device holds to sliding; what is more of h is left out."""
+    held = device.viscous_damping / device.longest_period_s / (0.5 + device.delay_samples)
+    return min(0.5 * held, 0.25 * friction_slope(device))
+
+
 def coupling_for(device: DeviceProfile, damping: float) -> float:
     """Stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
 

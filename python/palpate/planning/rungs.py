@@ -17,6 +17,7 @@ from .choices import (
     explicit_scheme,
     play_radius_for,
     renderable_slopes,
+    steepest_stick,
     usual_play_radius,
 )
 from .plan import Plan
@@ -79,10 +80,9 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
     if high <= 0.0:
         return _no_slope(device)
     rendered = _balanced(model)
-    if model.hysteretic:
-        limited = _hysteresis_limited(rendered, device, wishes)
-    else:
-        limited = _within(rendered, low, high)
+    limited = (
+        _hysteresis_limited(rendered, device, wishes) if model.hysteretic else _within(rendered, low, high)
+    )
     if limited is None:
         return f"no network was found whose slopes lie between {low:.4g} and {high:.4g}"
     plan = Plan(limited, _direct_scheme(limited, device, wishes), loss=loss_between(model, limited))
@@ -205,7 +205,7 @@ def _balanced(model: Model) -> Model:
     return changed_network(model, bias=model.bias - turn / model.period)
 
 
-def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model | None:
+def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model:
     """Slopes limited so that a stick has room, then as much of the loss h as the widest play can carry."""
 
     def holds(candidate: Model) -> bool:
@@ -215,13 +215,9 @@ def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> 
     radius = wishes.play_radius or model.play_radius
     if radius is None:
         radius = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
-    bare = renderable_slopes(device)
-    # Half of what the device can hold goes to the stick at most: the rest of h is left out.
-    stick = min(_core.force_bounds(model, radius).loss_per_play, 0.5 * bare[1])
+    stick = min(_core.force_bounds(model, radius).loss_per_play, steepest_stick(device))
     low, high = renderable_slopes(device, stick)
-    limited = _within(model, low, high)
-    if limited is None:
-        limited = model
+    limited = _within(model, low, high) or model
     if holds(limited):
         return limited
     kept, refused = 0.0, 1.0
