@@ -227,19 +227,20 @@ def _changes(
     return np.array(changes)
 
 
-def _begun_together(grid: Float1D, strokes: Float2D, edge: int, kept: int, high: float) -> Float2D:
-    """Pressing (2, n) lowered to begin as releasing ends, if it would be too steep beyond the lower edge.
+def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
+    """Pressing (2, n) lowered where contact begins, if it would be too steep beyond the lower edge.
 
-    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Both are the
-    same for `kept` samples: as far as the rounding of kinks reaches.
+    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Where it rises
+    as steeply as it may, that is too much if it begins above `high` / slope times where releasing ends, the
+    slope being that of releasing over the `near` samples that the rounding of kinks reaches.
     """
     press, release = strokes
-    together = edge + kept
-    g, h = 0.5 * (press[edge] + release[edge]), 0.5 * float((press - release)[edge : together + 1].max())
-    slope = 0.5 * (strokes[:, edge + 1] - strokes[:, edge]).sum() / (grid[1] - grid[0])
-    if g <= 0.0 or slope * (g + h) <= high * g:
+    first = release[edge]
+    slope = np.diff(release[edge : edge + near + 1]).max() / (grid[1] - grid[0])
+    if first <= 0.0 or slope <= 0.0:
         return strokes
-    return np.array([np.minimum(press, release[together] + high * (grid - grid[together])), release])
+    begin = release[edge + near] + first * (high / slope - 1.0)
+    return np.array([np.minimum(press, begin + high * (grid - grid[edge + near])), release])
 
 
 def _extended(force: Float1D, margin: int) -> Float1D:
