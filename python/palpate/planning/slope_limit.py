@@ -230,9 +230,9 @@ def _changes(
 def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
     """Pressing (2, n) lowered where contact begins, if it would be too steep beyond the lower edge.
 
-    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Where it rises
-    as steeply as it may, that is too much if it begins above `high` / slope times where releasing ends, the
-    slope being that of releasing over the `near` samples that the rounding of kinks reaches.
+    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Where it
+    rises as steeply as it may, that is too much if it begins above `high` / slope times where releasing
+    ends, the slope being that of releasing over the `near` samples that the rounding of kinks reaches.
     """
     press, release = strokes
     first = release[edge]
