@@ -145,7 +145,7 @@ class EmulatedDevice {
 
     /// The OUT endpoint is written to.
     Handshake out(const Bytes& packet) {
-        if (naks_) {
+        if (naks_ || used(FaultKind::Busy)) {
             return Handshake::Nak;
         }
         if (halted_out_ || used(FaultKind::StallOut)) {

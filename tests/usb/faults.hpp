@@ -33,16 +33,17 @@ enum class FaultKind : std::uint8_t {
     Jump,             ///< the count is off by a quarter turn
     FrozenEncoder,    ///< the count repeats
     Slow,             ///< frames that take three times as long
+    Busy,             ///< OUT packets refused for now (NAK), each a frame late; IN packets go on
 };
 
-inline constexpr std::array<std::string_view, 21> fault_names{
+inline constexpr std::array<std::string_view, 22> fault_names{
     "stall-in",       "stall-out",      "short",
     "freeze",         "unplug",         "skip",
     "repeat",         "magic",          "version",
     "long",           "deaf",           "mute",
     "old-echo",       "encoder",        "over-temperature",
     "emergency-stop", "reset",          "saturate",
-    "jump",           "frozen-encoder", "slow"};
+    "jump",           "frozen-encoder", "slow",      "busy"};
 
 /// A fault: how many packets or frames it lasts, and from which frame on.
 struct Fault {

@@ -164,6 +164,26 @@ TEST(UsbDevice, ADeviceThatDoesNotAnswerIsATimeoutAndNoMore) {
     EXPECT_EQ(status, Status::Ok);
 }
 
+// The device stops no run for one late command, but a certified one ends with the first.
+TEST(UsbDevice, ACommandThatMissesItsFrameDoesNotMakeAllThatFollowLate) {
+    constexpr int rounds = 20;
+    constexpr int commands = 40;
+    UsbOptions options;
+    options.wait = std::chrono::seconds{20};
+    options.longest_delay_s = 1.25e-3;
+    UsbDevice device{options};
+    ASSERT_EQ(device.open().reason, "");
+    int late = 0;
+    for (int round = 0; round < rounds; ++round) {  // the first is that of the stream's first command
+        tell("fault busy 1");
+        for (int k = 0; k < commands; ++k) {
+            late += device.exchange({0.1}).status == Status::Timeout ? 1 : 0;
+        }
+    }
+    EXPECT_GE(late, rounds);
+    EXPECT_LT(late, rounds * commands / 4);  // a few more where this machine is late
+}
+
 TEST(UsbDevice, SamplesLeftOutShowInTheSequence) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
