@@ -39,7 +39,7 @@ class Port {
             return -ENODEV;
         }
         if (transfer.is_control) {
-            EmulatedDevice::Answer answer = device_.control(transfer.setup, transfer.data);
+            Answer answer = device_.control(transfer.setup, transfer.data);
             transfer.status = answer.status;
             const bool in = (transfer.setup.at(0) & 0x80U) != 0;
             transfer.actual = answer.status != 0 ? 0 : in ? answer.data.size() : transfer.data.size();
@@ -90,7 +90,8 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        owes_answer_ = owes_answer_ && endpoint == 0x81;  // the answer was lost, whether the host knows or not
+        owes_answer_ =
+            owes_answer_ && endpoint == 0x81;  // the answer was lost, whether the host knows or not
     }
 
     /// One frame of the bus.
@@ -112,15 +113,15 @@ class Port {
             }
             return;
         }
-        // The answer to an OUT packet is told before the IN packet, as a host that sends at once would see it.
-        if (!device_.identity().takes_out_first) {
-            Bytes packet;
-            const Handshake answer = polled(packet);
-            serve_out();
+        Bytes packet;
+        const Handshake answer = polled(packet);
+        if (device_.identity().tells_in_first) {
             serve_in(answer, packet);
-        } else {
-            Bytes packet;
-            const Handshake answer = polled(packet);
+        }
+        if (!device_.identity().takes_out_first) {
+            serve_out();
+        }
+        if (!device_.identity().tells_in_first) {
             serve_in(answer, packet);
         }
     }
@@ -214,8 +215,7 @@ class FrameClock {
     /// Whether a frame begins now; else `until` is when to look again at the latest.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
-        const bool in_step =
-            lock_step_ && !device.takes_its_time() && !device.is_slow() && !port.is_behind();
+        const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow() && !port.is_behind();
         if (in_step && in_conversation_ && port.host_is_ready()) {
             until = first_;
             last_ = now;

@@ -30,12 +30,13 @@ struct UsbOptions {
 /// What happened on the wire, packets and transfers.
 struct UsbHealth {
     StreamHealth stream;
-    std::uint64_t skipped_commands = 0;  ///< not sent: the last one was still on its way, or a newer sample there
-    std::uint64_t lost_commands = 0;     ///< that did not arrive
-    std::uint64_t timeouts = 0;          ///< exchanges in which no packet came
-    std::uint64_t discarded = 0;         ///< packets that nobody had taken for too long
-    std::uint64_t stalls = 0;            ///< endpoints that halted and were cleared
-    std::uint64_t bus_errors = 0;        ///< transfers that failed on the bus
+    std::uint64_t skipped_commands =
+        0;  ///< not sent: the last one was still on its way, or a newer sample there
+    std::uint64_t lost_commands = 0;  ///< that did not arrive
+    std::uint64_t timeouts = 0;       ///< exchanges in which no packet came
+    std::uint64_t discarded = 0;      ///< packets that nobody had taken for too long
+    std::uint64_t stalls = 0;         ///< endpoints that halted and were cleared
+    std::uint64_t bus_errors = 0;     ///< transfers that failed on the bus
 };
 
 /// A haptic device of one degree of freedom over USB; packets and signs: device/wire.hpp.
@@ -85,12 +86,16 @@ class UsbDevice {
         if (open_ == nullptr) {
             return failed(Status::Fault);
         }
+        const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
         if (!begins_anew()) {
-            answer(command.force);
+            answer(command.force, deadline);
         }
-        if (next_packet(monotonic_now() + std::chrono::nanoseconds{options_.wait}.count())) {
-            return judged(open_->stream.reading());
+        if (next_packet(deadline)) {
+            const Reading reading = judged(open_->stream.reading());
+            open_->sound = sends_force(reading.status);
+            return reading;
         }
+        open_->sound = false;
         if (open_->transfers->is_gone()) {
             return failed(Status::Fault);
         }
@@ -155,7 +160,8 @@ class UsbDevice {
 
   private:
     static constexpr std::size_t most_waiting = 4;  ///< packets: a host that is later than this begins anew
-    static constexpr int most_held = 2;  ///< packets that a device may have kept from before: of another time and state
+    static constexpr int most_held =
+        2;  ///< packets that a device may have kept from before: of another time and state
     static constexpr Nanoseconds first_packet = nanoseconds_a_second;
     static constexpr Nanoseconds one_write = nanoseconds_a_second / 50;
 
@@ -169,6 +175,7 @@ class UsbDevice {
         Nanoseconds arrived = 0;  ///< the last packet
         bool catches_up = false;
         bool sent_last = true;
+        bool sound = true;  ///< the last reading
         std::uint64_t skipped_commands = 0;
         std::uint64_t lost_commands = 0;
         std::uint64_t timeouts = 0;
@@ -194,15 +201,15 @@ class UsbDevice {
                        : "sends no packets; unplug it and plug it in again";
         }
         if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
-            return "reports " + fault_text(open_->stream.status_bits()) +
-                   "; when its cause is gone, " + clear_it;
+            return "reports " + fault_text(open_->stream.status_bits()) + "; when its cause is gone, " +
+                   clear_it;
         }
         if (!options_.makes_force) {
             return "";
         }
         if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
             return "cannot be enabled: " + (code == LIBUSB_ERROR_PIPE ? std::string("it refuses; ") + clear_it
-                                                                     : detail::usb_reason(code));
+                                                                      : detail::usb_reason(code));
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {
             if (!next_packet(deadline)) {
@@ -260,21 +267,35 @@ class UsbDevice {
         return true;
     }
 
-    /// Sends the command that follows from the last packet, unless the host is behind: then it takes what comes, and
-    /// sends what follows from that at once afterwards; but not twice, and no zero force waits for that.
-    ///
-    /// The end of a command and the packet that wakes a host come in the same frame, in any order. A command that has
-    /// not ended half a frame later goes with the next frame: one that waited for its end would be a frame late, and
-    /// so would every one that followed.
-    void answer(double force) noexcept {
-        const bool ended = open_->transfers->wait_for_write(open_->arrived + open_->frame / 2);
-        const bool behind = !ended || (force != 0.0 && open_->transfers->arrived() > 0);
+    /// Sends the command that follows from the last packet, unless the host is behind: then it takes what waits, and
+    /// sends what follows from that at once afterwards; but not twice, and nothing that ends a force waits for that.
+    void answer(double force, Nanoseconds deadline) noexcept {
+        const bool ended = last_has_ended(deadline);
+        const bool behind = !ended || (open_->sound && open_->transfers->arrived() > 0);
         open_->catches_up = behind && !open_->catches_up;
         if (open_->catches_up) {
             ++open_->skipped_commands;
+            open_->sent_last = open_->sent_last && ended;
         } else {
             send(force);
         }
+    }
+
+    /// The end of a command and the packet that wakes a host come in the same frame, in any order. A command that ends
+    /// much later than that packet has missed its frame, and ends in the next one: close to a newer packet, which is
+    /// waited for, since else that command and all that follow were a frame late.
+    [[nodiscard]] bool last_has_ended(Nanoseconds deadline) noexcept {
+        detail::UsbTransfers& transfers = *open_->transfers;
+        if (!transfers.writes()) {
+            return true;
+        }
+        (void)transfers.wait_for_write_or_arrival(deadline);
+        const bool ended = !transfers.writes();
+        const Nanoseconds now = monotonic_now();
+        if (ended && now - open_->arrived > open_->frame / 2) {
+            (void)transfers.wait_for_arrival(now + open_->frame / 4);
+        }
+        return ended;
     }
 
     void send(double force) noexcept {

@@ -216,7 +216,8 @@ class Unwrapped {
     /// Takes the next reading; returns how far it is from the last one, 0 for the first.
     std::int64_t follow(Counter reading) noexcept {
         using Unsigned = std::make_unsigned_t<Counter>;
-        const auto ahead = static_cast<Unsigned>(static_cast<Unsigned>(reading) - static_cast<Unsigned>(last_));
+        const auto ahead =
+            static_cast<Unsigned>(static_cast<Unsigned>(reading) - static_cast<Unsigned>(last_));
         const auto step = started_ ? static_cast<std::make_signed_t<Counter>>(ahead) : 0;
         value_ = started_ ? value_ + step : static_cast<std::int64_t>(reading);
         last_ = reading;

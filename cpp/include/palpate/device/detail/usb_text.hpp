@@ -74,12 +74,15 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
             continue;
         }
         const bool is_control = unit < 0x20 || unit == 0x7F;
-        append_utf8(text, is_control ? ' ' : is_low ? 0x10000 + ((high - 0xD800) << 10U) + (unit - 0xDC00) : unit);
+        append_utf8(text, is_control ? ' '
+                          : is_low   ? 0x10000 + ((high - 0xD800) << 10U) + (unit - 0xDC00)
+                                     : unit);
         high = 0;
     }
     const std::size_t first = text.find_first_not_of(' ');
-    return high != 0 || first == std::string::npos ? ""
-                                                   : text.substr(first, text.find_last_not_of(' ') + 1 - first);
+    return high != 0 || first == std::string::npos
+               ? ""
+               : text.substr(first, text.find_last_not_of(' ') + 1 - first);
 }
 
 /// A string of the device, in the first of its languages; empty where it has none.
@@ -89,7 +92,8 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
         const int length = libusb_get_string_descriptor(handle, which, language, bytes.data(),
                                                         static_cast<int>(bytes.size()));
         const bool is_one = length >= 2 && bytes[0] >= 2 && bytes[1] == LIBUSB_DT_STRING;
-        return std::span<const std::uint8_t>{bytes}.first(is_one ? std::min<std::size_t>(bytes[0], length) : 0);
+        return std::span<const std::uint8_t>{bytes}.first(is_one ? std::min<std::size_t>(bytes[0], length)
+                                                                 : 0);
     };
     if (index == 0) {
         return "";
