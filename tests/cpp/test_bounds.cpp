@@ -4,12 +4,14 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "palpate/model/network_curve.hpp"
 #include "palpate/model/radial_network.hpp"
+#include "palpate/model/radial_sum.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -115,6 +117,59 @@ TEST(Bounds, AreTightWhereHugeWeightsCancel) {
 Domain unit_box(std::size_t dimension) {
     return {std::vector<double>(dimension, 0.0), std::vector<double>(dimension, 1.0), Continuation::Linear,
             Continuation::Linear, std::nullopt};
+}
+
+// Every instruction set that this machine has; in small boxes the rest is so small that each derivative is seen.
+TEST(RadialBounds, TaylorsFormulaLeavesNoMoreThanItsRest) {
+    for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
+        Random random{36};
+        for (int k = 0; k < cases(200); ++k) {
+            const std::size_t d = 1 + static_cast<std::size_t>(k % 3);
+            const NetworkParameters parameters =
+                test::random_network(random, static_cast<std::size_t>(k % 19), d);
+            const std::vector<double> lower(d, -1.0);
+            const std::vector<double> upper(d, 2.0);
+            const RadialSum hats{parameters, lower, upper, kernel};
+            detail::RadialExpansion sums = hats.expansion();
+            std::vector<double> middle(d);
+            std::vector<double> radius(d);
+            for (std::size_t j = 0; j < d; ++j) {
+                middle[j] = uniform(random, 0.0, 1.0);
+                radius[j] = std::exp(uniform(random, -9.0, -2.0));
+            }
+            hats.expand(middle.data(), radius.data(), sums);
+            const double rest = std::accumulate(sums.rest.begin(), sums.rest.end(), 0.0);
+            for (int point = 0; point < 10; ++point) {
+                std::vector<double> t(d);
+                std::vector<double> x(d);
+                for (std::size_t j = 0; j < d; ++j) {
+                    t[j] = uniform(random, -1.0, 1.0);
+                    x[j] = middle[j] + radius[j] * t[j];
+                }
+                double value = 0.0;
+                std::vector<double> gradient(d, 0.0);
+                hats.add(x.data(), value, gradient.data());
+                double cubic = sums.value;
+                for (std::size_t j = 0; j < d; ++j) {
+                    double along = sums.gradient[j];
+                    cubic += sums.gradient[j] * t[j];
+                    for (std::size_t l = 0; l < d; ++l) {
+                        along += sums.bend[j * d + l] * t[l];
+                        cubic += sums.bend[j * d + l] * t[j] * t[l] / 2.0;
+                        for (std::size_t m = 0; m < d; ++m) {
+                            const double twist = sums.twist[(j * d + l) * d + m];
+                            along += twist * t[l] * t[m] / 2.0;
+                            cubic += twist * t[j] * t[l] * t[m] / 6.0;
+                        }
+                    }
+                    ASSERT_LE(std::abs(radius[j] * gradient[j] - along),
+                              std::sqrt(sums.rest[j] * rest) / 6.0 + 1e-10 * radius[j])
+                        << k;
+                }
+                ASSERT_LE(std::abs(value - cubic), rest / 24.0 + 1e-12) << k;
+            }
+        }
+    }
 }
 
 TEST(RadialBounds, HoldAtEveryPointInsideAndOutside) {

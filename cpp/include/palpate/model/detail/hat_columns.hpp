@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "palpate/model/continuation.hpp"
+
+namespace palpate {
+
+/// What many positions may be asked for at once.
+enum class HatQuantity : std::uint8_t { Value, Slope, Integral };
+
+namespace detail {
+
+/// Beyond this |u| a hat is below 1e-300. It keeps e^{-u^2/2} a normal number.
+inline constexpr double hat_reach = 37.4;
+
+/// Parameters column by column. Beyond `count` wavelets, up to `size`, their weights are zero.
+struct HatColumns {
+    std::size_t count, size;
+    const double *alpha, *beta, *weight;
+    const double *weight_by_width, *weight_width, *weight_width_squared;  ///< w alpha, w / alpha, w / alpha^2
+};
+
+/// Radial hats of several inputs, input by input and each column by column, and the box of their data. Padded as
+/// above.
+struct RadialColumns {
+    std::size_t dimension, size;
+    const double *alpha, *beta, *weight;
+    const double *lower, *upper;
+
+    /// One component of the projection of x onto the box.
+    [[nodiscard]] double projected(const double* x, std::size_t j) const noexcept {
+        return x[j] < lower[j] ? lower[j] : x[j] > upper[j] ? upper[j] : x[j];
+    }
+};
+
+/// Bounds of |D^4 psi(a, b, c, e)| for unit vectors, of the radial hat of d inputs: psi is the Laplacian of a
+/// Gaussian, so along a direction it is a sum of Hermite functions of order 6 and 4; the largest value of a
+/// symmetric form is taken on equal vectors. Cramer's inequality gives what is left at a distance r from the
+/// centre, times e^{-r^2/4}.
+struct FourthDerivative {
+    double supremum;
+    double tail;
+
+    explicit FourthDerivative(std::size_t dimension) noexcept {
+        const double others = static_cast<double>(dimension) - 1.0;
+        supremum = 15.0 + std::max(others, 0.7358) * 3.0;
+        tail = 29.1540 + std::max(others, 1.4716) * 5.3228;
+    }
+};
+
+/// Taylor's formula about the middle of a box for a sum of radial hats, distances along an input counted in the
+/// box's radius along it. `rest` bounds the fourth order: with s_j a wavelet's dilation times the radius and B
+/// the largest |D^4 psi| at the wavelet's least distance, rest_j = sum |w| B |s|^2 s_j^2.
+struct RadialExpansion {
+    RadialExpansion(std::size_t d, std::size_t size)
+        : fourth{d}, gradient(d), bend(d * d), twist(d * d * d), rest(d), room((2 * d + 4) * size + d * d) {}
+
+    FourthDerivative fourth;
+    double value = 0.0;
+    std::vector<double> gradient;  ///< d
+    std::vector<double> bend;      ///< d x d: second derivatives
+    std::vector<double> twist;     ///< d x d x d: third
+    std::vector<double> rest;      ///< d
+    std::vector<double> room;      ///< of the kernel
+};
+
+/// The functions of one instruction set.
+struct HatKernel {
+    void (*at)(const HatColumns& of, double x, Curve& sum) noexcept;
+    std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3>
+        batch;  ///< by quantity
+    void (*radial)(const RadialColumns& of, const double* x, double& value, double* gradient) noexcept;
+    void (*expansion)(const RadialColumns& of, const double* middle, const double* radius,
+                      RadialExpansion& sums) noexcept;
+    void (*gaussians)(const double* square, std::size_t n, double* e) noexcept;
+};
+
+}  // namespace detail
+
+}  // namespace palpate
