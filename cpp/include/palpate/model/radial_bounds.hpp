@@ -88,6 +88,20 @@ class RadialEnclosure {
             quadratic_range(d, value, sums_.gradient.data(), sums_.bend.data(), twists / 6.0 + fourth / 24.0);
     }
 
+    /// The input along which most may change.
+    [[nodiscard]] std::size_t widest() const noexcept {
+        std::size_t widest = 0;
+        double most = 0.0;
+        for (std::size_t j = 0; j < network_.dimension; ++j) {
+            const double change = std::abs(sums_.gradient[j]) + sums_.rest[j];
+            if (change > most) {
+                widest = j;
+                most = change;
+            }
+        }
+        return widest;
+    }
+
     double value = 0.0;            ///< in the middle
     std::vector<double> gradient;  ///< in the middle
     RadialBounds ranges;
@@ -199,14 +213,6 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
         }
         return all;
     };
-    // A box is cut across the side that spans most of the finest wavelet along it.
-    std::vector<double> finest(d);
-    for (std::size_t j = 0; j < d; ++j) {
-        finest[j] = 1.0 / (upper[j] - lower[j]);
-        for (std::size_t i = 0; i < network.weight.size(); ++i) {
-            finest[j] = std::max(finest[j], network.alpha[i * d + j]);
-        }
-    }
     detail::RadialEnclosure box{network, hats};
     RadialBounds bounds;
     // The edges of boxes that are still to be looked at, 2 d numbers each.
@@ -217,11 +223,7 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
         double* const to = from + d;
         box.over(from, to);
         look(box.value, box.gradient);
-        std::size_t widest = 0;
-        for (std::size_t j = 1; j < d; ++j) {
-            widest =
-                (to[j] - from[j]) * finest[j] > (to[widest] - from[widest]) * finest[widest] ? j : widest;
-        }
+        const std::size_t widest = box.widest();
         const double cut = 0.5 * (from[widest] + to[widest]);
         if (settled(box.ranges) || boxes >= budget || cut <= from[widest] || cut >= to[widest]) {
             if (bounds.gradient.empty()) {

@@ -209,7 +209,6 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     double* const mixed = spread + d * n;   // d x d: sums of A_4 s_j^2 u_l s_l
     const Lanes nothing{};
     const Lanes reach = nothing + hat_reach;
-    const Lanes supremum = nothing + sums.fourth.supremum;
     Lanes values{};
     for (std::size_t i = 0; i < n; i += PALPATE_LANES) {
         Lanes square{};
@@ -236,15 +235,14 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
         Lanes weight, e, beyond;
         load(weight, of.weight + i);
         gaussian(square, e);
-        least *= 0.5;
+        least *= 2.0 * fourth_derivative_decay;
         gaussian(least, beyond);
         e *= weight;
         values += (square - inputs) * e;
         const Lanes factors[] = {(inputs + 2.0 - square) * e, (inputs + 4.0 - square) * e,
                                  (inputs + 6.0 - square) * e};
-        beyond *= sums.fourth.tail;
-        beyond = beyond > supremum ? supremum : beyond;
-        const Lanes left = (weight < nothing ? -weight : weight) * beyond * whole;
+        const Lanes left =
+            (weight < nothing ? -weight : weight) * (fourth_derivative_supremum(d) * beyond) * whole;
         __builtin_memcpy(first + i, &factors[0], sizeof(left));
         __builtin_memcpy(second + i, &factors[1], sizeof(left));
         __builtin_memcpy(third + i, &factors[2], sizeof(left));

@@ -78,9 +78,8 @@ inline void expansion(const RadialColumns& of, const double* middle, const doubl
         const double first = (inputs + 2.0 - square) * factor;
         const double second = (inputs + 4.0 - square) * factor;
         const double third = (inputs + 6.0 - square) * factor;
-        const double beyond =
-            std::min(sums.fourth.supremum,
-                     sums.fourth.tail * std::exp(-0.25 * std::min(least, 2.0 * hat_reach * hat_reach)));
+        const double beyond = fourth_derivative_supremum(d) *
+                              std::exp(-fourth_derivative_decay * std::min(least, hat_reach * hat_reach));
         sums.value += (square - inputs) * factor;
         for (std::size_t j = 0; j < d; ++j) {
             sums.gradient[j] += first * u[j] * scale[j];
