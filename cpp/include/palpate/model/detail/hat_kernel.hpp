@@ -277,18 +277,21 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
 
 /// e^{-s/2} for many s >= 0.
 PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
-    for (std::size_t k = 0; k < n; k += PALPATE_LANES) {
-        const std::size_t here = n - k < PALPATE_LANES ? n - k : PALPATE_LANES;
-        double padded[PALPATE_LANES] = {};
-        for (std::size_t j = 0; j < here; ++j) {
-            padded[j] = square[k + j];
-        }
-        Lanes s, result;
-        load(s, padded);
+    Lanes s, result;
+    std::size_t k = 0;
+    for (; k + PALPATE_LANES <= n; k += PALPATE_LANES) {
+        load(s, square + k);
         gaussian(s, result);
-        for (std::size_t j = 0; j < here; ++j) {
-            e[k + j] = result[j];
-        }
+        __builtin_memcpy(e + k, &result, sizeof(result));
+    }
+    double rest[PALPATE_LANES] = {};
+    for (std::size_t j = 0; k + j < n; ++j) {
+        rest[j] = square[k + j];
+    }
+    load(s, rest);
+    gaussian(s, result);
+    for (std::size_t j = 0; k + j < n; ++j) {
+        e[k + j] = result[j];
     }
 }
 
