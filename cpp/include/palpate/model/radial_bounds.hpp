@@ -184,7 +184,7 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
 /// that are still too coarse when the budget ends only make the result wider.
 [[nodiscard]] inline RadialBounds radial_bounds(const NetworkParameters& network,
                                                 std::span<const double> lower, std::span<const double> upper,
-                                                double relative = 0.01, int budget = 50'000,
+                                                double relative = 0.01, std::size_t budget = 50'000,
                                                 const detail::HatKernel& kernel = detail::hat_kernel()) {
     const std::size_t d = network.dimension;
     const RadialSum hats{network, lower, upper, kernel};
@@ -215,17 +215,18 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
     };
     detail::RadialEnclosure box{network, hats};
     RadialBounds bounds;
-    // The edges of boxes that are still to be looked at, 2 d numbers each.
-    std::vector<double> open{lower.begin(), lower.end()};
-    open.insert(open.end(), upper.begin(), upper.end());
-    for (int boxes = 1; !open.empty(); ++boxes) {
-        double* const from = &open[open.size() - 2 * d];
-        double* const to = from + d;
-        box.over(from, to);
+    // The edges of all boxes, 2 d numbers each, wide ones first: where the budget ends, all are equally coarse.
+    std::vector<double> edges{lower.begin(), lower.end()};
+    edges.insert(edges.end(), upper.begin(), upper.end());
+    edges.reserve(4096);
+    for (std::size_t next = 0; next < edges.size(); next += 2 * d) {
+        box.over(&edges[next], &edges[next + d]);
         look(box.value, box.gradient);
         const std::size_t widest = box.widest();
-        const double cut = 0.5 * (from[widest] + to[widest]);
-        if (settled(box.ranges) || boxes >= budget || cut <= from[widest] || cut >= to[widest]) {
+        const double from = edges[next + widest];
+        const double to = edges[next + d + widest];
+        const double cut = 0.5 * (from + to);
+        if (settled(box.ranges) || edges.size() >= 2 * d * budget || cut <= from || cut >= to) {
             if (bounds.gradient.empty()) {
                 bounds = box.ranges;
             }
@@ -233,14 +234,13 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
             for (std::size_t j = 0; j < d; ++j) {
                 bounds.gradient[j] = bounds.gradient[j].with(box.ranges.gradient[j]);
             }
-            open.resize(open.size() - 2 * d);
             continue;
         }
-        // The upper half takes the place of the box, the lower one comes next.
-        const std::vector<double> whole(from, from + 2 * d);
-        from[widest] = cut;
-        open.insert(open.end(), whole.begin(), whole.end());
-        open[open.size() - d + widest] = cut;
+        for (const std::size_t side : {d, std::size_t{0}}) {
+            for (std::size_t j = 0; j < 2 * d; ++j) {
+                edges.push_back(j == side + widest ? cut : edges[next + j]);
+            }
+        }
     }
     bounds.value = {bounds.value.lower - rounding.value, bounds.value.upper + rounding.value};
     for (std::size_t j = 0; j < d; ++j) {
