@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -142,6 +143,86 @@ TEST(RadialBounds, RestOnABoundOfTheFourthDerivative) {
                               std::exp(-detail::fourth_derivative_decay * (square + across)));
             }
         }
+    }
+}
+
+/// D^4 psi(t, t, t, t) of a wavelet at u, of |t|^4.
+double fourth_derivative(std::span<const double> u, std::span<const double> t) {
+    double square = 0.0;
+    double along = 0.0;
+    double length = 0.0;
+    for (std::size_t j = 0; j < u.size(); ++j) {
+        square += u[j] * u[j];
+        along += u[j] * t[j];
+        length += t[j] * t[j];
+    }
+    const double x = along * along / length;
+    const double sixth = ((x - 15.0) * x + 45.0) * x - 15.0;
+    const double fourth = (x - 6.0) * x + 3.0;
+    const double others = static_cast<double>(u.size()) - 1.0;
+    return (sixth + fourth * (square - x - others)) * std::exp(-0.5 * square) * length * length;
+}
+
+TEST(RadialBounds, SeeThatNearWaveletsTakeEachOtherAway) {
+    Random random{38};
+    for (int k = 0; k < cases(20'000); ++k) {
+        const std::size_t d = 1 + static_cast<std::size_t>(k % 3);
+        NetworkParameters pair = test::random_network(random, 2, d);
+        std::vector<double> u(2 * d);
+        std::vector<double> t(2 * d);
+        double square = 0.0;
+        double length = 0.0;
+        for (std::size_t j = 0; j < d; ++j) {
+            pair.alpha[d + j] = pair.alpha[j] * (1.0 + uniform(random, -0.006, 0.006));
+            pair.beta[d + j] = pair.beta[j] + uniform(random, -0.004, 0.004) / pair.alpha[j];
+            const double x = pair.beta[j] + uniform(random, -5.0, 5.0) / pair.alpha[j];
+            const double step = uniform(random, -1.0, 1.0) / pair.alpha[j];
+            for (std::size_t i = 0; i < 2; ++i) {
+                u[i * d + j] = pair.alpha[i * d + j] * (x - pair.beta[i * d + j]);
+                t[i * d + j] = pair.alpha[i * d + j] * step;
+            }
+            square += u[j] * u[j];
+            length += t[j] * t[j];
+        }
+        pair.weight = {1.0, -1.0};
+        const std::span<const double> all_u{u};
+        const std::span<const double> all_t{t};
+        const double difference = fourth_derivative(all_u.first(d), all_t.first(d)) -
+                                  fourth_derivative(all_u.last(d), all_t.last(d));
+        const std::vector<double> counted = detail::uncancelled_weights(pair);
+        ASSERT_EQ(counted[1], 0.0);
+        ASSERT_LT(counted[0], 0.4);
+        ASSERT_LE(std::abs(difference), counted[0] * detail::fourth_derivative_supremum(d) *
+                                            std::exp(-detail::fourth_derivative_decay * square) * length *
+                                            length)
+            << k;
+    }
+}
+
+TEST(RadialBounds, AreTightWhereHugeWeightsCancel) {
+    Random random{39};
+    for (int k = 0; k < cases(3); ++k) {
+        NetworkParameters network = test::random_network(random, 8, 2);
+        for (double& alpha : network.alpha) {
+            alpha = std::min(alpha, 10.0);
+        }
+        cancel(network, random);
+        const std::vector<double> lower{0.0, 0.0};
+        const std::vector<double> upper{1.0, 1.0};
+        const RadialSum hats{network, lower, upper};
+        Interval seen{1e300, -1e300};
+        for (int i = 0; i <= 200; ++i) {
+            for (int j = 0; j <= 200; ++j) {
+                const std::vector<double> x{i / 200.0, j / 200.0};
+                double value = 0.0;
+                std::vector<double> gradient = network.linear;
+                hats.add(x.data(), value, gradient.data());
+                seen = seen.with({gradient[0], gradient[0]});
+            }
+        }
+        const Interval proved = radial_bounds(network, lower, upper).gradient[0];
+        EXPECT_LE(proved.upper - seen.upper, 0.012 * seen.largest()) << k;
+        EXPECT_LE(seen.lower - proved.lower, 0.012 * seen.largest()) << k;
     }
 }
 

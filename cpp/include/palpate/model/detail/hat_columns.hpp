@@ -31,6 +31,7 @@ struct HatColumns {
 struct RadialColumns {
     std::size_t dimension, size;
     const double *alpha, *beta, *weight;
+    const double* uncancelled;  ///< what counts for |weight| in the rest of an expansion
     const double *lower, *upper;
 
     /// One component of the projection of x onto the box.
@@ -51,7 +52,8 @@ inline constexpr double fourth_derivative_decay = 0.22;
 
 /// Taylor's formula about the middle of a box for a sum of radial hats, distances along an input counted in the
 /// box's radius along it. `rest` bounds the fourth order: with s_j a wavelet's dilation times the radius and B
-/// what bounds |D^4 psi| at the wavelet's least distance, rest_j = sum |w| B |s|^2 s_j^2.
+/// what bounds |D^4 psi| at the wavelet's least distance, rest_j = sum w B |s|^2 s_j^2 with the uncancelled
+/// weights w.
 struct RadialExpansion {
     RadialExpansion(std::size_t d, std::size_t size)
         : gradient(d), bend(d * d), twist(d * d * d), rest(d), room((2 * d + 4) * size + d * d) {}

@@ -232,8 +232,9 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
             __builtin_memcpy(offset + j * n + i, &u, sizeof(u));
             __builtin_memcpy(spread + j * n + i, &along, sizeof(along));
         }
-        Lanes weight, e, beyond;
+        Lanes weight, uncancelled, e, beyond;
         load(weight, of.weight + i);
+        load(uncancelled, of.uncancelled + i);
         gaussian(square, e);
         least *= 2.0 * fourth_derivative_decay;
         gaussian(least, beyond);
@@ -241,8 +242,7 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
         values += (square - inputs) * e;
         const Lanes factors[] = {(inputs + 2.0 - square) * e, (inputs + 4.0 - square) * e,
                                  (inputs + 6.0 - square) * e};
-        const Lanes left =
-            (weight < nothing ? -weight : weight) * (fourth_derivative_supremum(d) * beyond) * whole;
+        const Lanes left = uncancelled * (fourth_derivative_supremum(d) * beyond) * whole;
         __builtin_memcpy(first + i, &factors[0], sizeof(left));
         __builtin_memcpy(second + i, &factors[1], sizeof(left));
         __builtin_memcpy(third + i, &factors[2], sizeof(left));

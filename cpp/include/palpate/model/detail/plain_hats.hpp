@@ -83,7 +83,7 @@ inline void expansion(const RadialColumns& of, const double* middle, const doubl
         sums.value += (square - inputs) * factor;
         for (std::size_t j = 0; j < d; ++j) {
             sums.gradient[j] += first * u[j] * scale[j];
-            sums.rest[j] += std::abs(of.weight[i]) * beyond * spread * scale[j] * scale[j];
+            sums.rest[j] += of.uncancelled[i] * beyond * spread * scale[j] * scale[j];
             for (std::size_t k = 0; k < d; ++k) {
                 const double by_two = scale[j] * scale[k];
                 sums.bend[j * d + k] += by_two * ((j == k ? first : 0.0) - second * u[j] * u[k]);
