@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -128,20 +129,29 @@ Domain unit_box(std::size_t dimension) {
             Continuation::Linear, std::nullopt};
 }
 
-TEST(RadialBounds, RestOnABoundOfTheFourthDerivative) {
+// Along a direction psi is a sum of two Hermite functions; at every distance all angles to it are tried.
+TEST(RadialBounds, RestOnBoundsOfHigherDerivatives) {
     for (std::size_t d = 1; d <= 5; ++d) {
         const double others = static_cast<double>(d) - 1.0;
-        for (double x = 0.0; x < 9.0; x += 0.05) {
-            const double square = x * x;
-            const double sixth = ((square - 15.0) * square + 45.0) * square - 15.0;
-            const double fourth = (square - 6.0) * square + 3.0;
-            for (double across = 0.0; across < (d == 1 ? 0.05 : 40.0); across += 0.25) {
-                const double derivative =
-                    (sixth + fourth * (across - others)) * std::exp(-0.5 * (square + across));
-                ASSERT_LE(std::abs(derivative),
-                          (1.0 + 1e-15) * detail::fourth_derivative_supremum(d) *
-                              std::exp(-detail::fourth_derivative_decay * (square + across)));
+        const double supremum = (1.0 + 1e-15) * detail::fourth_derivative_supremum(d);
+        for (double r = 0.0; r < 12.0; r += 0.02) {
+            double fourth = 0.0;
+            double fifth = 0.0;
+            for (int angle = 0; angle <= (d == 1 ? 0 : 90); ++angle) {
+                const double x = r * std::cos(angle * std::numbers::pi / 180.0);
+                const double s = x * x;
+                const double across = r * r - s - others;
+                fourth = std::max(
+                    fourth, std::abs(((s - 15.0) * s + 45.0) * s - 15.0 + ((s - 6.0) * s + 3.0) * across));
+                fifth = std::max(
+                    fifth,
+                    std::abs((((s - 21.0) * s + 105.0) * s - 105.0 + ((s - 10.0) * s + 15.0) * across) * x));
             }
+            fourth *= std::exp(-0.5 * r * r);
+            fifth *= std::exp(-0.5 * r * r);
+            ASSERT_LE(fourth, supremum * std::exp(-detail::fourth_derivative_decay * r * r));
+            ASSERT_LE(fifth * std::max(r, 1.0) + 4.0 * fourth,
+                      detail::fourth_derivative_change * supremum * std::exp(-0.24 * r * r));
         }
     }
 }
