@@ -29,23 +29,23 @@ IDLE_STEPS = 2
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Lower the objective from start by at most `steps` accepted or tried steps.
 
-    It ends early after IDLE_STEPS steps in a row that gained less than tolerance of the whole squared error.
+    It ends early after IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
     """
     best = start
     if len(start.basis) == 0:
         return best
     damping, idle = 1e-2, 0
-    matrix, gradient = problem.normal_equations(best.basis)
+    matrix, gradient = problem.normal_equations(best)
     for _ in range(steps):
         step = _bounded_step(problem, best.basis, matrix, gradient, damping)
         trial = problem.solve(_moved(problem, best.basis, step))
         if trial.objective < best.objective:
-            gain = (best.objective - trial.objective) / problem.total(trial.rss)
+            gain = problem.samples * (best.objective - trial.objective) / problem.total(trial.rss)
             best, damping = trial, max(damping / 5.0, 1e-9)
             idle = idle + 1 if gain < tolerance else 0
             if idle >= IDLE_STEPS:
                 break
-            matrix, gradient = problem.normal_equations(best.basis)
+            matrix, gradient = problem.normal_equations(best)
         else:
             damping *= 6.0
             if damping > 1e8:
