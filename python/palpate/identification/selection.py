@@ -42,7 +42,7 @@ class Library:
             wavelets = _core.wavelet_columns(block.positions, self.basis.alpha, self.basis.beta)
             columns = [channel[:, None] * wavelets for channel in block.channels.T]
             self.columns.append(columns)
-            self.grams.append(np.array([[np.einsum("mn,mn->n", a, b) for b in columns] for a in columns]))
+            self.grams.append(np.array([[np.einsum("nm,nm->n", a.T, b.T) for b in columns] for a in columns]))
 
     def __len__(self) -> int:
         return len(self.basis)
