@@ -58,14 +58,19 @@ struct Frame {
     }
 
     /// Calls visit(k, psi) for every sample k with the radial hat of wavelet i there, a block at a time: the
-    /// exponentials of a block are vectorised.
+    /// exponentials of a block are vectorised, and none is taken where the wavelet reaches no sample of it.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        constexpr std::size_t block = 256;
+        constexpr std::size_t block = 64;
+        // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
+        // algebra takes ten times as long.
+        constexpr double nothing_is_left = 160.0;
+        const auto d = static_cast<double>(dimension);
         std::array<double, block> square{};
         std::array<double, block> gaussian{};
         for (std::size_t first = 0; first < samples; first += block) {
             const std::size_t size = std::min(block, samples - first);
+            double nearest = nothing_is_left;
             for (std::size_t k = 0; k < size; ++k) {
                 double sum = 0.0;
                 for (std::size_t j = 0; j < dimension; ++j) {
@@ -73,12 +78,11 @@ struct Frame {
                     sum += u * u;
                 }
                 square[k] = std::min(sum, detail::hat_reach * detail::hat_reach);
+                nearest = std::min(nearest, square[k]);
             }
-            detail::hat_kernel().gaussians(square.data(), size, gaussian.data());
-            const auto d = static_cast<double>(dimension);
-            // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
-            // algebra takes ten times as long.
-            constexpr double nothing_is_left = 160.0;
+            if (nearest < nothing_is_left) {
+                detail::hat_kernel().gaussians(square.data(), size, gaussian.data());
+            }
             for (std::size_t k = 0; k < size; ++k) {
                 gaussian[k] = square[k] < nothing_is_left ? gaussian[k] : 0.0;
                 visit(first + k,
