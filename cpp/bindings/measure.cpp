@@ -105,7 +105,8 @@ class Watcher {
         try {
             (*progress_)(view.progress.ticks.load(std::memory_order_relaxed),
                          view.progress.position.load(std::memory_order_relaxed),
-                         view.progress.object_force.load(std::memory_order_relaxed));
+                         view.progress.object_force.load(std::memory_order_relaxed),
+                         view.progress.lost.load(std::memory_order_relaxed));
         } catch (const py::error_already_set&) {
             error_ = std::current_exception();
             asked_.store(true, std::memory_order_relaxed);
@@ -244,8 +245,10 @@ py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
     return measured_on(device, bench, probe, metadata, wanted, [&](py::dict& summary) {
         const UsbHealth health = device.health();
         summary["device"] = device.name().text();
-        summary["round_trip"] = microseconds(health.stream.round_trip);
-        summary["delay"] = microseconds(health.stream.delay);
+        if (health.stream.delay.count() > 0) {  // a device may accept no command while it is disabled
+            summary["round_trip"] = microseconds(health.stream.round_trip);
+            summary["delay"] = microseconds(health.stream.delay);
+        }
         summary["malformed"] = health.stream.malformed;
         summary["stalls"] = health.stalls;
         summary["bus_errors"] = health.bus_errors;
@@ -309,7 +312,8 @@ void bind_measure(py::module_& module) {
         "A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;\n"
         "with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: "
         "until\n"
-        "Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a\n"
+        "Ctrl-C) without holding the interpreter; `progress(ticks, position, force, lost)` is called ten "
+        "times a\n"
         "second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows "
         "as record.part; with `keep` the summary, "
         "returned\n"

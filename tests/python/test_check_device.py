@@ -111,6 +111,21 @@ def test_what_is_wrong_is_named_and_forbids_force_where_it_must(
     assert found.may_push is not forbids
 
 
+def test_a_device_that_must_not_make_force_has_no_profile() -> None:
+    found = judge(heard(velocity=-heard()["kept"]["velocity"]))
+    with pytest.raises(InputError, match="no profile of a device that must not make force; NOT SUITABLE"):
+        found.profile()
+
+
+def test_a_device_that_echoes_nothing_while_it_is_disabled_has_no_delay_of_zero() -> None:
+    silent = heard()
+    del silent["round_trip"], silent["delay"]
+    found = judge(silent)
+    assert found.suitable
+    assert found.numbers["delay_samples"] is None
+    assert check.with_pushes(found, push_response(pushed())).numbers["delay_samples"] == 0
+
+
 @pytest.mark.parametrize("what", ["measured", "velocity"])
 def test_a_flipped_sign_is_caught_before_any_force(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[dict[str, Any]] = []
@@ -263,12 +278,15 @@ def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
     hand: list[str], seconds: float, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
-    answer = checked("--push", "--yes", device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
+    profile = tmp_path / "knob.toml"
+    words = ["--push", "--yes", "--write-profile", profile]
+    answer = checked(*words, device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
     result, findings = told_of(answer)
     assert answer.returncode == 1
     assert findings["sign of the force"]["right"] is False
     assert "sign of the force: flipped" in result["verdict"]
     assert "do not enable force" in result["verdict"]
+    assert not profile.exists()  # and so nothing is certified for it
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.001 * SHARE_OF_FORCE * 5.0
 
 

@@ -16,6 +16,7 @@ import palpate
 from conftest import ROOT
 from control_program import PATIENT, PROGRAM, needs_program
 from palpate import InputError, Model, identify, load_model, read_recording
+from palpate.cli.live_line import LiveLine
 from palpate.devices import record
 from usb_emulation import emulated, frames, needs_emulation
 
@@ -134,7 +135,7 @@ def test_a_simulated_object_is_recorded_and_found_again(tmp_path: Path) -> None:
         duration_s=2.0,
         speed=0.5,
         lowest_rate_share=0.0,
-        progress=lambda rows, position, force: ticks.append(rows),
+        progress=lambda rows, position, force, lost: ticks.append(rows),
     )
     assert summary["orderly"]
     assert ticks == sorted(ticks)
@@ -153,3 +154,13 @@ def test_without_an_object_or_a_way_to_see_its_force_nothing_is_recorded(tmp_pat
     with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
         record(tmp_path / "a.csv", device="knob")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_line_that_is_alive_tells_of_lost_samples(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    line = LiveLine(1000.0, ("rad", "Nm"))
+    line.show(2500, 0.25, -0.5, 3)
+    line.end()
+    assert "2.5 s  2500 rows, 3 lost  position 0.25 rad" in capsys.readouterr().err

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -14,7 +14,9 @@
 #include "faults.hpp"
 #include "identity.hpp"
 #include "little_endian.hpp"
+#include "motor.hpp"
 #include "plant.hpp"
+#include "requests.hpp"
 
 namespace emulator {
 
@@ -25,18 +27,11 @@ enum class Handshake : std::uint8_t { Ack, Nak, Stall };
 /// and shares no code with the library that it tests.
 class EmulatedDevice {
   public:
-    struct Answer {
-        int status = 0;  ///< 0, or -EPIPE for a stall
-        Bytes data;
-    };
-
     EmulatedDevice(Identity identity, Plant plant, std::vector<Fault> script)
-        : identity_{std::move(identity)}, plant_{plant}, script_{std::move(script)} {
-        start_anew();
+        : identity_{std::move(identity)}, plant_{plant}, motor_{identity_}, faults_{std::move(script)} {
+        zero_count_ = identity_.first_count;
         sequence_ = identity_.first_sequence;
         clock_us_ = identity_.first_us;
-        latch();
-        fresh_ = false;
     }
 
     [[nodiscard]] const Identity& identity() const { return identity_; }
@@ -44,70 +39,61 @@ class EmulatedDevice {
     // ---------------------------------------------------------------------------------------- control requests
 
     /// `setup`: the 8 bytes; `data`: what follows on the way out.
-    Answer control(const Bytes& setup, const Bytes& data) {
-        const auto type = setup.at(0);
-        const auto request = setup.at(1);
-        const auto value = get<std::uint16_t>(setup, 2);
-        const auto index = get<std::uint16_t>(setup, 4);
-        const auto length = get<std::uint16_t>(setup, 6);
+    Answer control(const Bytes& bytes, const Bytes& data) {
+        const Setup setup{bytes};
         Answer answer = stalled();
-        if ((type & 0x60U) == 0) {
-            answer = standard(request, value, index);
-        } else if (type == 0xC1) {
-            answer = request == 1 ? Answer{0, info()} : stalled();
-        } else if (type == 0x41) {
-            answer = command(request, value, data);
+        if ((setup.type & 0x60U) == 0) {
+            if (setup.request == 9 || setup.request == 11) {  // SET_CONFIGURATION, SET_INTERFACE
+                disarm();
+                answer = {};
+            } else {
+                answer = standard_answer(setup, identity_, halts_);
+            }
+        } else if (setup.type == 0xC1 && setup.request == 1) {
+            answer = {0, info()};
+        } else if (setup.type == 0x41) {
+            answer = command(setup.request, setup.value, data);
         }
-        if (answer.data.size() > length) {
-            answer.data.resize(length);
+        if (answer.data.size() > setup.length) {
+            answer.data.resize(setup.length);
         }
         return answer;
     }
 
     /// Bus reset, suspend and SET_CONFIGURATION end every torque.
     void disarm() {
-        enabled_ = false;
-        torque_uNm_ = 0;
-        halted_in_ = halted_out_ = false;
+        motor_.disarm();
+        halts_ = {};
     }
-    void clear_halt(std::uint8_t endpoint) { (endpoint == 0x81 ? halted_in_ : halted_out_) = false; }
+    void clear_halt(std::uint8_t endpoint) { halts_.clear(endpoint); }
 
     // ------------------------------------------------------------------------------------------------- frames
 
     /// A millisecond passes: the mechanics move, the watchdog looks, the encoder is latched.
     void frame() {
-        started_ += out_seen_ ? 1 : 0;
-        for (const Fault& fault : script_) {
-            if (out_seen_ && fault.frame == started_) {
-                inject(fault.kind, fault.count);
-            }
-        }
-        if (used(FaultKind::Unplug) && remaining(FaultKind::Unplug) == 0) {
-            unplugged_ = true;
-        }
-        naks_ = used(FaultKind::Freeze);
-        mute_ = used(FaultKind::Mute);
-        slow_ = used(FaultKind::Slow);
-        if (used(FaultKind::Reset)) {
+        faults_.frame(out_seen_);
+        unplugged_ = unplugged_ || faults_.used_last(FaultKind::Unplug);
+        naks_ = faults_.used(FaultKind::Freeze);
+        mute_ = faults_.used(FaultKind::Mute);
+        slow_ = faults_.used(FaultKind::Slow);
+        if (faults_.used(FaultKind::Reset)) {
             start_anew();
         }
-        status_faults_ |= used(FaultKind::Encoder) ? encoder_fault : 0;
-        status_faults_ |= used(FaultKind::OverTemperature) ? over_temperature : 0;
-        if (used(FaultKind::EmergencyStop)) {
-            status_faults_ |= emergency_stop;
-            enabled_ = false;
+        for (const auto& [kind, bit] : {std::pair{FaultKind::Encoder, encoder_fault},
+                                        {FaultKind::OverTemperature, over_temperature},
+                                        {FaultKind::EmergencyStop, emergency_stop}}) {
+            if (faults_.used(kind)) {
+                motor_.fail(bit);
+            }
         }
-        saturates_ = used(FaultKind::Saturate);
-        const std::uint32_t skipped = std::exchange(remaining_.at(number(FaultKind::Skip)), 0);
+        motor_.saturate(faults_.used(FaultKind::Saturate));
+        const std::uint32_t skipped = faults_.used_up(FaultKind::Skip);
 
-        plant_.advance(1e-6 * applied_uNm() * (identity_.flipped ? -1.0 : 1.0), 1e-3);
+        plant_.advance(1e-6 * motor_.applied_uNm() * (identity_.flipped ? -1.0 : 1.0), 1e-3);
         ++frames_;
         clock_us_ += 1000;
         sequence_ = static_cast<std::uint16_t>(sequence_ + 1 + skipped);
-        if (out_seen_ && clock_us_ - out_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, ttl_ms_)) {
-            tripped_ = true;
-            torque_uNm_ = 0;
-        }
+        motor_.look(clock_us_);
         latch();
     }
 
@@ -118,26 +104,26 @@ class EmulatedDevice {
 
     /// The IN endpoint is polled.
     Handshake in(Bytes& packet) {
-        if (naks_ || mute_ || !fresh_) {
+        if (naks_ || mute_ || packets_.empty()) {
             return Handshake::Nak;
         }
-        if (halted_in_ || used(FaultKind::StallIn)) {
-            halted_in_ = true;
+        if (halts_.in || faults_.used(FaultKind::StallIn)) {
+            halts_.in = true;
             return Handshake::Stall;
         }
-        fresh_ = false;
-        packet = used(FaultKind::Repeat) ? last_sent_ : packet_;
+        packet = faults_.used(FaultKind::Repeat) ? last_sent_ : packets_.front();
+        packets_.pop_front();
         last_sent_ = packet;
-        if (used(FaultKind::Short)) {
+        if (faults_.used(FaultKind::Short)) {
             packet.resize(packet.size() / 2);
         }
-        if (used(FaultKind::Magic)) {
+        if (faults_.used(FaultKind::Magic)) {
             packet.at(0) = 'X';
         }
-        if (used(FaultKind::Version)) {
+        if (faults_.used(FaultKind::Version)) {
             packet.at(1) = 2;
         }
-        if (used(FaultKind::Long)) {
+        if (faults_.used(FaultKind::Long)) {
             packet.resize(64);
         }
         return Handshake::Ack;
@@ -145,23 +131,24 @@ class EmulatedDevice {
 
     /// The OUT endpoint is written to.
     Handshake out(const Bytes& packet) {
-        if (naks_) {
+        if (naks_ || faults_.used(FaultKind::Busy)) {
             return Handshake::Nak;
         }
-        if (halted_out_ || used(FaultKind::StallOut)) {
-            halted_out_ = true;
+        if (halts_.out || faults_.used(FaultKind::StallOut)) {
+            halts_.out = true;
             return Handshake::Stall;
         }
-        if (used(FaultKind::Deaf)) {
+        if (faults_.used(FaultKind::Deaf)) {
             return Handshake::Ack;
         }
-        take(packet);
+        out_seen_ = true;
+        motor_.take(packet, clock_us_);
         return Handshake::Ack;
     }
 
     // -------------------------------------------------------------------------------------------------- faults
 
-    void inject(FaultKind kind, std::uint32_t count) { remaining_.at(number(kind)) = std::max(count, 1U); }
+    void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
     /// Refuses transfers for now: such frames take their time, since the host's timeouts do. One that
     /// halted is no such device: the host is told, and clears it when it comes to it.
@@ -172,13 +159,11 @@ class EmulatedDevice {
 
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
     [[nodiscard]] std::uint16_t sequence() const { return sequence_; }
-    [[nodiscard]] std::uint64_t outs() const { return outs_; }
-    [[nodiscard]] std::uint64_t bad_outs() const { return bad_outs_; }
-    [[nodiscard]] bool is_enabled() const { return enabled_; }
-    [[nodiscard]] std::int32_t applied_uNm() const {
-        const std::int32_t torque = enabled_ && status_faults_ == 0 ? torque_uNm_ : 0;
-        return saturates_ ? torque / 2 : torque;
+    /// Sequence number of the last packet that a host has read.
+    [[nodiscard]] std::uint16_t told() const {
+        return last_sent_.empty() ? 0 : get<std::uint16_t>(last_sent_, 2);
     }
+    [[nodiscard]] const Motor& motor() const { return motor_; }
     [[nodiscard]] const Plant& plant() const { return plant_; }
 
     [[nodiscard]] static std::string trace_header() {
@@ -186,112 +171,35 @@ class EmulatedDevice {
                "unplugged\n";
     }
     [[nodiscard]] std::string trace_row() const {
-        return std::to_string(frames_) + "," + std::to_string(started_) + "," + std::to_string(clock_us_) +
-               "," + std::to_string(sequence_) + "," + std::to_string(plant_.position) + "," +
-               std::to_string(plant_.velocity) + "," + std::to_string(1e-6 * applied_uNm()) + "," +
-               std::to_string(status()) + "," + std::to_string(out_sequence_) + "," +
-               (unplugged_ ? "1\n" : "0\n");
+        return std::to_string(frames_) + "," + std::to_string(faults_.started()) + "," +
+               std::to_string(clock_us_) + "," + std::to_string(sequence_) + "," +
+               std::to_string(plant_.position) + "," + std::to_string(plant_.velocity) + "," +
+               std::to_string(1e-6 * motor_.applied_uNm()) + "," + std::to_string(motor_.status()) + "," +
+               std::to_string(motor_.out_sequence()) + "," + (unplugged_ ? "1\n" : "0\n");
     }
 
   private:
-    static constexpr std::uint16_t enabled_bit = 1;
-    static constexpr std::uint16_t watchdog_bit = 2;
-    static constexpr std::uint16_t saturated_bit = 4;
-    static constexpr std::uint16_t bad_packet_bit = 8;
-    static constexpr std::uint16_t encoder_fault = 16;
-    static constexpr std::uint16_t over_temperature = 32;
-    static constexpr std::uint16_t emergency_stop = 64;
-
-    [[nodiscard]] static Answer stalled() { return {-EPIPE, {}}; }
-    [[nodiscard]] static std::size_t number(FaultKind kind) { return static_cast<std::size_t>(kind); }
-    [[nodiscard]] std::uint32_t remaining(FaultKind kind) const { return remaining_.at(number(kind)); }
-
-    /// Whether a fault is due; one less is left of it.
-    bool used(FaultKind kind) {
-        std::uint32_t& left = remaining_.at(number(kind));
-        if (left == 0) {
-            return false;
-        }
-        --left;
-        return true;
-    }
-
     void start_anew() {
-        disarm();
+        motor_.start_anew();
+        halts_ = {};
         sequence_ = 0;
         clock_us_ = 0;
-        out_sequence_ = 0;
-        out_us_ = 0;
-        out_seen_at_all_ = false;
-        watchdog_ms_ = identity_.watchdog_ms;
-        ttl_ms_ = 0xFFFF;
-        status_faults_ = 0;
-        tripped_ = saturated_ = bad_packet_ = false;
-    }
-
-    Answer standard(std::uint8_t request, std::uint16_t value, std::uint16_t index) {
-        switch (request) {
-            case 0:  // GET_STATUS
-                return {
-                    0,
-                    {static_cast<std::uint8_t>((index == 0x81 && halted_in_) || (index == 1 && halted_out_)),
-                     0}};
-            case 1:  // CLEAR_FEATURE
-                if (value == 0) {
-                    clear_halt(static_cast<std::uint8_t>(index));
-                }
-                return {};
-            case 6: {  // GET_DESCRIPTOR
-                Bytes descriptor;
-                switch (value >> 8U) {
-                    case 1:
-                        descriptor = Identity::device_descriptor();
-                        break;
-                    case 2:
-                        descriptor = Identity::configuration_descriptor();
-                        break;
-                    case 3:
-                        descriptor = identity_.string_descriptor(value & 0xFFU);
-                        break;
-                    default:
-                        break;
-                }
-                return descriptor.empty() ? stalled() : Answer{0, descriptor};
-            }
-            case 8:  // GET_CONFIGURATION
-                return {0, {1}};
-            case 9:   // SET_CONFIGURATION
-            case 11:  // SET_INTERFACE
-                disarm();
-                return {};
-            case 10:  // GET_INTERFACE
-                return {0, {0}};
-            default:
-                return stalled();
-        }
+        zero_count_ = 0;
+        packets_.clear();
     }
 
     Answer command(std::uint8_t request, std::uint16_t value, const Bytes& data) {
         switch (request) {
-            case 2:  // ENABLE
-                if (value > 1 || (value == 1 && (status_faults_ & emergency_stop) != 0)) {
-                    return stalled();
-                }
-                enabled_ = value == 1;
-                torque_uNm_ = 0;
-                return {};
+            case 2:
+                return motor_.enable(value);
             case 3:  // ZERO
                 zero_ = plant_.position;
+                zero_count_ = 0;
                 return {};
-            case 4:  // WATCHDOG
-                if (value < 2 || value > 1000) {
-                    return stalled();
-                }
-                watchdog_ms_ = value;
-                return {};
-            case 5:  // CLEAR
-                status_faults_ = 0;
-                return {};
+            case 4:
+                return motor_.set_watchdog(value);
+            case 5:
+                return motor_.clear();
             case 0x7F:  // FAULT
                 if (value < 1 || value > 6 || data.size() != 2) {
                     return stalled();
@@ -309,101 +217,65 @@ class EmulatedDevice {
         put(bytes, identity_.counts_per_rev);
         put(bytes, identity_.max_torque_uNm);
         put(bytes, identity_.rate_hz);
-        put(bytes, watchdog_ms_);
+        put(bytes, identity_.tells_watchdog_that_is_set ? motor_.watchdog_ms() : identity_.watchdog_ms);
         put(bytes, identity_.capabilities);
         bytes.insert(bytes.end(), {32, 16, 1, 0});
         put(bytes, identity_.uid);
         return bytes;
     }
 
-    void take(const Bytes& packet) {
-        if (packet.size() != 16 || packet[0] != 'T' || packet[1] != 1 || get<std::uint16_t>(packet, 8) != 0) {
-            bad_packet_ = true;
-            ++bad_outs_;
-            return;
-        }
-        bad_packet_ = tripped_ = false;
-        out_sequence_ = get<std::uint16_t>(packet, 2);
-        ttl_ms_ = get<std::uint16_t>(packet, 10);
-        out_us_ = clock_us_;
-        out_seen_ = out_seen_at_all_ = true;
-        ++outs_;
-        const auto wanted = get<std::int32_t>(packet, 4);
-        torque_uNm_ = std::clamp(wanted, -identity_.max_torque_uNm, identity_.max_torque_uNm);
-        saturated_ = torque_uNm_ != wanted;
-        if (!enabled_) {
-            torque_uNm_ = 0;
-        }
-    }
-
-    [[nodiscard]] std::uint16_t status() const {
-        const auto bit = [](bool set, std::uint16_t mask) { return set ? mask : std::uint16_t{0}; };
-        return static_cast<std::uint16_t>(bit(enabled_, enabled_bit) | bit(tripped_, watchdog_bit) |
-                                          bit(saturated_ || saturates_, saturated_bit) |
-                                          bit(bad_packet_, bad_packet_bit) | status_faults_);
-    }
-
     void latch() {
         const double counts = identity_.counts_per_rev / (2.0 * std::numbers::pi);
-        auto count = static_cast<std::int32_t>(std::floor((plant_.position - zero_) * counts + 0.5));
-        count += used(FaultKind::Jump) ? static_cast<std::int32_t>(identity_.counts_per_rev / 4) : 0;
-        const bool frozen = used(FaultKind::FrozenEncoder);
+        const double moved = std::floor((plant_.position - zero_) * counts + 0.5);
+        // A count that has no room left goes on at the other end.
+        const std::int64_t jump = faults_.used(FaultKind::Jump) ? identity_.counts_per_rev / 4 : 0;
+        const auto count = static_cast<std::int32_t>(zero_count_ + static_cast<std::int64_t>(moved) + jump);
+        const bool frozen = faults_.used(FaultKind::FrozenEncoder);
         last_count_ = frozen ? last_count_ : count;
         const bool measures_speed = (identity_.capabilities & 2U) != 0;
         const bool has_transducer = (identity_.capabilities & 1U) != 0;
-        const double object = plant_.spring > 0.0 ? plant_.object_torque() : 1e-6 * applied_uNm();
-        packet_ = {'H', 1};
-        put(packet_, sequence_);
-        put(packet_, clock_us_);
-        put(packet_, last_count_);
-        put(packet_,
+        const double object = plant_.spring > 0.0 ? plant_.object_torque() : 1e-6 * motor_.applied_uNm();
+        Bytes packet{'H', 1};
+        put(packet, sequence_);
+        put(packet,
+            clock_us_ + (identity_.latch_jitter_us == 0 ? 0 : sequence_ * 7919U % identity_.latch_jitter_us));
+        put(packet, last_count_);
+        put(packet,
             static_cast<std::int32_t>(measures_speed && !frozen ? std::lround(plant_.velocity * counts) : 0));
-        put(packet_, applied_uNm());
-        put(packet_, status());
-        put(packet_, static_cast<std::uint16_t>(out_sequence_ - (used(FaultKind::OldEcho) ? 3 : 0)));
-        put(packet_, static_cast<std::uint16_t>(
-                         out_seen_at_all_ ? std::min<std::uint32_t>(clock_us_ - out_us_, 0xFFFF) : 0xFFFF));
-        put(packet_, std::uint16_t{253});
-        put(packet_, static_cast<std::int32_t>(has_transducer ? std::lround(1e6 * object) : 0));
-        fresh_ = true;
+        put(packet, motor_.applied_uNm());
+        put(packet, motor_.status());
+        put(packet,
+            static_cast<std::uint16_t>(motor_.out_sequence() - (faults_.used(FaultKind::OldEcho) ? 3 : 0)));
+        put(packet, motor_.out_age_us(clock_us_));
+        put(packet, identity_.temperature_dC);
+        put(packet, static_cast<std::int32_t>(has_transducer ? std::lround(1e6 * object) : 0));
+        if (packets_.size() < std::max<std::size_t>(1, identity_.held_packets)) {
+            packets_.push_back(packet);
+        } else if (identity_.held_packets == 0) {
+            packets_.back() = packet;
+        }
     }
 
     Identity identity_;
     Plant plant_;
-    std::vector<Fault> script_;
-    std::array<std::uint32_t, fault_names.size()> remaining_{};
+    Motor motor_;
+    Faults faults_;
+    Halts halts_;
 
-    bool enabled_ = false;
-    bool tripped_ = false;
-    bool saturated_ = false;
-    bool bad_packet_ = false;
-    std::uint16_t status_faults_ = 0;
-    std::uint16_t watchdog_ms_ = 0;
-    std::uint16_t ttl_ms_ = 0xFFFF;
-    std::int32_t torque_uNm_ = 0;
     double zero_ = 0.0;
+    std::int64_t zero_count_ = 0;
 
     std::uint64_t frames_ = 0;
-    std::uint64_t started_ = 0;  ///< frames since the first OUT packet
     std::uint16_t sequence_ = 0;
     std::uint32_t clock_us_ = 0;
-    std::uint16_t out_sequence_ = 0;
-    std::uint32_t out_us_ = 0;
-    bool out_seen_ = false;         ///< the script's clock runs
-    bool out_seen_at_all_ = false;  ///< since the device started
-    std::uint64_t outs_ = 0;
-    std::uint64_t bad_outs_ = 0;
+    bool out_seen_ = false;  ///< the script's clock runs
 
-    Bytes packet_;
+    std::deque<Bytes> packets_;  ///< that nobody has read yet
     Bytes last_sent_;
     std::int32_t last_count_ = 0;
-    bool fresh_ = false;
-    bool halted_in_ = false;
-    bool halted_out_ = false;
     bool naks_ = false;
     bool mute_ = false;
     bool slow_ = false;
-    bool saturates_ = false;
     bool unplugged_ = false;
 };
 

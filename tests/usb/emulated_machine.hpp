@@ -60,10 +60,11 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
         reading = device.exchange({force});
     }
     const auto is_newest = [&] {
-        return static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("sequence"));
+        return static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("told"));
     };
-    while (reading.status != Status::Fault &&
-           (reading.status == Status::Lost || device.in_flight() > 2 || !is_newest())) {
+    for (int k = 0; k < 1000 && reading.status != Status::Fault &&
+                    (reading.status == Status::Lost || device.in_flight() > 2 || !is_newest());
+         ++k) {
         std::this_thread::sleep_for(
             std::chrono::milliseconds{2});  // one is still on its way, and will be waiting
         reading = device.exchange({force});

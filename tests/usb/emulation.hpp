@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "choices.hpp"
 #include "port.hpp"
 
 namespace emulator {
@@ -34,6 +35,8 @@ inline constexpr const char* options_text =
     "  --patience-ms MS       lock-step waits so long for the host to do its part [3000]\n"
     "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
     "  --no-device            nothing is plugged in\n"
+    "  --chosen-by SEED       whatever the protocol leaves to a firmware is drawn; stands before all that it "
+    "overrides\n"
     "  --says-rate-hz RATE    what GET_INFO says [1000]\n"
     "  --no-transducer        capabilities without bit 0\n"
     "  --no-velocity          capabilities without bit 1\n"
@@ -74,6 +77,8 @@ inline constexpr const char* options_text =
             settings.patience = std::chrono::milliseconds{std::stoi(value())};
         } else if (word == "--serial") {
             serials.push_back(value());
+        } else if (word == "--chosen-by") {
+            common = chosen_by(static_cast<std::uint32_t>(std::stoul(value())));
         } else if (word == "--says-rate-hz") {
             common.rate_hz = static_cast<std::uint16_t>(std::stoi(value()));
         } else if (word == "--no-transducer") {
@@ -112,7 +117,7 @@ inline constexpr const char* options_text =
         settings.devices.clear();
         for (const std::string& serial : serials) {
             settings.devices.push_back(common);
-            settings.devices.back().serial = serial;
+            settings.devices.back().serial = std::u16string{serial.begin(), serial.end()};
         }
     }
     return settings;
@@ -136,10 +141,11 @@ inline constexpr const char* options_text =
         };
         return "{" + field("frames", std::to_string(device.frames())) + ", " +
                field("sequence", std::to_string(device.sequence())) + ", " +
-               field("outs", std::to_string(device.outs())) + ", " +
-               field("bad_outs", std::to_string(device.bad_outs())) + ", " +
-               field("enabled", device.is_enabled() ? "true" : "false") + ", " +
-               field("torque_uNm", std::to_string(device.applied_uNm())) + ", " +
+               field("told", std::to_string(device.told())) + ", " +
+               field("outs", std::to_string(device.motor().outs())) + ", " +
+               field("bad_outs", std::to_string(device.motor().bad_outs())) + ", " +
+               field("enabled", device.motor().is_enabled() ? "true" : "false") + ", " +
+               field("torque_uNm", std::to_string(device.motor().applied_uNm())) + ", " +
                field("position_rad", std::to_string(device.plant().position)) + ", " +
                field("waiting", std::to_string(port.waiting())) + "}";
     }

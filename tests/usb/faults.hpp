@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace emulator {
 
@@ -33,16 +36,15 @@ enum class FaultKind : std::uint8_t {
     Jump,             ///< the count is off by a quarter turn
     FrozenEncoder,    ///< the count repeats
     Slow,             ///< frames that take three times as long
+    Busy,             ///< OUT packets refused for now (NAK), each a frame late; IN packets go on
 };
 
-inline constexpr std::array<std::string_view, 21> fault_names{
-    "stall-in",       "stall-out",      "short",
-    "freeze",         "unplug",         "skip",
-    "repeat",         "magic",          "version",
-    "long",           "deaf",           "mute",
-    "old-echo",       "encoder",        "over-temperature",
-    "emergency-stop", "reset",          "saturate",
-    "jump",           "frozen-encoder", "slow"};
+inline constexpr std::array<std::string_view, 22> fault_names{
+    "stall-in",       "stall-out", "short",    "freeze",  "unplug",
+    "skip",           "repeat",    "magic",    "version", "long",
+    "deaf",           "mute",      "old-echo", "encoder", "over-temperature",
+    "emergency-stop", "reset",     "saturate", "jump",    "frozen-encoder",
+    "slow",           "busy"};
 
 /// A fault: how many packets or frames it lasts, and from which frame on.
 struct Fault {
@@ -73,5 +75,47 @@ struct Fault {
         times == std::string::npos ? 1 : static_cast<std::uint32_t>(std::stoul(text.substr(times + 1)));
     return fault;
 }
+
+/// What is wrong now, and what will be by the script.
+class Faults {
+  public:
+    explicit Faults(std::vector<Fault> script) : script_{std::move(script)} {}
+
+    void inject(FaultKind kind, std::uint32_t count) { remaining(kind) = std::max(count, 1U); }
+
+    /// A frame begins, the next one of the script or one before it.
+    void frame(bool counts) {
+        started_ += counts ? 1 : 0;
+        for (const Fault& fault : script_) {
+            if (counts && fault.frame == started_) {
+                inject(fault.kind, fault.count);
+            }
+        }
+    }
+    /// Frames of the script.
+    [[nodiscard]] std::uint64_t started() const { return started_; }
+
+    /// Whether a fault is due; one less is left of it.
+    bool used(FaultKind kind) {
+        if (remaining(kind) == 0) {
+            return false;
+        }
+        --remaining(kind);
+        return true;
+    }
+    /// How often a fault is due; nothing is left of it.
+    std::uint32_t used_up(FaultKind kind) { return std::exchange(remaining(kind), 0); }
+    /// Whether a fault was due for the last time.
+    bool used_last(FaultKind kind) { return used(kind) && remaining(kind) == 0; }
+
+  private:
+    [[nodiscard]] std::uint32_t& remaining(FaultKind kind) {
+        return remaining_.at(static_cast<std::size_t>(kind));
+    }
+
+    std::vector<Fault> script_;
+    std::array<std::uint32_t, fault_names.size()> remaining_{};
+    std::uint64_t started_ = 0;
+};
 
 }  // namespace emulator

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -9,12 +10,10 @@
 
 namespace emulator {
 
-/// What a device is, as its firmware says it.
+/// What a device is and how it goes about what the protocol leaves open; what is fixed stands in EmulatedDevice.
 struct Identity {
-    std::string manufacturer = "palpate";
-    std::string product = "emulated knob";
-    std::string serial = "EMU-1";
-    std::uint8_t magic = 'I';  ///< of GET_INFO; another one makes it somebody else's device
+    // GET_INFO
+    std::uint8_t magic = 'I';  ///< another one makes it somebody else's device
     std::uint16_t firmware = 0x0100;
     std::uint32_t counts_per_rev = 65536;
     std::int32_t max_torque_uNm = 5'000'000;
@@ -22,34 +21,89 @@ struct Identity {
     std::uint16_t watchdog_ms = 20;
     std::uint32_t capabilities = 3;  ///< bit 0 force transducer, bit 1 measured velocity
     std::uint64_t uid = 0x5041'4C50'0001ULL;
+    bool tells_watchdog_that_is_set = true;  ///< else the one that it starts with
+
+    // Descriptors
+    std::u16string manufacturer = u"palpate";
+    std::u16string product = u"emulated knob";
+    std::u16string serial = u"EMU-1";
+    std::array<std::uint8_t, 3> string_indices{1, 2, 3};
+    std::uint16_t language = 0x0409;  ///< English (United States)
+    std::uint16_t usb_version = 0x0200;
+    std::uint16_t release = 0x0100;
+    std::uint8_t control_packet = 64;  ///< bytes
+    std::uint8_t configuration = 1;    ///< bConfigurationValue
+    std::uint8_t power = 250;          ///< in 2 mA, from the bus
+    bool out_endpoint_first = false;
+    bool has_second_interface = false;
+    Bytes class_descriptor;  ///< between interface and endpoints
+
     // Counters begin close to their ends, so that every run sees them wrap.
     std::uint16_t first_sequence = 65'500;
     std::uint32_t first_us = 4'294'867'296U;
+    std::int32_t first_count = 0;
+    std::uint16_t first_out_sequence = 0;     ///< echoed before there was an OUT packet
+    std::uint16_t first_out_age_us = 0xFFFF;  ///< the same
+
+    // Habits
     bool flipped = false;          ///< a firmware whose torque points the wrong way
     bool takes_out_first = false;  ///< OUT packets act before the encoder of their frame is latched
+    bool tells_in_first = false;   ///< a controller that ends a frame's IN transfer before its OUT transfer
+    std::size_t held_packets =
+        0;  ///< that wait unread, as they were; 0: the newest takes the place of an unread one
+    bool hears_while_disabled = true;  ///< else OUT packets are accepted only while it is enabled
+    bool refuses_by_stall = true;      ///< else ENABLE after an emergency stop is taken, and does nothing
+    bool stop_disables = true;         ///< an emergency stop takes the enabled bit back as well
+    std::uint16_t spare_status = 0;    ///< bits that nobody has given a meaning
+    std::uint16_t temperature_dC = 253;
+    std::int32_t torque_step_uNm = 1;  ///< of its current control
+    std::uint32_t latch_jitter_us = 0;
 
-    [[nodiscard]] static Bytes device_descriptor() {
-        return {18, 1, 0x00, 0x02, 0xFF, 0, 0, 64, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 3, 1};
+    [[nodiscard]] Bytes device_descriptor() const {
+        Bytes bytes{18, 1};
+        put(bytes, usb_version);
+        bytes.insert(bytes.end(), {0xFF, 0, 0, control_packet, 0x09, 0x12, 0x01, 0x00});
+        put(bytes, release);
+        bytes.insert(bytes.end(), {string_indices[0], string_indices[1], string_indices[2], 1});
+        return bytes;
     }
-    [[nodiscard]] static Bytes configuration_descriptor() {
-        return {9, 2, 32,   0, 1,  1,    0,    0x80, 250,  // bus powered, 500 mA
-                9, 4, 0,    0, 2,  0xFF, 0x01, 0x01, 0,    // the interface
-                7, 5, 0x81, 3, 64, 0,    1,                // interrupt IN, every frame
-                7, 5, 0x01, 3, 64, 0,    1};               // interrupt OUT, every frame
+    [[nodiscard]] Bytes configuration_descriptor() const {
+        const Bytes in{7, 5, 0x81, 3, 64, 0, 1};   // interrupt, every frame
+        const Bytes out{7, 5, 0x01, 3, 64, 0, 1};  // the same
+        Bytes rest{9, 4, 0, 0, 2, 0xFF, 0x01, 0x01, 0};
+        for (const Bytes& part :
+             {class_descriptor, out_endpoint_first ? out : in, out_endpoint_first ? in : out}) {
+            rest.insert(rest.end(), part.begin(), part.end());
+        }
+        if (has_second_interface) {
+            const Bytes second{9, 4, 1, 0, 0, 0xFE, 0x01, 0x01, 0};  // for another firmware
+            rest.insert(rest.end(), second.begin(), second.end());
+        }
+        Bytes bytes{9, 2};
+        put(bytes, static_cast<std::uint16_t>(9 + rest.size()));
+        bytes.insert(bytes.end(), {static_cast<std::uint8_t>(has_second_interface ? 2 : 1), configuration, 0,
+                                   0x80, power});
+        bytes.insert(bytes.end(), rest.begin(), rest.end());
+        return bytes;
     }
     [[nodiscard]] Bytes string_descriptor(unsigned index) const {
+        Bytes bytes{0, 3};
         if (index == 0) {
-            return {4, 3, 0x09, 0x04};  // English (United States)
+            put(bytes, language);
         }
-        const std::array<std::string, 3> texts{manufacturer, product, serial};
-        if (index > texts.size()) {
+        const std::array<const std::u16string*, 3> texts{&manufacturer, &product, &serial};
+        for (std::size_t k = 0; k < texts.size(); ++k) {
+            if (index == string_indices.at(k)) {
+                for (const char16_t unit : *texts.at(k)) {
+                    put(bytes, static_cast<std::uint16_t>(unit));
+                }
+                bytes[0] = 1;
+            }
+        }
+        if (index != 0 && bytes[0] == 0) {
             return {};
         }
-        const std::string& text = texts.at(index - 1);
-        Bytes bytes{static_cast<std::uint8_t>(2 + 2 * text.size()), 3};
-        for (const char letter : text) {
-            put(bytes, static_cast<std::uint16_t>(static_cast<unsigned char>(letter)));
-        }
+        bytes[0] = static_cast<std::uint8_t>(bytes.size());
         return bytes;
     }
 };

@@ -39,7 +39,7 @@ class Port {
             return -ENODEV;
         }
         if (transfer.is_control) {
-            EmulatedDevice::Answer answer = device_.control(transfer.setup, transfer.data);
+            Answer answer = device_.control(transfer.setup, transfer.data);
             transfer.status = answer.status;
             const bool in = (transfer.setup.at(0) & 0x80U) != 0;
             transfer.actual = answer.status != 0 ? 0 : in ? answer.data.size() : transfer.data.size();
@@ -90,6 +90,8 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
+        owes_answer_ =
+            owes_answer_ && endpoint == 0x81;  // the answer was lost, whether the host knows or not
     }
 
     /// One frame of the bus.
@@ -111,15 +113,15 @@ class Port {
             }
             return;
         }
-        // The answer to an OUT packet is told before the IN packet, as a host that sends at once would see it.
-        if (!device_.identity().takes_out_first) {
-            Bytes packet;
-            const Handshake answer = polled(packet);
-            serve_out();
+        Bytes packet;
+        const Handshake answer = polled(packet);
+        if (device_.identity().tells_in_first) {
             serve_in(answer, packet);
-        } else {
-            Bytes packet;
-            const Handshake answer = polled(packet);
+        }
+        if (!device_.identity().takes_out_first) {
+            serve_out();
+        }
+        if (!device_.identity().tells_in_first) {
             serve_in(answer, packet);
         }
     }
@@ -132,6 +134,8 @@ class Port {
     [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
     /// Whether such a host has not come to queue the next one.
     [[nodiscard]] bool lacks_reads() const { return reads_ahead_ && in_.empty(); }
+    /// Whether an OUT packet waits for a later frame than the one that it was sent for.
+    [[nodiscard]] bool is_behind() const { return out_refused_ && !out_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
 
@@ -162,7 +166,8 @@ class Port {
             return;
         }
         const Handshake answer = device_.out(out_.front().data);
-        if (answer == Handshake::Nak) {
+        out_refused_ = answer == Handshake::Nak;
+        if (out_refused_) {
             return;
         }
         Transfer transfer = std::move(out_.front());
@@ -179,6 +184,7 @@ class Port {
     std::deque<Transfer> done_;
     bool in_held_ = false;  ///< a halted endpoint serves nothing until it is cleared
     bool out_held_ = false;
+    bool out_refused_ = false;
     bool reads_ahead_ = false;
     bool owes_answer_ = true;  ///< the host has a packet, and has sent nothing since
 };
@@ -209,7 +215,7 @@ class FrameClock {
     /// Whether a frame begins now; else `until` is when to look again at the latest.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
-        const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow();
+        const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow() && !port.is_behind();
         if (in_step && in_conversation_ && port.host_is_ready()) {
             until = first_;
             last_ = now;

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // UsbDevice on machines with other devices than the usual one: two, none, a foreign one, one that may not be opened.
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -14,6 +17,7 @@ namespace {
 using test::patient;
 using test::settled;
 using test::state;
+using test::tell;
 
 TEST(UsbTwoDevices, AreToldApartByTheirSerialNumbers) {
     const std::string both = patient().open().reason;
@@ -67,25 +71,92 @@ TEST(UsbPlainDevice, WithoutTransducerAndTachometerHasNoMeasuredForceAndDifferen
     }
 }
 
-// Whatever the page leaves to the firmware.
+// Every one of these is another device: whatever the protocol leaves to a firmware is drawn by chance.
+
 TEST(UsbOtherFirmware, IsTheSameDevice) {
     UsbDevice device = patient();
     ASSERT_EQ(device.open().reason, "");
     Reading last = settled(device);
+    const double began = last.position - state("position_rad");
     const UsbHealth before = device.health();
     for (int k = 0; k < 200; ++k) {
         const Reading reading = device.exchange({0.0});
         ASSERT_EQ(reading.status, Status::Ok);
         ASSERT_EQ(reading.sequence, last.sequence + 1);
+        ASSERT_NEAR(reading.device_time - last.device_time, 1e-3, 0.1e-3);
         last = reading;
     }
+    const double step = wire::position_of(1, device.info().counts_per_rev);
+    EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);  // a sample or two ago
     EXPECT_EQ(device.health().stream.lost, before.stream.lost);
     EXPECT_EQ(device.health().stream.late_echoes, 0U);
-    EXPECT_LE(device.health().stream.delay.quantile(0.5), 1e6 + 1.0);  // a sample at most
-    EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-9);
+    EXPECT_EQ(device.health().stream.watchdog_trips, 0U);
+    EXPECT_GE(device.health().stream.delay.count(), 200U);
+    EXPECT_LE(device.health().stream.delay.quantile(0.5), 2.1e6);  // two samples at most
+    EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-3);
+    EXPECT_NEAR(state("torque_uNm"), -0.25e6, 1e3);
     device.close();
     EXPECT_EQ(state("torque_uNm"), 0.0);
     EXPECT_EQ(state("enabled"), 0.0);
+}
+
+TEST(UsbOtherFirmware, IsFoundAgainByItsSerialNumber) {
+    UsbDevice first = patient();
+    ASSERT_EQ(first.open().reason, "");
+    const std::string serial = first.name().serial;
+    ASSERT_FALSE(serial.empty());
+    first.close();
+    EXPECT_EQ(patient(serial).open().reason, "");
+    EXPECT_NE(patient("another").open().reason.find("there is " + serial), std::string::npos);
+}
+
+TEST(UsbOtherFirmware, IsNotTakenForWhatItWasBefore) {
+    UsbDevice rendering = patient();
+    ASSERT_EQ(rendering.open().reason, "");
+    settled(rendering, 0.2);
+    tell("fault emergency-stop 1");
+    Status status = Status::Ok;
+    for (int k = 0; k < 3 && status == Status::Ok; ++k) {  // a packet or two may wait in the device
+        status = rendering.exchange({0.2}).status;
+    }
+    ASSERT_EQ(status, Status::Fault);
+    EXPECT_EQ(state("torque_uNm"), 0.0);
+    rendering.close();
+    const std::string reason = rendering.open().reason;
+    EXPECT_NE(reason.find("reports an emergency stop"), std::string::npos) << reason;
+    detail::UsbConnection connection;
+    rendering.close();
+    ASSERT_EQ(connection.open("").reason, "");
+    ASSERT_EQ(connection.request(wire::Request::Clear, 0), 0);
+    ASSERT_EQ(connection.request(wire::Request::Enable, 1),
+              0);  // and left so, as by a program that was killed
+    connection.close();
+    UsbOptions options;
+    options.makes_force = false;
+    options.wait = std::chrono::seconds{20};
+    UsbDevice listening{options};
+    ASSERT_EQ(listening.open().reason, "");
+    for (int k = 0; k < 20; ++k) {
+        ASSERT_NE(listening.exchange({0.0}).status, Status::Fault) << k;
+    }
+}
+
+TEST(UsbText, IsReadFromAllOfUnicodeAndFromNothingElse) {
+    const auto text = [](const std::u16string& units) {
+        std::vector<std::uint8_t> bytes;
+        for (const char16_t unit : units) {
+            bytes.push_back(static_cast<std::uint8_t>(unit & 0xFFU));
+            bytes.push_back(static_cast<std::uint8_t>(unit >> 8U));
+        }
+        return detail::text_of_utf16(bytes);
+    };
+    EXPECT_EQ(text(u"EMU-1"), "EMU-1");
+    EXPECT_EQ(text(u"\u00b5 \u2116 \U0001D11E"), "\xC2\xB5 \xE2\x84\x96 \xF0\x9D\x84\x9E");
+    EXPECT_EQ(text(u" two\nlines\t"), "two lines");
+    EXPECT_EQ(text(std::u16string{u"PADDED"} + std::u16string(3, u'\0')), "PADDED");
+    EXPECT_EQ(text(u"   "), "");
+    EXPECT_EQ(text({u'a', char16_t{0xD834}}), "");  // half a pair
+    EXPECT_EQ(text({char16_t{0xDD1E}, u'a'}), "");
 }
 
 }  // namespace

@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <iostream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "../cpp/support.hpp"
 
 namespace {
 
@@ -57,21 +60,33 @@ int main(int count, char** words) {
         testing::InitGoogleTest(&count, words);
         return RUN_ALL_TESTS();
     }
+    std::vector<Machine> machines{{"UsbDevice", {}},
+                                  {"UsbTwoDevices", {"--serial", "LEFT", "--serial", "RIGHT"}},
+                                  {"UsbNoDevice", {"--no-device"}},
+                                  {"UsbForeignDevice", {"--somebody-elses"}},
+                                  {"UsbDeniedDevice", {"--denied"}},
+                                  {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}},
+                                  {"UsbText", {"--no-device"}}};
+    for (int seed = 1; seed <= palpate::test::cases(10); ++seed) {
+        machines.push_back({"UsbOtherFirmware", {"--chosen-by", std::to_string(seed)}});
+    }
     int worst = 0;
-    for (const Machine& machine : {Machine{"UsbDevice", {}},
-                                   {"UsbTwoDevices", {"--serial", "LEFT", "--serial", "RIGHT"}},
-                                   {"UsbNoDevice", {"--no-device"}},
-                                   {"UsbForeignDevice", {"--somebody-elses"}},
-                                   {"UsbDeniedDevice", {"--denied"}},
-                                   {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}},
-                                   {"UsbOtherFirmware", {"--takes-out-first", "--from-zero"}}}) {
+    for (const Machine& machine : machines) {
         const std::string suite = machine.suite;
         if (filter.empty() || filter.rfind(suite + ".", 0) == 0) {
             std::vector<std::string> given = asked;
             if (filter.empty()) {
                 given.push_back("--gtest_filter=" + suite + ".*");
             }
-            worst = std::max(worst, run_under_emulator(self, machine, given));
+            const int code = run_under_emulator(self, machine, given);
+            if (code != 0) {
+                std::cerr << "failed on the machine:";
+                for (const std::string& option : machine.options) {
+                    std::cerr << " " << option;
+                }
+                std::cerr << "\n";
+            }
+            worst = std::max(worst, code);
         }
     }
     return worst;

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <fcntl.h>
 #include <linux/usbdevice_fs.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
 #include <umockdev.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -14,49 +11,32 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "port.hpp"
+#include "usbfs_files.hpp"
 
 namespace emulator {
 
-/// A device in a umockdev testbed: what stands in /sys, and a node in /dev/bus/usb that answers the usbfs ioctls of
-/// libusb.
-///
-/// umockdev passes on ioctls but no poll(). The node is therefore a FIFO with room for one byte: full, and so not
-/// writable, while there is nothing to reap, and empty when there is. libusb waits for just that.
+/// A device in a umockdev testbed: its files, and the ioctls of its node, which are those of usbfs.
 class UsbfsNode {
   public:
     UsbfsNode(UMockdevTestbed* testbed, EmulatedDevice device, int address, std::mutex& mutex,
               std::function<void()> woken)
-        : testbed_{testbed},
+        : handler_{umockdev_ioctl_base_new()},
           port_{std::move(device)},
-          address_{address},
           mutex_{mutex},
           woken_{std::move(woken)} {
-        handler_ = umockdev_ioctl_base_new();
         g_object_connect(handler_, "signal-after::handle-ioctl", G_CALLBACK(&UsbfsNode::ioctl_called), this,
                          nullptr);
-        const std::string number = std::to_string(100 + address_).substr(1);
-        name_ = "1-" + std::to_string(address_);
-        system_path_ = "/sys/devices/usb1/" + name_;
-        node_ = "/dev/bus/usb/001/0" + number;
-        GError* error = nullptr;
-        if (umockdev_testbed_attach_ioctl(testbed_, node_.c_str(), handler_, &error) == FALSE) {
-            throw std::runtime_error(std::string("umockdev: ") + error->message);
-        }
-        if (umockdev_testbed_add_from_string(testbed_, description().c_str(), &error) == FALSE) {
-            throw std::runtime_error(std::string("umockdev: ") + error->message);
-        }
-        make_fifo();
+        files_ = std::make_unique<UsbfsFiles>(testbed, handler_, port_.device().identity(), address);
     }
     ~UsbfsNode() {
-        umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
+        files_.reset();
         g_object_unref(handler_);
-        ::close(fifo_);
     }
     UsbfsNode(const UsbfsNode&) = delete;
     UsbfsNode& operator=(const UsbfsNode&) = delete;
@@ -65,7 +45,7 @@ class UsbfsNode {
     [[nodiscard]] Port& port() { return port_; }
     [[nodiscard]] FrameClock& clock() { return *clock_; }
     void set_clock(FrameClock& clock) { clock_ = &clock; }
-    [[nodiscard]] const std::string& node_file() const { return node_file_; }
+    [[nodiscard]] const std::string& node_file() const { return files_->node_file(); }
     void frame() {
         port_.frame();
         show_readiness();
@@ -81,66 +61,11 @@ class UsbfsNode {
     }
 
     /// Not under the mutex: the testbed may be answering an ioctl that waits for it.
-    void tell_removal() {
-        umockdev_testbed_uevent(testbed_, system_path_.c_str(), "remove");
-        umockdev_testbed_remove_device(testbed_, system_path_.c_str());
-    }
-    void tell_arrival() { umockdev_testbed_uevent(testbed_, system_path_.c_str(), "add"); }
+    void tell_removal() { files_->tell_removal(); }
+    void tell_arrival() { files_->tell_arrival(); }
 
   private:
-    /// The device and the root hub that it hangs on, as umockdev reads them.
-    [[nodiscard]] std::string description() const {
-        const auto hex = [](const Bytes& bytes) {
-            constexpr const char* digits = "0123456789abcdef";
-            std::string text;
-            for (const std::uint8_t byte : bytes) {
-                text += digits[byte >> 4U];
-                text += digits[byte & 15U];
-            }
-            return text;
-        };
-        Bytes descriptors = Identity::device_descriptor();
-        const Bytes configuration = Identity::configuration_descriptor();
-        descriptors.insert(descriptors.end(), configuration.begin(), configuration.end());
-        const Identity& identity = port_.device().identity();
-        const std::string address = std::to_string(address_);
-        return "P: /devices/usb1/" + name_ + "\nN: " + node_.substr(5) +
-               "\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_device\nE: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=0" +
-               node_.substr(node_.size() - 2) + "\nE: DEVNAME=" + node_ +
-               "\nE: PRODUCT=1209/1/100\nE: TYPE=255/0/0\nA: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: "
-               "devnum=" +
-               address + "\\n\nA: speed=12\\n\nA: idVendor=1209\\n\nA: idProduct=0001\\n\nA: serial=" +
-               identity.serial + "\\n\nA: product=" + identity.product +
-               "\\n\nA: manufacturer=" + identity.manufacturer + "\\n\nH: descriptors=" + hex(descriptors) +
-               "\n\n";
-    }
-
-    void make_fifo() {
-        gchar* root = umockdev_testbed_get_root_dir(testbed_);
-        node_file_ = std::string(root) + node_;
-        g_free(root);
-        ::unlink(node_file_.c_str());
-        if (::mkfifo(node_file_.c_str(), 0666) != 0) {
-            throw std::runtime_error("no FIFO at " + node_file_);
-        }
-        ::chmod(node_file_.c_str(), 0666);
-        fifo_ = ::open(node_file_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-        ::fcntl(fifo_, F_SETPIPE_SZ, 4096);
-        show_readiness();
-    }
-
-    void show_readiness() {
-        const bool ready = !port_.done().empty();
-        if (ready == shown_ready_) {
-            return;
-        }
-        shown_ready_ = ready;
-        char byte = 0;
-        const ssize_t moved = ready ? ::read(fifo_, &byte, 1) : ::write(fifo_, &byte, 1);
-        if (moved != 1) {
-            throw std::runtime_error("the FIFO of the device node does not do as it should");
-        }
-    }
+    void show_readiness() { files_->show(!port_.done().empty()); }
 
     static gboolean ioctl_called(UMockdevIoctlBase* /*handler*/, UMockdevIoctlClient* client,
                                  UsbfsNode* self) {
@@ -348,17 +273,10 @@ class UsbfsNode {
         return port_.cancel(address, client, -ENOENT) ? 0 : -EINVAL;
     }
 
-    UMockdevTestbed* testbed_;
-    UMockdevIoctlBase* handler_ = nullptr;
+    UMockdevIoctlBase* handler_;
     Port port_;
     FrameClock* clock_ = nullptr;
-    int address_;
-    std::string name_;
-    std::string system_path_;
-    std::string node_;
-    std::string node_file_;
-    int fifo_ = -1;
-    bool shown_ready_ = true;  ///< an empty FIFO
+    std::unique_ptr<UsbfsFiles> files_;
     std::mutex& mutex_;
     std::function<void()> woken_;
     std::map<UMockdevIoctlClient*, bool> clients_;  ///< and whether they are there

@@ -68,6 +68,7 @@ enum class Ending : std::uint8_t {
 struct LoopProgress {
     std::atomic<std::uint64_t> ticks{0};
     std::atomic<std::uint64_t> missed{0};
+    std::atomic<std::uint64_t> lost{0};  ///< samples
     std::atomic<double> position{0.0};
     std::atomic<double> force{0.0};
     std::atomic<double> object_force{0.0};  ///< of a real object against the handle
@@ -150,6 +151,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
 
         progress.ticks.store(report.timing.ticks(), std::memory_order_relaxed);
         progress.missed.store(report.timing.missed, std::memory_order_relaxed);
+        progress.lost.store(controller.reading_guard().lost(), std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
         progress.force.store(tick.command.force, std::memory_order_relaxed);
         progress.object_force.store(object_force(record), std::memory_order_relaxed);

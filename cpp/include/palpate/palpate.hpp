@@ -44,6 +44,7 @@
 #include "palpate/model/network.hpp"
 #include "palpate/model/piecewise_septic.hpp"
 #include "palpate/model/radial_network.hpp"
+#include "palpate/model/radial_sum.hpp"
 #include "palpate/model/velocity_network.hpp"
 #include "palpate/model/wavelet.hpp"
 #include "palpate/readable.hpp"

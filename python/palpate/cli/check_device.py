@@ -62,9 +62,10 @@ def check_device(
 ) -> None:
     """Measure whether a device is fit to render force, and end in a verdict.
 
-    The device makes no force while it is looked at: rate, period, lost samples, encoder and, while you move
-    the handle against an object, the sign of its transducer. With --push, and only where that is right, it
-    then gives pushes of half a percent of its force to a handle that nobody holds. Exit code 1: not suitable.
+    The device stays disabled while it is looked at: rate, period, lost samples, encoder and, while you move
+    the handle against an object, the signs of its velocity and transducer. A motor that turns the wrong way
+    shows only when it turns: with --push, and only where the rest is right, it is enabled for pushes of half
+    a percent of its force. Before that was seen nothing should render. Exit code 1: not suitable.
     """
     from ..devices import check_device as check
     from ..model import load_model
@@ -127,7 +128,9 @@ def check_device(
             }
         )
         click.echo(found.verdict)
-    if write_profile is not None:
+    if write_profile is not None and not found.may_push:
+        talk(f"{write_profile} is not written: this device must not make force")
+    elif write_profile is not None:
         found.profile().save(write_profile)
         talk(f"wrote {write_profile}; its friction is 0, the safe side: fill in what you know")
     if not found.suitable:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 
 import click
@@ -12,7 +13,7 @@ from .output import number
 
 
 class LiveLine:
-    """Rows, position and force as they come, and where the handle has been.
+    """Rows, position and force as they come, samples lost, and where the handle has been.
 
     Parameters
     ----------
@@ -28,16 +29,18 @@ class LiveLine:
         self._terminal = sys.stderr.isatty()
         self._lower, self._upper = math.inf, -math.inf
 
-    def show(self, rows: int, position: float, force: float) -> None:
+    def show(self, rows: int, position: float, force: float, lost: int) -> None:
         """Take what is true now."""
         self._lower, self._upper = min(self._lower, position), max(self._upper, position)
         if self._terminal:
             text = (
-                f"{rows / self._rate_hz:6.1f} s  {rows} rows  position {number(position)} {self._units[0]} "
+                f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "
+                f"position {number(position)} {self._units[0]} "
                 f"(so far {number(self._lower)} to {number(self._upper)})  "
                 f"force {number(force)} {self._units[1]}"
             )
-            click.echo(f"\r{text:<100.100}", nl=False, err=True)
+            width = shutil.get_terminal_size().columns - 1
+            click.echo(f"\r{text:<{width}.{width}}", nl=False, err=True)
 
     def end(self) -> None:
         """Leave the line."""

@@ -68,7 +68,12 @@ class Check:
         return f"OK: {self.device} is fit to render force{rest}"
 
     def profile(self) -> DeviceProfile:
-        """The device as it was measured; InputError where its mechanics were not."""
+        """The device as it was measured; InputError where its mechanics were not, or a sign is wrong.
+
+        What a certificate counts on is thereby a device whose motor was seen to push the right way.
+        """
+        if not self.may_push:
+            raise InputError(f"there is no profile of a device that must not make force; {self.verdict}")
         return profile_of(self.base, self.numbers)
 
 
@@ -87,10 +92,12 @@ def check_device(
 ) -> Check:
     """Measure a device for some seconds and judge it.
 
-    First the device only listens, with no force: its rate, its lost samples, its encoder, and, while somebody
-    moves the handle against an object, the sign of its transducer. With `push`, and only where signs and
-    encoder are right, it then pushes the handle, which nobody may hold, a little to either side: the sign of
-    its force, its delay, its inertia and damping.
+    First the device only listens, disabled: its rate, its lost samples, its encoder, and, while somebody
+    moves the handle against an object, the signs of its velocity and transducer against its positions. The
+    sign of its motor shows in nothing that a disabled device says. With `push`, and only where the other
+    signs and the encoder are right, it is therefore enabled and pushes the handle, which nobody need hold, a
+    little to either side: half a percent of its force shows that sign, its delay, its inertia and damping.
+    Where a sign is wrong there is no profile, and so nothing is certified for the device.
 
     Parameters
     ----------
@@ -111,7 +118,7 @@ def check_device(
     wait_s : float, optional
         How long a packet of a USB device is waited for [s].
     progress : callable, optional
-        Is told ten times a second: ticks, position, force.
+        Is told ten times a second: ticks, position, force, samples lost.
 
     Raises
     ------

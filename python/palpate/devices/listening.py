@@ -47,6 +47,7 @@ def findings_at_rest(listened: Mapping[str, Any]) -> list[Finding]:
         findings.insert(0, Finding("stream", listened["ended"], False, _CABLE, True))
     if "round_trip" in listened:
         findings.append(Finding("round trip", _percentiles(listened["round_trip"])))
+    if "malformed" in listened:
         counts = ("malformed", "stalls", "bus_errors", "timeouts", "skipped_commands")
         findings.append(
             Finding(

@@ -11,8 +11,8 @@ from .._core import measure as measure_live
 from ..errors import InputError
 from ..model import Model
 
-Progress = Callable[[int, float, float], None]
-"""Is told, ten times a second, the ticks so far, the position and the object's force."""
+Progress = Callable[[int, float, float, int], None]
+"""Is told, ten times a second, the ticks so far, the position, the object's force and the samples lost."""
 
 
 def measure(device: str = "simulated", *, object: Model | None = None, **settings: Any) -> dict[str, Any]:
@@ -96,7 +96,7 @@ def record(
     lowest_rate_share : float, optional
         Of the rate: less for half a second ends a probe, 0: never; a hand's recording never ends by it.
     progress : callable, optional
-        Is told ten times a second: ticks, position, force.
+        Is told ten times a second: ticks, position, force, samples lost.
     **sweep
         lower, upper [m or rad], speed [a second], stiffness, force_limit of the probe; None: as suits it.
 

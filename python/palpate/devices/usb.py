@@ -66,7 +66,7 @@ class UsbSetup:
     def identify(self) -> wire.DeviceInfo:
         """Ask the device who it is: strings and GET_INFO, decoded strictly."""
         info = wire.decode_info(
-            bytes(self._request(wire.Request.GET_INFO, "asking who it is", wire.INFO_SIZE))
+            bytes(self._request(wire.Request.GET_INFO, "asking who it is", wire.LARGEST_PACKET))
         )
         for field, index in (("product", self._handle.iProduct), ("serial", self._handle.iSerialNumber)):
             setattr(self, field, self._string(index))
@@ -120,9 +120,10 @@ class UsbSetup:
 
         core = _pyusb()
         try:
-            return usb.util.get_string(self._handle, index) or "" if index else ""
+            text = usb.util.get_string(self._handle, index) or "" if index else ""
         except (core.USBError, ValueError):  # a device without names is as good
             return ""
+        return "".join(" " if letter < " " or letter == "\x7f" else letter for letter in text).strip(" ")
 
 
 @dataclass(frozen=True)

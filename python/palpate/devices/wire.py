@@ -26,6 +26,8 @@ TO_HOST, TO_DEVICE = 0xC1, 0x41
 
 VERSION = 1
 INFO_SIZE, IN_SIZE, OUT_SIZE = 32, 32, 16
+LARGEST_PACKET = 64
+"""Asked for where less must come: what is too long is seen to be."""
 SHORTEST_WATCHDOG_MS, LONGEST_WATCHDOG_MS = 2, 1000
 
 _INFO = struct.Struct("<BBHIiHHIBBBBQ")

@@ -50,11 +50,12 @@ class PacketStream {
         const bool first = !sequence_.started();
         const std::int64_t step = sequence_.follow(packet.sequence);
         clock_us_.follow(packet.clock_us);
+        count_.follow(packet.count);
         ++health_.packets;
         health_.lost += follows_ ? static_cast<std::uint64_t>(std::max<std::int64_t>(step - 1, 0)) : 0;
         health_.repeated += !first && step <= 0 ? 1 : 0;
         is_late_ = false;
-        if (first) {
+        if (!has_sent_) {
             sent_ = echoed_ = packet.out_sequence;
         } else {
             follow_echo(packet, now);
@@ -77,6 +78,7 @@ class PacketStream {
     }
     /// It went out.
     void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
+        has_sent_ = true;
         sent_ = command.sequence;
         flights_[sent_ % flights_.size()] = {sent_, now, follows_ ? clock_us_.value() : Flight{}.sample_us};
     }
@@ -94,7 +96,7 @@ class PacketStream {
             std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
     };
 
-    /// Commands are numbered on from the echo in the first packet, so that an echo is of this session or none.
+    /// Commands are numbered on from the echo before the first of them, so that an echo is of this session or none.
     void follow_echo(const wire::InPacket& packet, Nanoseconds now) noexcept {
         const auto ahead = static_cast<std::int16_t>(packet.out_sequence - echoed_);
         const auto unsent = static_cast<std::int16_t>(packet.out_sequence - sent_);
@@ -123,7 +125,7 @@ class PacketStream {
 
     void read(const wire::InPacket& packet, bool first, std::int64_t step) noexcept {
         Reading now;
-        now.position = wire::position_of(packet.count, info_.counts_per_rev);
+        now.position = wire::position_of(count_.value(), info_.counts_per_rev);
         now.device_time = 1e-6 * static_cast<double>(clock_us_.value());
         now.velocity = velocity(packet, now, first, step);
         now.applied = wire::force_of(packet.torque_uNm);
@@ -170,6 +172,8 @@ class PacketStream {
     Nanoseconds longest_delay_ = std::numeric_limits<Nanoseconds>::max();
     wire::Unwrapped<std::uint16_t> sequence_;
     wire::Unwrapped<std::uint32_t> clock_us_;
+    wire::Unwrapped<std::int32_t> count_;
+    bool has_sent_ = false;
     std::uint16_t sent_ = 0;
     std::uint16_t echoed_ = 0;
     bool is_acknowledged_ = false;

@@ -30,20 +30,23 @@ struct UsbOptions {
 /// What happened on the wire, packets and transfers.
 struct UsbHealth {
     StreamHealth stream;
-    std::uint64_t skipped_commands = 0;  ///< not sent, since the last one was still on its way
-    std::uint64_t lost_commands = 0;     ///< that did not arrive
-    std::uint64_t timeouts = 0;          ///< exchanges in which no packet came
-    std::uint64_t discarded = 0;         ///< packets that nobody had taken for too long
-    std::uint64_t stalls = 0;            ///< endpoints that halted and were cleared
-    std::uint64_t bus_errors = 0;        ///< transfers that failed on the bus
+    std::uint64_t skipped_commands =
+        0;  ///< not sent: the last one was still on its way, or a newer sample there
+    std::uint64_t lost_commands = 0;  ///< that did not arrive
+    std::uint64_t timeouts = 0;       ///< exchanges in which no packet came
+    std::uint64_t discarded = 0;      ///< packets that nobody had taken for too long
+    std::uint64_t stalls = 0;         ///< endpoints that halted and were cleared
+    std::uint64_t bus_errors = 0;     ///< transfers that failed on the bus
 };
 
 /// A haptic device of one degree of freedom over USB; packets and signs: device/wire.hpp.
 ///
 /// The device paces the host: an exchange sends its command at once and waits for the next packet, in the order in
 /// which they were sampled, but no longer than `UsbOptions::wait`. A host that falls behind by a packet or two
-/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. In
-/// the exchange nothing is allocated or thrown; libusb takes its own locks, and the wait is a futex.
+/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. A
+/// stream that begins, or begins anew, is behind: its first exchange only listens, so that every command follows a
+/// packet at once. In the exchange nothing is allocated or thrown; libusb takes its own locks, and the wait is a
+/// futex.
 ///
 /// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
 /// to the device than `UsbOptions::longest_delay_s`; Fault when the device reports one, was disabled or is gone, and
@@ -83,23 +86,17 @@ class UsbDevice {
         if (open_ == nullptr) {
             return failed(Status::Fault);
         }
-        detail::UsbTransfers& transfers = *open_->transfers;
-        discard_old();
-        // A host that is behind takes what waits, and sends what follows from it at once afterwards; but not twice.
-        open_->catches_up = transfers.arrived() > 0 && !open_->catches_up;
-        if (open_->catches_up) {
-            ++open_->skipped_commands;
-        } else {
-            send(command.force);
-        }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
-        while (transfers.wait_for_arrival(deadline)) {
-            detail::UsbArrival arrival;
-            if (transfers.take(arrival) && open_->stream.take(arrival.packet(), arrival.time)) {
-                return judged(open_->stream.reading());
-            }
+        if (!begins_anew()) {
+            answer(command.force, deadline);
         }
-        if (transfers.is_gone()) {
+        if (next_packet(deadline)) {
+            const Reading reading = judged(open_->stream.reading());
+            open_->sound = sends_force(reading.status);
+            return reading;
+        }
+        open_->sound = false;
+        if (open_->transfers->is_gone()) {
             return failed(Status::Fault);
         }
         ++open_->timeouts;
@@ -163,16 +160,22 @@ class UsbDevice {
 
   private:
     static constexpr std::size_t most_waiting = 4;  ///< packets: a host that is later than this begins anew
+    static constexpr int most_held =
+        2;  ///< packets that a device may have kept from before: of another time and state
     static constexpr Nanoseconds first_packet = nanoseconds_a_second;
     static constexpr Nanoseconds one_write = nanoseconds_a_second / 50;
+
+    static constexpr const char* clear_it = "run 'palpate devices --clear', then try again";
 
     struct OpenDevice {
         detail::UsbConnection connection;
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
         Nanoseconds frame = 0;
+        Nanoseconds arrived = 0;  ///< the last packet
         bool catches_up = false;
         bool sent_last = true;
+        bool sound = true;  ///< the last reading
         std::uint64_t skipped_commands = 0;
         std::uint64_t lost_commands = 0;
         std::uint64_t timeouts = 0;
@@ -192,24 +195,25 @@ class UsbDevice {
             return "does not stream: " + detail::usb_reason(code);
         }
         const Nanoseconds deadline = monotonic_now() + first_packet;
-        if (!next_packet(deadline)) {
+        if (!throw_away(most_held, deadline) || !next_packet(deadline)) {
             return open_->transfers->is_gone()
                        ? "does not stream: " + detail::usb_reason(open_->transfers->error())
                        : "sends no packets; unplug it and plug it in again";
         }
         if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
-            return "reports " + fault_text(open_->stream.status_bits()) +
-                   "; when its cause is gone, run 'palpate devices --clear', then try again";
+            return "reports " + fault_text(open_->stream.status_bits()) + "; when its cause is gone, " +
+                   clear_it;
         }
         if (!options_.makes_force) {
             return "";
         }
         if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
-            return "cannot be enabled: " + detail::usb_reason(code);
+            return "cannot be enabled: " + (code == LIBUSB_ERROR_PIPE ? std::string("it refuses; ") + clear_it
+                                                                      : detail::usb_reason(code));
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {
             if (!next_packet(deadline)) {
-                return "does not let itself be enabled; run 'palpate devices --clear', then try again";
+                return std::string("does not let itself be enabled; ") + clear_it;
             }
         }
         open_->stream.pause();
@@ -231,27 +235,70 @@ class UsbDevice {
         detail::UsbArrival arrival;
         while (open_->transfers->wait_for_arrival(deadline)) {
             if (open_->transfers->take(arrival) && open_->stream.take(arrival.packet(), arrival.time)) {
+                open_->arrived = arrival.time;
                 return true;
             }
         }
         return false;
     }
 
-    void discard_old() noexcept {
+    [[nodiscard]] bool throw_away(int packets, Nanoseconds deadline) noexcept {
         detail::UsbArrival old;
-        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
-            return;
+        for (int k = 0; k < packets; ++k) {
+            if (!open_->transfers->wait_for_arrival(deadline)) {
+                return false;
+            }
+            (void)open_->transfers->take(old);
         }
+        return true;
+    }
+
+    /// Whether nothing can follow from the last packet: there was none, or too many wait, which are thrown away.
+    [[nodiscard]] bool begins_anew() noexcept {
+        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
+            return false;
+        }
+        detail::UsbArrival old;
         while (open_->transfers->take(old)) {
             ++open_->discarded;
         }
         open_->stream.pause();
+        open_->catches_up = false;
+        return true;
     }
 
-    /// The end of the last command and the packet that wakes a host come in the same frame, in any order: up to a
-    /// frame of waiting keeps every frame a command. A device that takes longer is not taking commands.
+    /// Sends the command that follows from the last packet, unless the host is behind: then it takes what waits, and
+    /// sends what follows from that at once afterwards; but not twice, and nothing that ends a force waits for that.
+    void answer(double force, Nanoseconds deadline) noexcept {
+        const bool ended = last_has_ended(deadline);
+        const bool behind = !ended || (open_->sound && open_->transfers->arrived() > 0);
+        open_->catches_up = behind && !open_->catches_up;
+        if (open_->catches_up) {
+            ++open_->skipped_commands;
+            open_->sent_last = open_->sent_last && ended;
+        } else {
+            send(force);
+        }
+    }
+
+    /// The end of a command and the packet that wakes a host come in the same frame, in any order. A command that ends
+    /// much later than that packet has missed its frame, and ends in the next one: close to a newer packet, which is
+    /// waited for, since else that command and all that follow were a frame late.
+    [[nodiscard]] bool last_has_ended(Nanoseconds deadline) noexcept {
+        detail::UsbTransfers& transfers = *open_->transfers;
+        if (!transfers.writes()) {
+            return true;
+        }
+        (void)transfers.wait_for_write_or_arrival(deadline);
+        const bool ended = !transfers.writes();
+        const Nanoseconds now = monotonic_now();
+        if (ended && now - open_->arrived > open_->frame / 2) {
+            (void)transfers.wait_for_arrival(now + open_->frame / 4);
+        }
+        return ended;
+    }
+
     void send(double force) noexcept {
-        (void)open_->transfers->wait_for_write(monotonic_now() + open_->frame);
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
         const int code = open_->transfers->write(packet);

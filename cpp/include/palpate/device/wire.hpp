@@ -177,7 +177,8 @@ class Putting {
                                      degrees_of_freedom, reserved, info.uid);
     const bool fits = in_bytes == in_size && out_bytes == out_size && degrees_of_freedom == 1 &&
                       reserved == 0 && (info.capabilities & ~(has_transducer | measures_velocity)) == 0;
-    const bool possible = fits && info.counts_per_rev > 0 && info.max_torque_uNm > 0 && info.rate_hz > 0;
+    const bool possible = fits && info.counts_per_rev > 0 && info.max_torque_uNm > 0 && info.rate_hz > 0 &&
+                          info.watchdog_ms > 0;
     return possible ? Decoded::Ok : Decoded::WrongField;
 }
 
@@ -190,7 +191,7 @@ class Putting {
 }
 
 /// [rad]
-[[nodiscard]] inline double position_of(std::int32_t count, std::uint32_t counts_per_rev) noexcept {
+[[nodiscard]] inline double position_of(std::int64_t count, std::uint32_t counts_per_rev) noexcept {
     return 2.0 * std::numbers::pi * static_cast<double>(count) / static_cast<double>(counts_per_rev);
 }
 
@@ -209,13 +210,15 @@ class Putting {
 }
 
 /// A counter that wraps around, made one that does not. What is less than half a turn behind is before.
-template <std::unsigned_integral Counter>
+template <std::integral Counter>
 class Unwrapped {
   public:
     /// Takes the next reading; returns how far it is from the last one, 0 for the first.
     std::int64_t follow(Counter reading) noexcept {
-        using Signed = std::make_signed_t<Counter>;
-        const auto step = started_ ? static_cast<Signed>(static_cast<Counter>(reading - last_)) : Signed{0};
+        using Unsigned = std::make_unsigned_t<Counter>;
+        const auto ahead =
+            static_cast<Unsigned>(static_cast<Unsigned>(reading) - static_cast<Unsigned>(last_));
+        const auto step = started_ ? static_cast<std::make_signed_t<Counter>>(ahead) : 0;
         value_ = started_ ? value_ + step : static_cast<std::int64_t>(reading);
         last_ = reading;
         started_ = true;

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/device/detail/usb_text.hpp"
 #include "palpate/device/device.hpp"
 #include "palpate/device/wire.hpp"
 
@@ -36,31 +37,6 @@ struct UsbName {
 };
 
 namespace detail {
-
-/// What an error of libusb means, and what helps.
-[[nodiscard]] inline std::string usb_reason(int code) {
-    switch (code) {
-        case LIBUSB_ERROR_ACCESS:
-            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
-                   "again";
-        case LIBUSB_ERROR_BUSY:
-            return "another program uses it; end that program, then try again";
-        case LIBUSB_ERROR_NO_DEVICE:
-        case LIBUSB_ERROR_NOT_FOUND:
-            return "it was unplugged meanwhile; plug it in and try again";
-        case LIBUSB_ERROR_TIMEOUT:
-            return "it does not answer; unplug it and plug it in again";
-        case LIBUSB_ERROR_PIPE:
-            return "it refused a request; its firmware may be of another version";
-        case LIBUSB_ERROR_NO_MEM:
-            return "the system has no memory left for USB; see "
-                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
-        case LIBUSB_ERROR_IO:
-            return "the transfer failed on the bus; try another cable or port";
-        default:
-            return std::string(libusb_error_name(code)) + ", " + libusb_strerror(code);
-    }
-}
 
 struct CloseContext {
     void operator()(libusb_context* context) const noexcept { libusb_exit(context); }
@@ -193,13 +169,17 @@ class UsbConnection {
             }
         };
         const std::unique_ptr<libusb_config_descriptor, Free> config{read};
-        if (config->bNumInterfaces < 1 || config->interface[0].num_altsetting < 1) {
-            return false;
-        }
-        const libusb_interface_descriptor& interface = config->interface[0].altsetting[0];
-        return interface.bInterfaceClass == wire::interface_kind[0] &&
-               interface.bInterfaceSubClass == wire::interface_kind[1] &&
-               interface.bInterfaceProtocol == wire::interface_kind[2];
+        const std::span interfaces{config->interface, config->bNumInterfaces};
+        return std::any_of(interfaces.begin(), interfaces.end(), [](const libusb_interface& interface) {
+            if (interface.num_altsetting < 1) {
+                return false;
+            }
+            const libusb_interface_descriptor& first = interface.altsetting[0];
+            return first.bInterfaceNumber == wire::interface_number &&
+                   first.bInterfaceClass == wire::interface_kind[0] &&
+                   first.bInterfaceSubClass == wire::interface_kind[1] &&
+                   first.bInterfaceProtocol == wire::interface_kind[2];
+        });
     }
 
     /// Opens it and asks it who it is.
@@ -218,9 +198,9 @@ class UsbConnection {
         Handle handle{opened};
         libusb_device_descriptor descriptor{};
         libusb_get_device_descriptor(device, &descriptor);
-        name.manufacturer = text_of(opened, descriptor.iManufacturer);
-        name.product = text_of(opened, descriptor.iProduct);
-        name.serial = text_of(opened, descriptor.iSerialNumber);
+        name.manufacturer = string_of(opened, descriptor.iManufacturer);
+        name.product = string_of(opened, descriptor.iProduct);
+        name.serial = string_of(opened, descriptor.iSerialNumber);
         if (!serial.empty() && name.serial != serial) {
             others.push_back(name.serial);
             return;
@@ -245,14 +225,6 @@ class UsbConnection {
             return;
         }
         fitting.push_back({std::move(handle), name, info});
-    }
-
-    [[nodiscard]] static std::string text_of(libusb_device_handle* handle, std::uint8_t index) {
-        std::array<unsigned char, 256> letters{};
-        const int length =
-            index == 0 ? 0
-                       : libusb_get_string_descriptor_ascii(handle, index, letters.data(), letters.size());
-        return {letters.begin(), letters.begin() + (length > 0 ? length : 0)};
     }
 
     std::unique_ptr<libusb_context, CloseContext> context_;

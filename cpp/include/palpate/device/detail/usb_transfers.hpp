@@ -92,7 +92,7 @@ class UsbTransfers {
         if (is_gone()) {
             return LIBUSB_ERROR_NO_DEVICE;
         }
-        if (writes_in_flight_.load(std::memory_order_acquire) != 0) {
+        if (writes()) {
             return LIBUSB_ERROR_BUSY;
         }
         out_bytes_ = wire::encode(command);
@@ -124,26 +124,27 @@ class UsbTransfers {
             return code;
         }
         const Nanoseconds last = monotonic_now() + longest_stop;
-        return wait_until_zero(requests_in_flight_, last) ? answer_.load(std::memory_order_relaxed)
-                                                          : static_cast<int>(LIBUSB_ERROR_TIMEOUT);
+        const bool ended =
+            wait_until([&] { return requests_in_flight_.load(std::memory_order_acquire) == 0; }, last);
+        return ended ? answer_.load(std::memory_order_relaxed) : static_cast<int>(LIBUSB_ERROR_TIMEOUT);
     }
 
     /// Waits for packets; false: none came before the deadline, or none can come any more.
     [[nodiscard]] bool wait_for_arrival(Nanoseconds deadline) noexcept {
-        while (!is_gone()) {
-            const std::uint32_t seen = changes_.events();
-            if (arrived() > 0 || is_gone()) {
-                break;
-            }
-            if (!changes_.wait(seen, deadline)) {
-                return arrived() > 0;
-            }
-        }
+        (void)wait_until([&] { return arrived() > 0 || is_gone(); }, deadline);
         return arrived() > 0;
     }
-    /// Waits until the write on its way has ended; false: it has not.
+    /// Whether a write is on its way.
+    [[nodiscard]] bool writes() const noexcept {
+        return writes_in_flight_.load(std::memory_order_acquire) != 0;
+    }
+    /// Waits until it has ended; false: it has not.
     [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
-        return wait_until_zero(writes_in_flight_, deadline);
+        return wait_until([&] { return !writes(); }, deadline);
+    }
+    /// Waits until it has ended or a packet is there; false: neither.
+    [[nodiscard]] bool wait_for_write_or_arrival(Nanoseconds deadline) noexcept {
+        return wait_until([&] { return !writes() || arrived() > 0 || is_gone(); }, deadline);
     }
 
     /// Packets that wait to be taken.
@@ -345,11 +346,13 @@ class UsbTransfers {
 
     // ------------------------------------------------------------------------------------------- both threads
 
-    [[nodiscard]] bool wait_until_zero(const std::atomic<int>& in_flight, Nanoseconds deadline) noexcept {
-        while (in_flight.load(std::memory_order_acquire) != 0) {
+    /// Waits until something is so that a transfer makes so; false: it is not.
+    template <class IsSo>
+    [[nodiscard]] bool wait_until(IsSo is_so, Nanoseconds deadline) noexcept {
+        while (!is_so()) {
             const std::uint32_t seen = changes_.events();
-            if (in_flight.load(std::memory_order_acquire) != 0 && !changes_.wait(seen, deadline)) {
-                return in_flight.load(std::memory_order_acquire) == 0;
+            if (!is_so() && !changes_.wait(seen, deadline)) {
+                return is_so();
             }
         }
         return true;

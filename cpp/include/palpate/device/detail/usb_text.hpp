@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <libusb-1.0/libusb.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace palpate::detail {
+
+/// What an error of libusb means, and what helps.
+[[nodiscard]] inline std::string usb_reason(int code) {
+    switch (code) {
+        case LIBUSB_ERROR_ACCESS:
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
+                   "again";
+        case LIBUSB_ERROR_BUSY:
+            return "another program uses it; end that program, then try again";
+        case LIBUSB_ERROR_NO_DEVICE:
+        case LIBUSB_ERROR_NOT_FOUND:
+            return "it was unplugged meanwhile; plug it in and try again";
+        case LIBUSB_ERROR_TIMEOUT:
+            return "it does not answer; unplug it and plug it in again";
+        case LIBUSB_ERROR_PIPE:
+            return "it refused a request; its firmware may be of another version";
+        case LIBUSB_ERROR_NO_MEM:
+            return "the system has no memory left for USB; see "
+                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
+        case LIBUSB_ERROR_IO:
+            return "the transfer failed on the bus; try another cable or port";
+        default:
+            return std::string(libusb_error_name(code)) + ", " + libusb_strerror(code);
+    }
+}
+
+/// UTF-8 of one character.
+inline void append_utf8(std::string& text, std::uint32_t character) {
+    const auto byte = [&](std::uint32_t bits) { text.push_back(static_cast<char>(bits)); };
+    const auto rest = [&](unsigned shift) { byte(0x80U | (character >> shift & 0x3FU)); };
+    if (character < 0x80) {
+        byte(character);
+    } else if (character < 0x800) {
+        byte(0xC0U | character >> 6U);
+        rest(0);
+    } else if (character < 0x10000) {
+        byte(0xE0U | character >> 12U);
+        rest(6);
+        rest(0);
+    } else {
+        byte(0xF0U | character >> 18U);
+        rest(12);
+        rest(6);
+        rest(0);
+    }
+}
+
+/// The text of a string descriptor's UTF-16 (little endian) as UTF-8, on one line, without blanks at its ends; empty
+/// where it is no text.
+[[nodiscard]] inline std::string text_of_utf16(std::span<const std::uint8_t> bytes) {
+    std::string text;
+    std::uint32_t high = 0;  // the first half of a pair
+    for (std::size_t k = 0; k + 1 < bytes.size(); k += 2) {
+        const auto unit = static_cast<std::uint32_t>(bytes[k] | bytes[k + 1] << 8U);
+        const bool is_low = unit >= 0xDC00 && unit < 0xE000;
+        if (is_low != (high != 0)) {
+            return "";
+        }
+        if (unit >= 0xD800 && unit < 0xDC00) {
+            high = unit;
+            continue;
+        }
+        const bool is_control = unit < 0x20 || unit == 0x7F;
+        append_utf8(text, is_control ? ' '
+                          : is_low   ? 0x10000 + ((high - 0xD800) << 10U) + (unit - 0xDC00)
+                                     : unit);
+        high = 0;
+    }
+    const std::size_t first = text.find_first_not_of(' ');
+    return high != 0 || first == std::string::npos
+               ? ""
+               : text.substr(first, text.find_last_not_of(' ') + 1 - first);
+}
+
+/// A string of the device, in the first of its languages; empty where it has none.
+[[nodiscard]] inline std::string string_of(libusb_device_handle* handle, std::uint8_t index) {
+    std::array<std::uint8_t, 255> bytes{};
+    const auto read = [&](std::uint8_t which, std::uint16_t language) {
+        const int length = libusb_get_string_descriptor(handle, which, language, bytes.data(),
+                                                        static_cast<int>(bytes.size()));
+        const bool is_one = length >= 2 && bytes[0] >= 2 && bytes[1] == LIBUSB_DT_STRING;
+        return std::span<const std::uint8_t>{bytes}.first(is_one ? std::min<std::size_t>(bytes[0], length)
+                                                                 : 0);
+    };
+    if (index == 0) {
+        return "";
+    }
+    const auto languages = read(0, 0);
+    if (languages.size() < 4) {
+        return "";
+    }
+    const auto text = read(index, static_cast<std::uint16_t>(languages[2] | languages[3] << 8U));
+    return text.size() < 2 ? "" : text_of_utf16(text.subspan(2));
+}
+
+}  // namespace palpate::detail

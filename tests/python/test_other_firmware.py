@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Devices of other people's making: whatever the protocol leaves open is drawn by a seed, palpate works the same."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import ROOT
+from control_program import PATIENT, PROGRAM, needs_program
+from palpate import read_recording
+from usb_emulation import emulated, frames, needs_emulation
+
+SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
+SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
+PALPATE = [sys.executable, "-m", "palpate"]
+
+pytestmark = [needs_emulation, pytest.mark.parametrize("seed", range(1, 1 + 3 * SCALE))]
+
+
+def other(seed: int, *words: Any) -> list[str]:
+    return ["--lock-step", "--chosen-by", str(seed), *map(str, words)]
+
+
+@needs_program
+def test_it_is_found_by_its_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
+    listed = emulated(*PALPATE, "devices", "--json", device=other(seed))
+    (found,) = json.loads(listed.stdout)["devices"]
+    assert found["problem"] == ""
+    trace, record = tmp_path / "trace.csv", tmp_path / "felt.csv"
+    words = [PROGRAM, SPRING, "--device", f"usb:{found['serial']}", "--uncertified", *PATIENT]
+    run = [*words, "--wait-ms", 10_000, "--priority", 0, "--json", "--duration-s", 0.5, "--record", record]
+    answer = emulated(*run, device=other(seed, "--trace", trace))
+    assert answer.returncode == 0, answer.stderr
+    summary = json.loads(answer.stdout)
+    assert summary["ticks"] == summary["recorded"] == 500
+    assert summary["lost_samples"] == summary["usb"]["malformed"] == summary["usb"]["late_echoes"] == 0
+    felt = frames(trace)
+    assert min(frame.torque for frame in felt) < -1e-3  # the spring was felt
+    assert felt[-1].torque == 0.0
+    assert not felt[-1].enabled
+    assert len(read_recording(record)) > 0
+
+
+def test_its_sign_and_mechanics_are_measured(seed: int) -> None:
+    words = [*PALPATE, "check-device", "--device", "usb", "--duration-s", 2, "--wait-ms", 2000, "--json"]
+    answer = emulated(*words, "--push", "--yes", device=other(seed, "--no-hand"))
+    assert answer.returncode in (0, 1), answer.stderr  # this machine may be late
+    told = json.loads(answer.stdout)
+    findings = {one["name"]: one for one in told["findings"]}
+    assert findings["sign of the force"]["right"], answer.stdout
+    assert told["delay_samples"] in (0, 1, 2, 3)
+    assert findings["wire"]["right"]
