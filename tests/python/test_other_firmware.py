@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices of other people's making: whatever the protocol leaves open is drawn by a seed, palpate works the same."""
+"""Devices of other people's making: whatever the protocol leaves open is drawn by a seed."""
 
 from __future__ import annotations
 
