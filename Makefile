@@ -77,7 +77,7 @@ test: lint test-cpp | setup
 	$(MAKE) --no-print-directory test-python
 
 test-python: setup control
-	$(python) -m pytest
+	$(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile
 
 # The real-time program; the build tool knows what is up to date.
 control: $(stamps)/develop
@@ -93,8 +93,7 @@ test-full: test-full-native
 # What `make test` does not do at any size: sanitizers, the package as installed, a USB device below a kernel.
 test-full-native: setup control
 	tools/cpp_tests.sh release
-	sanitized=$$(( (PALPATE_TEST_SCALE + 9) / 10 )); for preset in asan tsan; do \
-	  PALPATE_TEST_SCALE=$$sanitized tools/cpp_tests.sh $$preset; done
+	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
 	tools/install_tests.sh
 	$(python) -m pytest tests/usb
 

@@ -18,12 +18,13 @@ from statistics import median
 import numpy as np
 from blocks import row, scaled, timed, write_results
 from problems import TITLES, problem
+from run import SCALE
 
 from palpate import WaveletNetworkRegressor
 from palpate.baselines import HuntCrossley, LinearZones, LookupTable, SmoothingSpline, TissueParameters
 
 PROBLEMS = ("P1", "P2")
-WAVELETS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32)
+WAVELETS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32) if SCALE >= 0.1 else (1, 2, 4)
 
 BASELINES = {
     "lookup table": [LookupTable(size) for size in (4, 8, 16, 32, 64, 128, 256, 512)],

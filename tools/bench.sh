@@ -5,6 +5,8 @@ set -euo pipefail
 
 scale=${PALPATE_BENCH_SCALE:-1}
 seconds=$(awk -v scale="$scale" 'BEGIN { print 0.1 * scale }')
+repetitions=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 1 : 5 }')
+blocks=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 1 : 10 }')
 governor=$(cat /sys/devices/system/cpu/cpu0/cpufreq/scaling_governor 2>/dev/null || echo unknown)
 commit=$(git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -19,8 +21,8 @@ flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCa
 for source in bench/*.cpp; do
     name=$(basename "$source" .cpp)
     "build/release/bench/$name" \
-        --benchmark_min_time="$seconds" --benchmark_repetitions=5 --benchmark_enable_random_interleaving=true \
-        --benchmark_display_aggregates_only=true \
+        --benchmark_min_time="$seconds" --benchmark_repetitions="$repetitions" \
+        --benchmark_enable_random_interleaving=true --benchmark_display_aggregates_only=true \
         --benchmark_out="build/bench/$name.json" --benchmark_out_format=json \
         --benchmark_context=commit="$commit" --benchmark_context=governor="$governor" \
         --benchmark_context=compiler="$("$compiler" --version | head -1 | tr ', ' '__')" \
@@ -45,7 +47,7 @@ cmake --preset control >/dev/null
 cmake --build --preset control >/dev/null
 if command -v cyclictest >/dev/null; then
     .venv/bin/python tools/lateness.py build/control/palpate-control tests/models/good/position.json \
-        build/bench/lateness.json --seconds "$(awk -v scale="$scale" 'BEGIN { print 20 * scale }')"
+        build/bench/lateness.json --seconds "$(awk -v scale="$scale" 'BEGIN { print 20 * scale }')" --blocks "$blocks"
 else
     echo "skipped: needs cyclictest (Debian: rt-tests)"
 fi

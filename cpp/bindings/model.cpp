@@ -134,7 +134,7 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
                       const std::optional<Array>& linear_hysteresis, std::optional<double> bias_hysteresis,
                       const Array& lower, const Array& upper, const std::string& below,
                       const std::string& above, std::optional<double> period,
-                      std::optional<double> play_radius) {
+                      std::optional<double> play_radius, bool of_velocity) {
     NetworkParameters network{static_cast<std::size_t>(lower.size()),
                               copied(alpha),
                               copied(beta),
@@ -150,7 +150,8 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
         "weight_hysteresis, linear_hysteresis and bias_hysteresis must be given together or not at all");
     if (given == 0) {
         detail::require(!play_radius, "play_radius is given for a model without hysteresis");
-        return {std::move(network), std::move(domain)};
+        return of_velocity ? ForceModel::of_velocity(std::move(network), std::move(domain))
+                           : ForceModel{std::move(network), std::move(domain)};
     }
     detail::require_size(copied(*linear_hysteresis), 1, "linear_hysteresis");
     return {network,
@@ -257,8 +258,10 @@ void bind_model(py::module_& module) {
              "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
              "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear",
              "above"_a = "linear", "period"_a = py::none(), "play_radius"_a = py::none(),
-             "alpha, beta (N, d); weight (N,); linear, lower, upper (d,). ValueError names the field that is "
-             "wrong.");
+             "of_velocity"_a = false,
+             "alpha, beta (N, d); weight (N,); linear, lower, upper (d,). of_velocity: the second of two "
+             "inputs is the "
+             "velocity. ValueError names the field that is wrong.");
 
     bind_quantity<&EnvironmentSample::force>(type, "force",
                                              "Force of the object against the tool [N or N*m]; a number in, "
@@ -306,6 +309,9 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("linear", [](const ForceModel& m) { return row(m.parameters().linear); });
     type.def_property_readonly("bias", [](const ForceModel& m) { return m.parameters().bias; });
     type.def_property_readonly("hysteretic", [](const ForceModel& m) { return m.hysteresis() != nullptr; });
+    type.def_property_readonly(
+        "of_velocity", [](const ForceModel& m) { return m.velocity() != nullptr; },
+        "Whether the second of two inputs is the velocity.");
     type.def_property_readonly("weight_hysteresis", [](const ForceModel& m) -> std::optional<Array> {
         return m.hysteresis() ? std::optional(row(m.hysteresis()->loss().parameters().weight)) : std::nullopt;
     });

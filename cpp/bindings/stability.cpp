@@ -36,12 +36,14 @@ void bind_bounds(py::module_& module) {
         "With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', "
         "and h / r more while it sticks.")
         .def(py::init([](double slope_min, double slope_max, double steepest, double sliding, double loss_min,
-                         double loss_max, double loss_per_play, double mean_force, bool hysteresis) {
-                 return ForceBounds{hysteresis,           {slope_min, slope_max}, steepest,  sliding,
-                                    {loss_min, loss_max}, loss_per_play,          mean_force};
+                         double loss_max, double loss_per_play, double mean_force, double drag,
+                         bool hysteresis) {
+                 return ForceBounds{hysteresis,           {slope_min, slope_max}, steepest,   sliding,
+                                    {loss_min, loss_max}, loss_per_play,          mean_force, drag};
              }),
              py::kw_only(), "slope_min"_a, "slope_max"_a, "steepest"_a, "sliding"_a, "loss_min"_a = 0.0,
-             "loss_max"_a = 0.0, "loss_per_play"_a = 0.0, "mean_force"_a = 0.0, "hysteresis"_a = false)
+             "loss_max"_a = 0.0, "loss_per_play"_a = 0.0, "mean_force"_a = 0.0, "drag"_a = 0.0,
+             "hysteresis"_a = false)
         .def_readonly("hysteresis", &ForceBounds::hysteresis)
         .def_property_readonly("slope_min", end(&ForceBounds::slope, &Interval::lower), "Of every path.")
         .def_property_readonly("slope_max", end(&ForceBounds::slope, &Interval::upper), "Of every path.")
@@ -50,10 +52,12 @@ void bind_bounds(py::module_& module) {
         .def_property_readonly("loss_min", end(&ForceBounds::loss, &Interval::lower), "Smallest h.")
         .def_property_readonly("loss_max", end(&ForceBounds::loss, &Interval::upper), "Largest h.")
         .def_readonly("loss_per_play", &ForceBounds::loss_per_play, "max h / r")
-        .def_readonly("mean_force", &ForceBounds::mean_force,
-                      "|mean| over a period of a model that repeats.");
-    module.def("force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0,
-               "Proved bounds of a model of one position; play_radius in place of its own where above 0.");
+        .def_readonly("mean_force", &ForceBounds::mean_force, "|mean| over a period of a model that repeats.")
+        .def_readonly("drag", &ForceBounds::drag, "B_v = max |f(x, v) - f(x, 0)| / |v|.");
+    module.def(
+        "force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0,
+        "Proved bounds of a model of one position, or of position and velocity; play_radius in place of its\n"
+        "own where above 0.");
 }
 
 void bind_inequality(py::module_& module) {

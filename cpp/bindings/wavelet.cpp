@@ -52,15 +52,25 @@ struct Frame {
         return alpha[i * dimension + j] * (x[k * dimension + j] - beta[i * dimension + j]);
     }
 
+    /// The same for what a hat is multiplied by: far away it is zero whatever u is, even if it is infinite.
+    [[nodiscard]] double clamped(std::size_t i, std::size_t k, std::size_t j) const noexcept {
+        return std::clamp(scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
+    }
+
     /// Calls visit(k, psi) for every sample k with the radial hat of wavelet i there, a block at a time: the
-    /// exponentials of a block are vectorised.
+    /// exponentials of a block are vectorised, and none is taken where the wavelet reaches no sample of it.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        constexpr std::size_t block = 256;
+        constexpr std::size_t block = 64;
+        // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
+        // algebra takes ten times as long.
+        constexpr double nothing_is_left = 160.0;
+        const auto d = static_cast<double>(dimension);
         std::array<double, block> square{};
         std::array<double, block> gaussian{};
         for (std::size_t first = 0; first < samples; first += block) {
             const std::size_t size = std::min(block, samples - first);
+            double nearest = nothing_is_left;
             for (std::size_t k = 0; k < size; ++k) {
                 double sum = 0.0;
                 for (std::size_t j = 0; j < dimension; ++j) {
@@ -68,12 +78,11 @@ struct Frame {
                     sum += u * u;
                 }
                 square[k] = std::min(sum, detail::hat_reach * detail::hat_reach);
+                nearest = std::min(nearest, square[k]);
             }
-            detail::hat_kernel().gaussians(square.data(), size, gaussian.data());
-            const auto d = static_cast<double>(dimension);
-            // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
-            // algebra takes ten times as long.
-            constexpr double nothing_is_left = 160.0;
+            if (nearest < nothing_is_left) {
+                detail::hat_kernel().gaussians(square.data(), size, gaussian.data());
+            }
             for (std::size_t k = 0; k < size; ++k) {
                 gaussian[k] = square[k] < nothing_is_left ? gaussian[k] : 0.0;
                 visit(first + k,
@@ -125,8 +134,7 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
                 value_out[at] = psi.value;
                 for (std::size_t j = 0; j < frame.dimension; ++j) {
                     const double dilation = frame.alpha[i * frame.dimension + j];
-                    // Far away the hat is zero whatever u is, even if it is infinite.
-                    const double u = std::clamp(frame.scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
+                    const double u = frame.clamped(i, k, j);
                     const double by_u = psi.gradient_over_u * u;
                     alpha_out[j][at] = by_u * (u / dilation);
                     beta_out[j][at] = -dilation * by_u;
@@ -150,7 +158,7 @@ std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alph
         frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
             for (std::size_t j = 0; j < frame.dimension; ++j) {
                 const double dilation = frame.alpha[i * frame.dimension + j];
-                const double u = std::clamp(frame.scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
+                const double u = frame.clamped(i, k, j);
                 *out[j]++ = dilation * dilation * psi.curvature(u);
             }
         });
@@ -158,9 +166,7 @@ std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alph
     return result;
 }
 
-/// One function of the one-dimensional wavelet on every (sample, wavelet) pair.
-template <class Function>
-Columns one_dimensional_columns(const Array& x, const Array& alpha, const Array& beta, Function function) {
+Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& beta) {
     const Frame frame(x, alpha, beta);
     if (frame.dimension != 1) {
         throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,): this is for one input");
@@ -169,9 +175,9 @@ Columns one_dimensional_columns(const Array& x, const Array& alpha, const Array&
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
     for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        for (std::size_t k = 0; k < frame.samples; ++k) {
-            *out++ = function(mexican_hat(frame.scaled(i, k, 0)), frame.alpha[i]);
-        }
+        frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
+            *out++ = frame.alpha[i] * (psi.gradient_over_u * frame.clamped(i, k, 0));
+        });
     }
     return result;
 }
@@ -203,22 +209,8 @@ void bind_wavelet(py::module_& module) {
                "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
     module.def("wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
                "Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
-    module.def(
-        "wavelet_slope_columns",
-        [](const Array& x, const Array& alpha, const Array& beta) {
-            return one_dimensional_columns(
-                x, alpha, beta, [](const MexicanHat& psi, double dilation) { return dilation * psi.slope; });
-        },
-        "x"_a, "alpha"_a, "beta"_a, "d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).");
-    module.def(
-        "wavelet_integral_columns",
-        [](const Array& x, const Array& alpha, const Array& beta) {
-            return one_dimensional_columns(x, alpha, beta, [](const MexicanHat& psi, double dilation) {
-                return psi.integral / dilation;
-            });
-        },
-        "x"_a, "alpha"_a, "beta"_a,
-        "An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).");
+    module.def("wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,
+               "d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).");
 }
 
 }  // namespace palpate::bindings

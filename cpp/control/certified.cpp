@@ -20,14 +20,6 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 
 }  // namespace
 
-bool chooses_rendering(const Options& options) {
-    const SchemeChoices& scheme = options.scheme;
-    // The parser writes a flag that was not given, too.
-    return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
-           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || options.slew_s ||
-           options.tolerated;
-}
-
 void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.slew_s = 0.0;
     loop.tolerated = 0;
@@ -73,17 +65,13 @@ Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units
                    "; make a certificate with 'palpate plan', or type --uncertified to render without");
         }
     }
-    const Scheme scheme = options.uncertified ? scheme_of(options, file.model, bench) : *file.plan;
+    const Scheme scheme = scheme_of(options, file, bench);
     GuardSettings guards = guards_of(options, bench);
     LoopSettings loop = options.loop;
     if (!options.uncertified) {
         keep_to(*file.certificate, guards, loop);
     }
-    Job job{std::move(file), std::move(units), scheme, guards, {}};
-    job.settings.loop = loop;
-    job.settings.real_time = options.real_time;
-    validate(job.settings.loop);
-    return job;
+    return job_of(options, std::move(file), std::move(units), scheme, guards, loop);
 }
 
 }  // namespace palpate::control

@@ -14,9 +14,6 @@ namespace palpate::control {
 /// Below this share of its rate the certificate of a run no longer holds: it is for the period asked for.
 inline constexpr double certified_rate_share = 0.99;
 
-/// Whether the command line asks for a rendering of its own: then nothing is certified.
-[[nodiscard]] bool chooses_rendering(const Options& options);
-
 /// What a certified run keeps to: no slew limit and no tick without a force, which are not covered by the proofs,
 /// and no time between two ticks that is longer than they hold for.
 void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop);

@@ -42,9 +42,6 @@ std::string filters_of(const Inverse3Info& info) {
 }  // namespace
 
 int run_on_inverse3(const Options& options, ModelFile file, RecordUnits units) {
-    if (!options.faults.empty()) {
-        refuse("--fault is for the simulated device");
-    }
     if (file.position_unit != "m" || file.force_unit != "N") {
         refuse(options.model + " is in " + (file.position_unit.empty() ? "no unit" : file.position_unit) +
                " and " + (file.force_unit.empty() ? "no unit" : file.force_unit) +

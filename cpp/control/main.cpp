@@ -58,13 +58,14 @@ void refuse(const std::string& sentence) {
     throw std::invalid_argument(sentence);
 }
 
-Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench) {
-    SchemeChoices chosen = options.scheme;
+Scheme scheme_of(const Options& options, const ModelFile& file, const Bench& bench) {
+    SchemeChoices choices = options.scheme;
     if (options.structure) {
-        chosen.structure = structure_named(*options.structure);
+        choices.structure = structure_named(*options.structure);
     }
-    const Scheme scheme = bench.scheme(model, chosen);
-    validate(scheme, model, bench.device.period_s);
+    const bool planned = file.plan && !chooses_scheme(options);
+    const Scheme scheme = planned ? *file.plan : bench.scheme(file.model, choices);
+    validate(scheme, file.model, bench.device.period_s);
     return scheme;
 }
 
@@ -82,6 +83,15 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
                readable(bench.device.force_limit));
     }
     return guards;
+}
+
+Job job_of(const Options& options, ModelFile file, RecordUnits units, const Scheme& scheme,
+           const GuardSettings& guards, const LoopSettings& loop) {
+    validate(loop);
+    Job job{std::move(file), std::move(units), scheme, guards, {}};
+    job.settings.loop = loop;
+    job.settings.real_time = options.real_time;
+    return job;
 }
 
 void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
@@ -152,19 +162,14 @@ int run_on_simulated(const Options& given, ModelFile file, RecordUnits units) {
     if (certified) {
         bench.device = file.certificate->device;
     }
-    const bool planned = file.plan && !chooses_rendering(options);
-    const Scheme scheme = planned ? *file.plan : scheme_of(options, file.model, bench);
-    validate(scheme, file.model, period_s);
+    const Scheme scheme = scheme_of(options, file, bench);
     GuardSettings guards = guards_of(options, bench);
     if (certified) {
         keep_to(*file.certificate, guards, options.loop);
     } else if (file.certificate) {
         std::cerr << "uncertified: " << reason << "\n";
     }
-    Job job{std::move(file), std::move(units), scheme, guards, {}};
-    job.settings.loop = options.loop;
-    job.settings.real_time = options.real_time;
-    validate(job.settings.loop);
+    const Job job = job_of(options, std::move(file), std::move(units), scheme, guards, options.loop);
     std::vector<Fault> faults;
     for (const std::string& fault : options.faults) {
         faults.push_back(parse_fault(fault, period_s));
@@ -190,11 +195,14 @@ int run(const Options& options) {
         refuse("--device is '" + options.device +
                "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
+    if (kind != "simulated" && !options.faults.empty()) {
+        refuse("--fault is for the simulated device");
+    }
     ModelFile file = load_model_file(options.model);
     const RecordUnits units = units_of(file);
-    if (file.inputs.size() != 1) {
+    if (file.inputs.size() != 1 && file.model.velocity() == nullptr) {
         refuse(options.model + " has " + std::to_string(file.inputs.size()) +
-               " inputs: a model of the position alone can be rendered");
+               " inputs: a model of the position, or of position and velocity, can be rendered");
     }
     const auto run_on = kind == "usb" ? run_on_usb : kind == "inverse3" ? run_on_inverse3 : run_on_simulated;
     return run_on(options, std::move(file), units);

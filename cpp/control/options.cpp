@@ -248,4 +248,15 @@ std::optional<int> read_options(int count, char** words, Options& options) {
     return std::nullopt;
 }
 
+bool chooses_scheme(const Options& options) {
+    const SchemeChoices& scheme = options.scheme;
+    // The parser writes a flag that was not given, too.
+    return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
+           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius;
+}
+
+bool chooses_rendering(const Options& options) {
+    return chooses_scheme(options) || options.slew_s || options.tolerated;
+}
+
 }  // namespace palpate::control

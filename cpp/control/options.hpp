@@ -48,4 +48,10 @@ struct Options {
 /// printed and the exit code is returned.
 [[nodiscard]] std::optional<int> read_options(int count, char** words, Options& options);
 
+/// Whether the command line asks for a structure or numbers of its own.
+[[nodiscard]] bool chooses_scheme(const Options& options);
+
+/// Whether it asks for anything that the model's plan does not say: then nothing is certified.
+[[nodiscard]] bool chooses_rendering(const Options& options);
+
 }  // namespace palpate::control

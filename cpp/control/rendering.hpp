@@ -27,9 +27,14 @@ struct Job {
     SessionSettings settings;
 };
 
-[[nodiscard]] Scheme scheme_of(const Options& options, const ForceModel& model, const Bench& bench);
+/// The rendering that the options ask for, else the model's plan, else the default one.
+[[nodiscard]] Scheme scheme_of(const Options& options, const ModelFile& file, const Bench& bench);
 /// Throws where the device of the bench cannot make the force that is asked for.
 [[nodiscard]] GuardSettings guards_of(const Options& options, const Bench& bench);
+
+/// Throws where the loop cannot be run as it is set.
+[[nodiscard]] Job job_of(const Options& options, ModelFile file, RecordUnits units, const Scheme& scheme,
+                         const GuardSettings& guards, const LoopSettings& loop);
 
 void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
                   Outlets& outlets);
@@ -58,6 +63,11 @@ int render_on(D& device, const std::string& called, const Options& options, cons
               << describe(job.scheme) << "; " << called << " at " << readable(job.settings.loop.rate_hz)
               << " Hz " << (std::isfinite(seconds) ? "for " + readable(seconds) + " s" : "until Ctrl-C")
               << "\n";
+    if (!job.file.plan && !chooses_scheme(options) && job.scheme.structure != StructureKind::Direct) {
+        std::cerr
+            << "no plan in the model: rendered behind the default coupling, which is felt; 'palpate plan' "
+               "finds the simplest rendering that is not\n";
+    }
 
     handle_signals();
     LiveView view{job.settings.loop, job.units};

@@ -85,9 +85,6 @@ bool has_usb() noexcept {
 }
 
 int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
-    if (!options.faults.empty()) {
-        refuse("--fault is for the simulated device");
-    }
     UsbOptions usb = usb_options(options);
     if (!options.uncertified && file.certificate) {
         // A command that comes later than that is one that nobody certified.

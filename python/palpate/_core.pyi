@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_integral_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -95,9 +95,9 @@ class ForceModel:
     f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis
     f(x, s) = g(x) + s h(x), h with weights of its own on the same wavelets.
     """
-    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False) -> None:
         """
-        alpha, beta (N, d); weight (N,); linear, lower, upper (d,). ValueError names the field that is wrong.
+        alpha, beta (N, d); weight (N,); linear, lower, upper (d,). of_velocity: the second of two inputs is the velocity. ValueError names the field that is wrong.
         """
     @typing.overload
     def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -189,6 +189,11 @@ class ForceModel:
     @property
     def n_wavelets(self) -> int:
         ...
+    @property
+    def of_velocity(self) -> bool:
+        """
+        Whether the second of two inputs is the velocity.
+        """
     @property
     def period(self) -> float | None:
         ...
@@ -394,8 +399,13 @@ class ForceBounds:
     
     With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h / r more while it sticks.
     """
-    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
+    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, drag: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
         ...
+    @property
+    def drag(self) -> float:
+        """
+        B_v = max |f(x, v) - f(x, 0)| / |v|.
+        """
     @property
     def hysteresis(self) -> bool:
         ...
@@ -625,7 +635,8 @@ def fingerprint(model: ForceModel) -> str:
     """
 def force_bounds(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ForceBounds:
     """
-    Proved bounds of a model of one position; play_radius in place of its own where above 0.
+    Proved bounds of a model of one position, or of position and velocity; play_radius in place of its
+    own where above 0.
     """
 def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
@@ -645,7 +656,7 @@ def measure(device: str = 'simulated', *, object: ForceModel | None = None, tran
     
     A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;
     with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: until
-    Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a
+    Ctrl-C) without holding the interpreter; `progress(ticks, position, force, lost)` is called ten times a
     second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows as record.part; with `keep` the summary, returned
     by name, holds the ticks. ValueError where it is refused before anything moves.
     """
@@ -721,10 +732,6 @@ def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], 
 def wavelet_curvature_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[numpy.typing.NDArray[numpy.float64]]:
     """
     Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).
-    """
-def wavelet_integral_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    An antiderivative of psi(alpha_i (x_k - beta_i)) for one input: (n, N).
     """
 def wavelet_jacobian(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], list[numpy.typing.NDArray[numpy.float64]], list[numpy.typing.NDArray[numpy.float64]]]:
     """

@@ -68,8 +68,10 @@ inline double steepest_place(const ForceModel& model) {
     double most = -1e300;
     for (int k = 0; k <= 400; ++k) {
         const double x = k / 400.0;
-        const double slope = model.hysteresis() != nullptr ? model.hysteresis()->sliding(x, 0.0).slope
-                                                           : model.network()->at(x, {}).slope;
+        const double slope = model.velocity() != nullptr     ? model.velocity()->force(x + 1e-4, 0.0) -
+                                                                   model.velocity()->force(x - 1e-4, 0.0)
+                             : model.hysteresis() != nullptr ? model.hysteresis()->sliding(x, 0.0).slope
+                                                             : model.network()->at(x, {}).slope;
         if (slope > most) {
             most = slope;
             place = x;

@@ -215,15 +215,19 @@ TEST(Certificate, TheComparisonSceneIsCertifiedForNoCoupledStructureAsItStands) 
 }
 
 TEST(Certificate, VelocityCountsInFull) {
+    ForceBounds bounds = slopes(-30.0, 20.0);
+    bounds.drag = 0.04;
     const DeviceProfile device = smooth(0.05);
-    EXPECT_TRUE(velocity_inequalities({20.0, 30.0, 0.04, 30.0}, device)[0].holds());
-    EXPECT_FALSE(velocity_inequalities({20.0, 30.0, 0.0401, 30.0}, device)[0].holds());
+    EXPECT_TRUE(velocity_inequalities(bounds, device)[0].holds());
+    bounds.drag = 0.0401;
+    EXPECT_FALSE(velocity_inequalities(bounds, device)[0].holds());
+    bounds.drag = 0.04;
     DeviceProfile stepped = device;
     stepped.encoder_step = 1e-4;
     stepped.coulomb_friction = 30.0 * 0.5e-4 + 0.04 * 1e-4 / 1e-3;
-    EXPECT_TRUE(velocity_inequalities({20.0, 30.0, 0.04, 30.0}, stepped)[1].holds());
+    EXPECT_TRUE(velocity_inequalities(bounds, stepped)[1].holds());
     stepped.coulomb_friction *= 0.999;
-    EXPECT_FALSE(velocity_inequalities({20.0, 30.0, 0.04, 30.0}, stepped)[1].holds());
+    EXPECT_FALSE(velocity_inequalities(bounds, stepped)[1].holds());
 }
 
 TEST(Certificate, HysteresisCountsTheStickAndTheSignOfTheLoss) {
@@ -310,6 +314,48 @@ TEST(ForceBounds, HoldEverySlopeOfEveryPathContinuationIncluded) {
             ASSERT_LE(pair.hysteresis()->loss().at(x).value, both.loss.upper);
         }
     }
+}
+
+TEST(ForceBounds, HoldEverySlopeOfAForceOfVelocityContinuationIncluded) {
+    test::Random random{8};
+    for (int draw = 0; draw < test::cases(20); ++draw) {
+        const NetworkParameters network = test::random_network(random, draw % 8, 2);
+        const double slowest = draw % 3 == 0 ? 0.2 : -1.0;  // data that never rested
+        const ForceModel model =
+            ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, 1.0}, {}, {}, std::nullopt});
+        const ForceBounds bounds = force_bounds(model);
+        const VelocityNetwork& f = *model.velocity();
+        const double rounding = 1e-11;
+        for (int k = 0; k < 2000; ++k) {
+            const double x = test::uniform(random, -1.0, 2.0);
+            const double moved = x + 1e-3 * test::uniform(random, 0.0, 1.0);
+            const double v = test::uniform(random, -3.0, 3.0);
+            const double at_rest = f.force(moved, 0.0) - f.force(x, 0.0);
+            ASSERT_GE(at_rest, bounds.slope.lower * (moved - x) - rounding);
+            ASSERT_LE(at_rest, bounds.slope.upper * (moved - x) + rounding);
+            ASSERT_LE(std::abs(f.force(moved, v) - f.force(x, v)), bounds.sliding * (moved - x) + rounding);
+            ASSERT_LE(std::abs(f.force(x, v) - f.force(x, 0.0)), bounds.drag * std::abs(v) + rounding);
+        }
+    }
+}
+
+// "where no bound is known it says so and refuses"
+TEST(Certificate, OfAForceOfVelocityIsRefusedBehindACoupling) {
+    ForceBounds bounds = slopes(0.0, 1.0);
+    for (const StructureKind kind : {StructureKind::Massless, StructureKind::Implicit,
+                                     StructureKind::EnergyConsistent, StructureKind::Explicit}) {
+        bounds.drag = 0.0;
+        EXPECT_NE(certify(bounds, scheme_of(kind, {100.0, 0.02}, {0.001, 0.5}), smooth(10.0)).verdict,
+                  Verdict::Refused);
+        bounds.drag = 1e-3;
+        const Certificate refused =
+            certify(bounds, scheme_of(kind, {100.0, 0.02}, {0.001, 0.5}), smooth(10.0));
+        EXPECT_EQ(refused.verdict, Verdict::Refused);
+        EXPECT_NE(refused.why.find("no bound is known"), std::string::npos) << refused.why;
+    }
+    EXPECT_TRUE(certify(bounds, scheme_of(StructureKind::Direct), smooth(10.0)).certified());
+    bounds.drag = 10.0;
+    EXPECT_FALSE(certify(bounds, scheme_of(StructureKind::Direct), smooth(10.0)).certified());
 }
 
 TEST(ForceBounds, AModelThatRepeatsOwesFrictionToItsMeanForce) {

@@ -95,7 +95,7 @@ double plain(const NetworkParameters& network, std::span<const double> x, std::s
 TEST(RadialNetwork, ValueAndGradientInOnePassAreEquation4) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{8};
-        for (int k = 0; k < cases(200); ++k) {
+        for (int k = 0; k < cases(80); ++k) {
             const std::size_t d = 1 + static_cast<std::size_t>(k % 4);
             const NetworkParameters parameters = random_network(random, static_cast<std::size_t>(k % 71), d);
             const RadialNetwork network{

@@ -173,6 +173,12 @@ ForceModel hysteresis_model() {
     return {network, {std::vector<double>(16, 0.0), 0.0, 0.1}, test::unit_domain(), 0.01};
 }
 
+ForceModel velocity_model() {
+    test::Random random{7};
+    return ForceModel::of_velocity(test::random_network(random, 16, 2),
+                                   {{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt});
+}
+
 /// The real loop at 10 kHz with its real recorder behind it; `before` runs in the loop's thread before it begins,
 /// `after` in that thread when it is over.
 template <class Sin, class Before, class After>
@@ -233,6 +239,7 @@ Counts counted(Sin sin, StructureKind kind = StructureKind::Massless) {
 
 TEST(RealTimePath, AllocatesLocksAndThrowsNothingInAnyStructure) {
     SKIP_UNDER_SANITIZERS();
+    EXPECT_EQ(run_watched(velocity_model(), StructureKind::Direct, nothing, nothing, nothing).allocations, 0);
     for (const ForceModel& rendered : {model(), hysteresis_model()}) {
         for (int kind = 0; kind < 4; ++kind) {
             const Counts counts =

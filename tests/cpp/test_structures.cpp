@@ -246,6 +246,40 @@ ForceModel spring_model(double stiffness) {
     return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
 }
 
+/// f = 5 x + 0.2 v.
+ForceModel dashpot_model() {
+    return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
+}
+
+TEST(DirectVelocity, TakesTheVelocityFromTheLastTwoPositions) {
+    DirectVelocity structure{*dashpot_model().velocity(), period};
+    structure.reset(0.3);
+    EXPECT_NEAR(structure.step(0.3).force, 1.5, 1e-12) << "the object rests under the device";
+    EXPECT_NEAR(structure.step(0.3005).force, 1.5025 + 0.2 * 0.5, 1e-9);
+    EXPECT_NEAR(structure.step(0.31).force, 1.55 + 0.2, 1e-9) << "9.5 a second: no faster than the data";
+    const Rendered refused = structure.step(std::numeric_limits<double>::quiet_NaN());
+    EXPECT_EQ(refused.status, Status::NonFinite);
+    EXPECT_EQ(refused.force, 0.0);
+    EXPECT_NEAR(structure.step(0.31).force, 1.55, 1e-9) << "what was refused has changed nothing";
+    EXPECT_FALSE(structure.step(0.3095).extrapolated);
+    EXPECT_TRUE(structure.step(0.2).extrapolated);
+}
+
+TEST(Scheme, RendersAForceOfVelocityDirectlyOrNotAtAll) {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    const Trace trace = simulate(dashpot_model(), scheme, DeviceProfile{}, Hand{}, 2000);
+    for (std::size_t k = 1; k < trace.force.size(); ++k) {
+        const double velocity = (trace.position[k] - trace.position[k - 1]) / DeviceProfile{}.period_s;
+        const double drag = 0.2 * std::clamp(velocity, -1.0, 1.0);
+        ASSERT_NEAR(trace.force[k], 5.0 * trace.position[k] + drag, 1e-9) << "tick " << k;
+    }
+    for (const std::string_view name : {"massless", "implicit", "explicit", "energy-consistent"}) {
+        scheme.structure = structure_named(name);
+        EXPECT_THROW(validate(scheme, dashpot_model()), std::invalid_argument) << name;
+    }
+}
+
 TEST(Scheme, SimulatesEveryStructureOfAModel) {
     for (const std::string_view name : structure_names) {
         Scheme scheme;

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from palpate.cli.main import main
+from palpate.cli.speed_over_size import BOUNDS
 
 PNG = b"\x89PNG"
 
@@ -84,11 +85,7 @@ def results(tmp_path: Path) -> Path:
             for method in ("ExpLoop", "Network", "Compiled", "Table", "CubicSpline")
             for row in _sized(f"latency<{method}>")
         ],
-        "bench_bounds": [
-            row
-            for name in ("slope_bound", "slope_bound_cancelling", "gradient_bound_two_inputs")
-            for row in _sized(name, excess=0.004)
-        ],
+        "bench_bounds": [row for name in BOUNDS for row in _sized(name, excess=0.004)],
         "ratios": [{"name": "table / explicit step", "measured": 0.93, "most": 1.0}],
     }
     for name, rows in benchmarks.items():

@@ -2,6 +2,7 @@
 """Bounds hold over the whole domain, between samples too, and cost no more than they must."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,7 +71,7 @@ def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:
     basis = Basis(np.array([[1000.0]]), np.array([[0.50195]]))
     coefficients = np.array([[1e-3, 0.0, 2e-3], [-1e-3, 0.0, -2e-3]])
     (bound,) = domain_bounds(problem, hysteresis=True, slopes=None)
-    dipping = Solution(basis, coefficients, 0.0, 0.0, free.designs, free.residuals)
+    dipping = replace(free, basis=basis, coefficients=coefficients)
     where = violated_positions(problem, dipping, bound)
     assert where == pytest.approx([0.50195], abs=1e-3)
 

@@ -39,9 +39,19 @@ def metadata(record: Path) -> str:
 def test_the_plan_of_the_file_is_what_is_rendered(tmp_path: Path) -> None:
     scheme = Scheme(structure="massless", coupling_stiffness=70.0, coupling_damping=0.0)
     path = Plan(model_by_hand(), scheme).stored().save(tmp_path / "planned.json")
-    answer = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0)
-    assert answer.returncode == 0, answer.stderr
-    assert "massless, K_c = 70, B_c = 0" in answer.stderr
+    # A limit of one's own is no rendering of one's own.
+    for others in ([], ["--uncertified"], ["--slew-s", 0.1]):
+        answer = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0, *others)
+        assert answer.returncode == 0, answer.stderr
+        assert "massless, K_c = 70, B_c = 0" in answer.stderr
+        assert "no plan" not in answer.stderr
+
+
+def test_without_a_plan_the_default_coupling_is_told_unless_it_was_chosen(tmp_path: Path) -> None:
+    path = model_by_hand().save(tmp_path / "unplanned.json")
+    words = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
+    assert "no plan in the model: rendered behind the default coupling" in control(*words).stderr
+    assert "no plan" not in control(*words, "--structure", "massless").stderr
 
 
 def test_a_certified_run_takes_rate_and_device_of_its_certificate_and_says_so(

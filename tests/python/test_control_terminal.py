@@ -97,7 +97,8 @@ def test_a_terminal_shows_one_line_that_is_alive_and_gone_at_the_end() -> None:
             assert WHOLE.fullmatch(line), line
         seconds = [float(line.split()[0]) for line in screen.lines]
         assert seconds == sorted(seconds)
-        assert len(set(seconds)) == len(seconds)
+        ticking = [second for second in seconds if second > 0.0]  # a busy machine starts late
+        assert len(set(ticking)) == len(ticking) >= 3
         assert screen.shown.endswith(AGAIN)
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Growth begins again where that pays, and finer where there is no noise."""
+"""Growth ends with finer wavelets where there is no noise, and only there."""
 
 import numpy as np
 import pytest
 
-from palpate.identification import IdentifyOptions, growth
+from palpate.identification import IdentifyOptions
 from palpate.identification.compression import Compressor
 from palpate.identification.frame import resolved_frame
 from palpate.identification.growth import WITHOUT_NOISE, Grown, grow
@@ -42,16 +42,3 @@ def test_noise_is_not_taken_for_structure(noise: float) -> None:
     found = grown(problem)
     assert problem.resolved_by == OPTIONS.resolved_by
     assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_growing_again_lowers_the_criterion_or_changes_nothing(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    problem = kinked(0.01, seed)
-    again = grown(problem)
-    monkeypatch.setattr(growth, "REGROWTHS", 0)
-    once = grown(kinked(0.01, seed))
-    assert again.criterion <= once.criterion
-    assert len(again.path) == len(once.path)
-    assert again.path[-1].n_wavelets == len(again.solution.basis)

@@ -48,7 +48,8 @@ struct Bench {
             play_radius = std::max(4.0 * device.encoder_step, 0.01 * travel);
         }
         const Scheme standard;
-        return {chosen.structure.value_or(standard.structure),
+        return {chosen.structure.value_or(model.velocity() != nullptr ? StructureKind::Direct
+                                                                      : standard.structure),
                 {chosen.coupling_stiffness.value_or(standard.coupling.stiffness * stiffness),
                  chosen.coupling_damping.value_or(standard.coupling.damping * stiffness)},
                 {chosen.mass.value_or(standard.inertia.mass * stiffness),
@@ -74,9 +75,13 @@ struct Bench {
 
 namespace detail {
 
-/// The force while sliding in a direction, +1 pressing and -1 releasing.
+/// The force while sliding in a direction, +1 pressing and -1 releasing; of velocity, as fast as the data are.
 [[nodiscard]] inline double sliding_force(const ForceModel& model, double position,
                                           double direction) noexcept {
+    if (const VelocityNetwork* force = model.velocity()) {
+        const Domain& box = model.domain();
+        return force->force(position, direction > 0.0 ? box.upper[1] : box.lower[1]);
+    }
     return model.hysteresis() != nullptr ? model.hysteresis()->sliding(position, direction).force
                                          : model.network()->at(position, {}).force;
 }
@@ -141,9 +146,9 @@ namespace detail {
 
 }  // namespace detail
 
-/// The bench for a model of one position; `is_angle`: its positions are in rad.
+/// The bench for a model of one position, or of position and velocity; `is_angle`: its positions are in rad.
 [[nodiscard]] inline Bench bench_for(const ForceModel& model, bool is_angle, double period_s) {
-    require_one_input(model.parameters());
+    require_renderable(model);
     constexpr double knob_travel = 0.5;  // of a scene that suits the default knob [rad]
     Bench bench;
     bench.device.period_s = period_s;

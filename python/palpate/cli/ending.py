@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import click
@@ -44,6 +46,16 @@ class Ending:
         with suppress(OSError):
             if self.help or self.sentence:
                 click.echo(self.help or f"error: {self.sentence}", err=True)
+
+
+@contextmanager
+def terminated_as_interrupted() -> Iterator[None]:
+    """A request to terminate ends what runs here as Ctrl-C does."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def drop_what_cannot_be_written() -> None:

@@ -125,11 +125,10 @@ def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
     from ..planning import force_at
     from ..plotting import draw_measured_and_modelled
 
-    modelled = force_at(plan, rendered.position)
+    modelled = force_at(plan, rendered.position, rendered.sample_period)
+    one_curve = not (plan.model.hysteretic or plan.model.of_velocity)
     with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
-        draw_measured_and_modelled(
-            force, residual, rendered, modelled, one_curve=not plan.model.hysteretic, seen="rendered"
-        )
+        draw_measured_and_modelled(force, residual, rendered, modelled, one_curve=one_curve, seen="rendered")
 
 
 def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[ClosedLoop]) -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from ..devices import DeviceError
 from ..errors import InputError
 from .arguments import PATH, json_option
 from .device_options import device_options
-from .ending import WorkError
+from .ending import WorkError, terminated_as_interrupted
 from .live_line import LiveLine
 from .output import number, print_json, print_numbers, require_writable, talk
 from .verb import Verb
@@ -79,26 +78,25 @@ def record(
     who = "the device moves the handle" if probe else "move the handle over the whole object, slowly"
     talk(f"{device}: recording to {recording} for {number(duration_s)} s; {who}; Ctrl-C ends it")
     line = LiveLine(rate_hz, units)
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        summary = record_object(
-            recording,
-            device=device,
-            object=mounted,
-            transducer=transducer,
-            probe=probe,
-            duration_s=duration_s,
-            rate_hz=rate_hz,
-            wait_s=None if wait_ms is None else 1e-3 * wait_ms,
-            lowest_rate_share=lowest_rate_share,
-            progress=line.show,
-            **sweep,
-        )
+        with terminated_as_interrupted():
+            summary = record_object(
+                recording,
+                device=device,
+                object=mounted,
+                transducer=transducer,
+                probe=probe,
+                duration_s=duration_s,
+                rate_hz=rate_hz,
+                wait_s=None if wait_ms is None else 1e-3 * wait_ms,
+                lowest_rate_share=lowest_rate_share,
+                progress=line.show,
+                **sweep,
+            )
     except DeviceError as error:
         raise InputError(str(error)) from None
     finally:
         line.end()
-        signal.signal(signal.SIGTERM, before)
     for note in summary["notes"]:
         talk(f"  {note}")
     if not summary["orderly"]:

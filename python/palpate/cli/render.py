@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import click
 
 from .._core import LoopSettings, usual_telemetry_hz
 from .arguments import PATH, json_option
-from .ending import WorkError
+from .ending import WorkError, terminated_as_interrupted
 from .output import number, print_json, print_numbers, require_writable, talk
 from .scheme_options import chosen_plan, scheme_options
 from .verb import Verb
@@ -77,9 +76,7 @@ def render(
     bench = bench_for(model)
     plan = chosen_plan(model, bench, scheme)
     talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated: nothing moves")
-    # A request to terminate is as orderly an end as Ctrl-C.
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
+    with terminated_as_interrupted():
         summary = render_live(
             model,
             plan.scheme,
@@ -93,8 +90,6 @@ def render(
             telemetry_hz=telemetry_hz,
             lowest_rate_share=lowest_rate_share,
         )
-    finally:
-        signal.signal(signal.SIGTERM, before)
     for note in summary["notes"]:
         talk(f"  {note}")
     if not summary["orderly"]:

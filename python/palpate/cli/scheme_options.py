@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import click
 
 from .._core import Scheme, structure_names
+from .output import talk
 
 if TYPE_CHECKING:
     from .._core import Bench
@@ -70,10 +71,15 @@ def scheme_options(command: F) -> F:
 
 
 def chosen_plan(model: Model, bench: Bench, scheme: Mapping[str, Any]) -> Plan:
-    """The plan that stands in the model, unless a rendering was asked for; else what was asked for."""
+    """What was asked for; else the plan that stands in the model; else the default, which is told."""
     from ..planning import Plan
 
-    if model.plan is not None and all(value is None or value is False for value in scheme.values()):
-        return Plan.of(model)
-    structure = scheme["structure"] or _DEFAULT.structure
-    return Plan(model, bench.scheme(model, **{**scheme, "structure": structure}))
+    if all(value is None or value is False for value in scheme.values()):
+        if model.plan is not None:
+            return Plan.of(model)
+        if not model.of_velocity:
+            talk(
+                "no plan in the model: rendered behind the default coupling, which is felt; "
+                "'palpate plan' finds the simplest rendering that is not"
+            )
+    return Plan(model, bench.scheme(model, **scheme))

@@ -143,7 +143,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
             rows.append(np.asarray(bound.sign * reading, dtype=np.float64))
             limits.append(np.full(len(x), bound.sign * bound.limit + margin * bound.unit))
         coefficients = _least_squares(problem, free, np.concatenate(rows), np.concatenate(limits))
-        current = problem.solution(free.basis, coefficients, free.designs)
+        current = problem.with_coefficients(free, coefficients)
     return _mixed_with_safe(problem, current, bounds)
 
 
@@ -228,8 +228,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
     non-negative least squares solves (Lawson & Hanson 1974, chapter 23).
     """
     start = free.coefficients.ravel()
-    blocks = [problem.gram(block, design) for block, design in zip(problem.blocks, free.designs, strict=True)]
-    factors, norms = zip(*[factored(gram) for gram in blocks], strict=True)
+    factors, norms = zip(*[factored(gram) for gram in free.grams], strict=True)
     factor, norm = np.tril(block_diag(*factors)), np.concatenate(norms)
     reach = solve_triangular(factor, (rows / norm).T, lower=True)
     missing = limits - rows @ start
@@ -282,10 +281,10 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
     for _ in range(30):
         share = 0.5 * (refused + kept)
         mixed = (1.0 - share) * solution.coefficients + share * safe
-        trial = problem.solution(solution.basis, mixed, solution.designs)
+        trial = problem.with_coefficients(solution, mixed)
         if any(len(violated_positions(problem, trial, bound)) for bound in bounds):
             refused = share
         else:
             kept = share
     mixed = (1.0 - kept) * solution.coefficients + kept * safe
-    return problem.solution(solution.basis, mixed, solution.designs)
+    return problem.with_coefficients(solution, mixed)

@@ -125,7 +125,7 @@ class _Data:
     within: float
     """Sum of squares inside rows that stand for several samples [force^2]"""
 
-    def climbed(self, cells: int) -> tuple[Ladder, Rung]:
+    def climbed(self, cells: int, before: Ladder | None = None) -> tuple[Ladder, Rung]:
         """The highest rung that earned its place, with positions in at most that many cells."""
         ladder = Ladder(
             self.box,
@@ -139,6 +139,7 @@ class _Data:
             reach=float(self.reach[0]),
             max_positions=cells,
             within=self.within,
+            before=before,
         )
         return ladder, ladder.climb()
 
@@ -174,15 +175,15 @@ def _fitted(
         if not best.cells_too_wide():
             break
         cells *= 2
-        ladder, best = data.climbed(cells)
+        ladder, best = data.climbed(cells, ladder)
     if options.loss == "huber":
 
         def fit(weights: Float1D) -> Rung:
-            return replace(data, weight=weights).climbed(cells)[1]
+            return replace(data, weight=weights).climbed(cells, ladder)[1]
 
         weights, note = robust_weights(fit, best, data.box, force, weight)
         data = replace(data, weight=weights)
-        ladder, best = data.climbed(cells)
+        ladder, best = data.climbed(cells, ladder)
         ladder.notes.append(note)
     if not parts or len(names) > 1 or options.inputs != "auto":
         return _identified(best, NO_TERMS, ladder, data)

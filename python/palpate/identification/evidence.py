@@ -97,4 +97,4 @@ class Evidence:
         """A network grown from the wavelets of start, and the problem that it solves."""
         problem = self.problem(rows, strokes)
         library = Library(problem, resolved_frame(problem, options))
-        return problem, grow(problem, library, start, name, options, again=self._single)
+        return problem, grow(problem, library, start, name, options, single=self._single)

@@ -17,7 +17,7 @@ from .fresh import FreshRows
 from .options import IdentifyOptions
 from .quasi_newton import refine_all
 from .refinement import refine
-from .selection import Library, OrthogonalSelection, residual_gains, select_backward
+from .selection import Library, orthogonal_gains, residual_gains, select_backward
 from .separable import TINY, Basis, SeparableProblem, Solution
 from .stopping import CRITERIA, ON_FRESH_ROWS, choice, deviance, enough
 
@@ -28,9 +28,6 @@ PRUNE_HOPE = 6.0
 """A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
 
 
-REGROWTHS = 3
-"""Times that a refined and pruned network is grown again at most."""
-
 WITHOUT_NOISE = 5
 """Positions that a wavelet's core must hold where there is hardly any noise to be taken for structure."""
 
@@ -40,10 +37,19 @@ EVEN = 0.5
 WORTH_FINER = 4.0
 """How many times smaller the error must become by wavelets finer than noise would allow."""
 
-GROWING_TOLERANCE = 1e-3
-"""While the size is open, refinement ends at steps that gain less than this share of the squared error."""
+STRETCHED = 64
+"""Members of the frame that are tried stretched along each input, where there are several."""
 
-FINAL_TOLERANCE = 1e-4
+STARTS = 5
+"""Of these, candidates that are refined before one is taken."""
+
+FIRST_STEPS = 4
+"""Refinement steps that they are judged by."""
+
+GROWING_TOLERANCE = 0.4
+"""While the size is open, refinement ends at steps that lower the deviance by less."""
+
+FINAL_TOLERANCE = 0.04
 """The same for the accepted network."""
 
 
@@ -91,30 +97,25 @@ def grow(
     rung: str,
     options: IdentifyOptions,
     *,
-    again: bool = True,
+    single: bool = True,
 ) -> Grown:
-    """Grow from the wavelets of start; where that pays, again from what is left of them, then finer.
+    """Grow from the wavelets of start; where what is left is no noise, then finer than noise would allow.
 
-    What was added one by one stands where it was best among fewer; once refined and pruned it leaves other
-    gaps. It pays for a single force: of two strokes measured objects gain nothing by it. Not for wavelets
-    that stay on the frame, nor where fresh rows judge.
+    That is for a force that is known to be a single one, not for wavelets that stay on the frame, nor where
+    fresh rows judge.
     """
     found = _grown(problem, library, start, rung, options)
-    once = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
-    if once or not again or problem.n_channels > 1 or len(found.solution.basis) == 0:
+    coarse = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
+    if coarse or not single or problem.n_channels > 1 or len(found.solution.basis) == 0:
         return found
-    for _ in range(REGROWTHS):
-        regrown = _grown(problem, library, found.solution.basis, rung, options)
-        if regrown.criterion >= found.criterion:
-            break
-        found = replace(regrown, path=(*found.path[:-1], regrown.path[-1]))
-    if problem.resolved_by > WITHOUT_NOISE and problem.evenness(found.solution) < EVEN:
-        before, problem.resolved_by = problem.resolved_by, WITHOUT_NOISE
-        fine = Library(problem, resolved_frame(problem, options))
-        finer = _grown(problem, fine, found.solution.basis, rung, options)
-        if problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
-            return replace(finer, path=(*found.path[:-1], finer.path[-1]))
-        problem.resolved_by = before
+    if problem.resolved_by <= WITHOUT_NOISE or problem.evenness(found.solution) >= EVEN:
+        return found
+    before, problem.resolved_by = problem.resolved_by, WITHOUT_NOISE
+    fine = Library(problem, resolved_frame(problem, options))
+    finer = _grown(problem, fine, found.solution.basis, rung, options)
+    if problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
+        return replace(finer, path=(*found.path[:-1], finer.path[-1]))
+    problem.resolved_by = before
     problem.set_prior(found.solution.rss)
     return found
 
@@ -138,7 +139,7 @@ def _grown(
         if enough(options.criterion, path[-1].criterion) or options.selection == "backward":
             stop_reason = options.criterion
             break
-        added = _with_best_candidate(problem, library, current, options)
+        added = _with_candidate(problem, library, current, options)
         if added is None:
             stop_reason = "data"
             break
@@ -147,7 +148,7 @@ def _grown(
         grown.append(current)
         since = 0 if path[-1].criterion < best else since + 1
         best = min(best, path[-1].criterion)
-        if since >= options.patience:
+        if since >= options.patience * problem.dimension:
             stop_reason = options.criterion
             break
     if problem.fresh is not None and options.criterion in ON_FRESH_ROWS:
@@ -196,20 +197,28 @@ def _price(problem: SeparableProblem, solution: Solution, options: IdentifyOptio
     )
 
 
-def _with_best_candidate(
+def _with_candidate(
     problem: SeparableProblem, library: Library, current: Solution, options: IdentifyOptions
 ) -> Solution | None:
-    """The network with the frame member that helps most, or None where data allow no further wavelet."""
+    """The network with the frame member that helps most, or None where data allow no further wavelet.
+
+    The frame has one dilation for all inputs. Where there are several, members are tried stretched along each
+    of them as well, and a few that differ are refined a little before one is taken: what fits best unrefined
+    often ends in a worse minimum.
+    """
     if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.samples:
         return None
-    if options.selection == "residual":
-        gains = residual_gains(library, current)
-    else:
-        gains = OrthogonalSelection(library, current).gains()
-    index = int(np.argmax(gains))
-    if gains[index] <= 0.0:
-        return None
-    return problem.solve(current.basis.joined(library.members([index])))
+    measured = residual_gains if options.selection == "residual" else orthogonal_gains
+    gains = measured(library, current)
+    starts = 1
+    if problem.dimension > 1 and options.refine:
+        library = library.stretched(problem, _falling(gains)[:STRETCHED])
+        gains, starts = measured(library, current), STARTS
+    chosen = library.unlike(_falling(gains), starts)
+    tried = [problem.solve(current.basis.joined(library.members([index]))) for index in chosen]
+    if len(tried) > 1:
+        tried = [_refined(problem, start, FIRST_STEPS, options, GROWING_TOLERANCE) for start in tried]
+    return min(tried, key=lambda solution: solution.objective, default=None)
 
 
 def _improved(
@@ -221,10 +230,22 @@ def _improved(
 ) -> Solution:
     """Refine, then let the prior on the weights follow the noise level that is left."""
     if options.refine:
-        descend = refine_all if options.refinement == "quasi-newton" else refine
-        solution = descend(problem, solution, steps=steps, tolerance=tolerance)
+        solution = _refined(problem, solution, steps, options, tolerance)
     problem.set_prior(solution.rss)
     return problem.solve(solution.basis)
+
+
+def _falling(gains: Float1D) -> list[int]:
+    """The numbers of the candidates that gain anything, the best first."""
+    order = np.argsort(-gains, kind="stable")
+    return [int(index) for index in order[: np.count_nonzero(gains > 0.0)]]
+
+
+def _refined(
+    problem: SeparableProblem, start: Solution, steps: int, options: IdentifyOptions, tolerance: float
+) -> Solution:
+    descend = refine_all if options.refinement == "quasi-newton" else refine
+    return descend(problem, start, steps=steps, tolerance=tolerance)
 
 
 def _point(problem: SeparableProblem, solution: Solution, rung: str, options: IdentifyOptions) -> PathPoint:

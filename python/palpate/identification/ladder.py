@@ -56,6 +56,8 @@ class Ladder:
     max_positions : int
     within : float
         Sum of squares of the force inside rows that stand for several samples.
+    before : Ladder, optional
+        A climb over nearly the same rows: what was grown on it is where growth begins.
     """
 
     def __init__(
@@ -72,9 +74,11 @@ class Ladder:
         reach: float,
         max_positions: int,
         within: float = 0.0,
+        before: "Ladder | None" = None,
     ) -> None:
         self.notes: list[str] = []
-        self.path: list[PathPoint] = []
+        self.path: list[PathPoint] = list(before.path) if before else []
+        self._grown_before: dict[str, Basis] = dict(before._grown_before) if before else {}
         self._options, self._name, self._slope_unit = options, network, reach
         self._fixed_force = None
         if options.fixed_force is not None:
@@ -108,7 +112,7 @@ class Ladder:
         rows = self._evidence.rows()
         best = self._better(self._constant(rows), self._straight(rows))
         if self._options.max_wavelets > 0:
-            best = self._better(best, self._network(rows, self._name, Basis.empty(rows.positions.shape[1])))
+            best = self._better(best, self._network(rows))
         if not (self._options.inputs == "auto" or "hysteresis" in self._options.inputs):
             return best
         if self._side is not None:
@@ -124,7 +128,7 @@ class Ladder:
         mean = float(np.average(rows.force, weights=rows.weight))
         coefficients = np.zeros_like(straight.solution.coefficients)
         coefficients[0, 0] = mean
-        level = straight.problem.solution(straight.solution.basis, coefficients, straight.solution.designs)
+        level = straight.problem.with_coefficients(straight.solution, coefficients)
         return self._recorded(replace(straight, name="constant", solution=level, n_parameters=1))
 
     def _straight(self, rows: Compressed) -> Rung:
@@ -135,11 +139,15 @@ class Ladder:
         solution = problem.solve(Basis.empty(problem.dimension))
         return Rung("linear", rows, problem, solution, problem.n_parameters(0), self._options.criterion)
 
-    def _network(self, rows: Compressed, name: str, start: Basis) -> Rung:
-        """A network grown from the wavelets of start, with its constraints."""
-        problem, grown = self._grown(rows, None, name, start)
+    def _network(self, rows: Compressed) -> Rung:
+        """A network with its constraints."""
+        start = self._grown_before.get(self._name, Basis.empty(rows.positions.shape[1]))
+        problem, grown = self._grown(rows, None, self._name, start)
+        self._grown_before[self._name] = grown.solution.basis
         n_parameters = problem.n_parameters(len(grown.solution.basis))
-        return self._constrained(Rung(name, rows, problem, grown.solution, n_parameters, grown.stop_reason))
+        return self._constrained(
+            Rung(self._name, rows, problem, grown.solution, n_parameters, grown.stop_reason)
+        )
 
     def _grown(
         self, rows: Compressed, strokes: HysteresisInput | None, name: str, start: Basis
@@ -160,7 +168,9 @@ class Ladder:
         first = problem.solve(below.solution.basis)
         free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
         if named or free.criterion(options) < below.criterion(options):
-            problem, grown = self._grown(rows, strokes, "hysteresis", first.basis)
+            start = self._grown_before.get("hysteresis", first.basis)
+            problem, grown = self._grown(rows, strokes, "hysteresis", start)
+            self._grown_before["hysteresis"] = grown.solution.basis
             free = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
         if not named and self._better(below, free) is below:
             return below
@@ -259,7 +269,7 @@ class Ladder:
 
 def _judged_on(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
     """Criterion of a solution on the rows of another problem of the same form."""
-    return judge(problem, problem.solution_of(solution), options)
+    return judge(problem, problem.with_coefficients(solution, solution.coefficients), options)
 
 
 def _hysteresis_rung(

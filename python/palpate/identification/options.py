@@ -47,7 +47,7 @@ class IdentifyOptions:
     rung_evidence: float = 10.0
     """Fall of the criterion that a more complex rung must show; 10 is called very strong evidence [-]"""
     patience: int = 3
-    """Wavelets without improvement after which growth stops [-]"""
+    """Wavelets without improvement, for each input, after which growth stops [-]"""
     refine: bool = True
     """False: dilations and translations stay on the frame"""
     refinement: str = "projection"

@@ -22,8 +22,8 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
     """Lower the objective from start; never worse than it.
 
     The unknowns are the coefficients times the norms of their columns over that of the target, log(alpha) and
-    alpha_start beta, so that all are of one size. It ends where a step gains less than tolerance of the
-    objective, a tenth of it for each of its shorter steps.
+    alpha_start beta, so that all are of one size. It ends where a step lowers the deviance by less than
+    tolerance, a tenth of it for each of its shorter steps.
     """
     basis, d = start.basis, problem.dimension
     if len(basis) == 0:
@@ -66,7 +66,7 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
         jac=True,
         method="L-BFGS-B",
         bounds=Bounds(np.concatenate(low), np.concatenate(high)),
-        options={"maxiter": STEPS_FOR_ONE * steps, "ftol": tolerance / STEPS_FOR_ONE},
+        options={"maxiter": STEPS_FOR_ONE * steps, "ftol": tolerance / problem.samples / STEPS_FOR_ONE},
     )
     _, moved = apart(found.x)
     resolved = np.maximum(problem.finest(moved.beta), COARSEST)

@@ -29,23 +29,24 @@ IDLE_STEPS = 2
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Lower the objective from start by at most `steps` accepted or tried steps.
 
-    It ends early after IDLE_STEPS steps in a row that gained less than tolerance of the whole squared error.
+    It ends early after IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
     """
     best = start
     if len(start.basis) == 0:
         return best
-    damping, idle = 1e-2, 0
-    matrix, gradient = problem.normal_equations(best.basis)
+    damping, idle, finest = 1e-2, 0, problem.finest(best.basis.beta)
+    matrix, gradient = problem.normal_equations(best)
     for _ in range(steps):
-        step = _bounded_step(problem, best.basis, matrix, gradient, damping)
-        trial = problem.solve(_moved(problem, best.basis, step))
+        step = _bounded_step(best.basis, finest, matrix, gradient, damping)
+        basis, finest_there = _moved(problem, best.basis, step)
+        trial = problem.solve(basis)
         if trial.objective < best.objective:
-            gain = (best.objective - trial.objective) / problem.total(trial.rss)
-            best, damping = trial, max(damping / 5.0, 1e-9)
+            gain = problem.samples * (best.objective - trial.objective) / problem.total(trial.rss)
+            best, finest, damping = trial, finest_there, max(damping / 5.0, 1e-9)
             idle = idle + 1 if gain < tolerance else 0
             if idle >= IDLE_STEPS:
                 break
-            matrix, gradient = problem.normal_equations(best.basis)
+            matrix, gradient = problem.normal_equations(best)
         else:
             damping *= 6.0
             if damping > 1e8:
@@ -54,12 +55,12 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
 
 
 def _bounded_step(
-    problem: SeparableProblem, basis: Basis, matrix: Float2D, gradient: Float1D, damping: float
+    basis: Basis, finest: Float2D, matrix: Float2D, gradient: Float1D, damping: float
 ) -> Float1D:
     """Levenberg-Marquardt step over the unknowns that no bound holds against their push."""
-    d = problem.dimension
+    d = basis.alpha.shape[1]
     push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
-    held_alpha = (push_alpha > 0) & (basis.alpha >= problem.finest(basis.beta) * (1 - 1e-9))
+    held_alpha = (push_alpha > 0) & (basis.alpha >= finest * (1 - 1e-9))
     held_alpha |= (push_alpha < 0) & (basis.alpha <= COARSEST * (1 + 1e-9))
     held_beta = (push_beta > 0) & (basis.beta >= 1 + REACH) | (push_beta < 0) & (basis.beta <= -REACH)
     free = np.flatnonzero(~np.stack([held_alpha.T, held_beta.T]).ravel())
@@ -79,9 +80,10 @@ def _bounded_step(
     return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
 
 
-def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> Basis:
-    """The basis after a step, brought back to its bounds."""
+def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basis, Float2D]:
+    """The basis after a step, brought back to its bounds, and the largest dilations there (N, 1)."""
     grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
     beta = np.clip(basis.beta + shift / basis.alpha, -REACH, 1 + REACH)
-    ceiling = np.maximum(problem.finest(beta), COARSEST)
-    return Basis(np.clip(basis.alpha * np.exp(grow), COARSEST, ceiling), beta)
+    finest = problem.finest(beta)
+    alpha = np.clip(basis.alpha * np.exp(grow), COARSEST, np.maximum(finest, COARSEST))
+    return Basis(alpha, beta), finest

@@ -129,30 +129,36 @@ class _Rows:
 def _fitted(data: _Rows, weight: Float1D, options: IdentifyOptions) -> tuple[Rung, list[PathPoint]]:
     """Climb with cells that are fine enough, again with outliers weighed down where that is asked for."""
     cells = options.max_positions * 2 ** (data.box.shape[1] - 1)
-    best, path = _climbed(data, weight, cells, options)
+    best, path = _climbed(data, weight, cells, options, Basis.empty(data.box.shape[1]))
     for _ in range(MOST_HALVINGS):
         if not best.cells_too_wide():
             break
         cells *= 2
-        best, path = _climbed(data, weight, cells, options)
+        best, further = _climbed(data, weight, cells, options, best.solution.basis)
+        path += further
     if options.loss == "huber":
+        start = best.solution.basis
         weight, _ = robust_weights(
-            lambda weights: _climbed(data, weights, cells, options)[0], best, data.box, data.y, weight
+            lambda weights: _climbed(data, weights, cells, options, start)[0], best, data.box, data.y, weight
         )
-        best, path = _climbed(data, weight, cells, options)
+        best, further = _climbed(data, weight, cells, options, start)
+        path += further
     return best, path
 
 
 def _climbed(
-    data: _Rows, weight: Float1D, cells: int, options: IdentifyOptions
+    data: _Rows, weight: Float1D, cells: int, options: IdentifyOptions, start: Basis
 ) -> tuple[Rung, list[PathPoint]]:
-    """Constant, linear, network: as far as each lowers the criterion by `rung_evidence` or more."""
+    """Constant, linear, network: as far as each lowers the criterion by `rung_evidence` or more.
+
+    The network grows from the wavelets of start.
+    """
     rows = data.compressed(weight, cells)
     problem = data.problem(rows, options)
     straight = problem.solve(Basis.empty(problem.dimension))
     mean = np.zeros_like(straight.coefficients)
     mean[0, 0] = np.average(rows.force, weights=rows.weight)
-    level = problem.solution(straight.basis, mean, straight.designs)
+    level = problem.with_coefficients(straight, mean)
 
     def rung(of: SeparableProblem, name: str, solution: Solution, n_parameters: int, reason: str) -> Rung:
         return Rung(name, rows, of, solution, n_parameters, reason)
@@ -169,7 +175,7 @@ def _climbed(
     # growth sets a prior of its own in its problem
     apart = data.problem(rows, options)
     library = Library(apart, resolved_frame(apart, options))
-    grown = grow(apart, library, Basis.empty(apart.dimension), "network", options)
+    grown = grow(apart, library, start, "network", options)
     path.extend(grown.path)
     n_parameters = apart.n_parameters(len(grown.solution.basis))
     return _better(

@@ -15,11 +15,19 @@ import numpy as np
 
 from .. import _core
 from .._typing import Float1D, Float2D
-from .separable import Basis, SeparableProblem, Solution
+from .refinement import COARSEST
+from .separable import Basis, SeparableProblem, Solution, solve_gram
 from .stopping import deviance
 
 DEPENDENT = 1e-7
 """Share of a candidate's squared norm that must stand outside the design for it to be a new direction."""
+
+
+UNLIKE = 1.0
+"""Distance in units of a wavelet, or difference of log(alpha), from which two may end in different minima."""
+
+STRETCHES = (0.25, 0.5, 2.0, 4.0)
+"""What the dilation of a candidate along one input is multiplied by."""
 
 
 class Library:
@@ -34,7 +42,7 @@ class Library:
             wavelets = _core.wavelet_columns(block.positions, self.basis.alpha, self.basis.beta)
             columns = [channel[:, None] * wavelets for channel in block.channels.T]
             self.columns.append(columns)
-            self.grams.append(np.array([[np.einsum("mn,mn->n", a, b) for b in columns] for a in columns]))
+            self.grams.append(np.array([[np.einsum("nm,nm->n", a.T, b.T) for b in columns] for a in columns]))
 
     def __len__(self) -> int:
         return len(self.basis)
@@ -43,6 +51,30 @@ class Library:
         """The candidates of these numbers."""
         chosen = list(order)
         return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
+
+    def stretched(self, problem: SeparableProblem, order: Sequence[int]) -> "Library":
+        """The candidates of these numbers, and each with its dilation along one input changed."""
+        chosen, d = self.members(order), problem.dimension
+        combinations = [(factor, k) for k in range(d) for factor in STRETCHES]
+        factors = np.ones((1 + len(combinations), 1, d))
+        for place, (factor, k) in enumerate(combinations, start=1):
+            factors[place, :, k] = factor
+        alpha = np.maximum(chosen.alpha * factors, COARSEST).reshape(-1, d)
+        return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
+
+    def unlike(self, order: Sequence[int], count: int) -> list[int]:
+        """The first of these numbers, so many at most, that stand apart or differ in a dilation."""
+        chosen: list[int] = []
+        for index in order:
+            alpha, beta = self.basis.alpha[index], self.basis.beta[index]
+            others = self.members(chosen)
+            shift = np.abs(beta - others.beta) * np.sqrt(alpha * others.alpha)
+            stretch = np.abs(np.log(alpha / others.alpha))
+            if np.maximum(shift, stretch).max(axis=1).min(initial=np.inf) > UNLIKE:
+                chosen.append(int(index))
+                if len(chosen) == count:
+                    break
+        return chosen
 
 
 class OrthogonalSelection:
@@ -67,14 +99,7 @@ class OrthogonalSelection:
         """(candidates,) fall of the residual sum of squares if that candidate were taken next."""
         total = np.zeros(len(self._library))
         for gram, left, product in zip(self._library.grams, self._grams, self._products, strict=True):
-            left, product = left.transpose(2, 0, 1), product.T
-            own = np.maximum(np.einsum("nkk->nk", gram.transpose(2, 0, 1)), np.finfo(float).tiny)
-            root = np.sqrt(own)
-            scaled = left / (root[:, :, None] * root[:, None, :])
-            value, vector = np.linalg.eigh(scaled)
-            along = np.einsum("nkj,nk->nj", vector, product / root)
-            new = value > DEPENDENT
-            total += np.sum(np.where(new, along**2 / np.where(new, value, 1.0), 0.0), axis=1)
+            total += _falls(gram, left, product)
         return total
 
     def take(self, index: int) -> float:
@@ -100,6 +125,39 @@ class OrthogonalSelection:
         return rss
 
 
+def _falls(gram: Float2D, left: Float2D, product: Float2D) -> Float1D:
+    """z' S^-1 z of every candidate (n,): gram, S (channels, channels, n), z (channels, n).
+
+    Directions in which a candidate does not stand outside the design do not count.
+    """
+    if len(product) == 1:
+        new = left[0, 0] > DEPENDENT * gram[0, 0]
+        return np.asarray(np.where(new, product[0] ** 2 / np.where(new, left[0, 0], 1.0), 0.0))
+    own = np.maximum(np.einsum("kkn->nk", gram), np.finfo(float).tiny)
+    root = np.sqrt(own)
+    value, vector = np.linalg.eigh(left.transpose(2, 0, 1) / (root[:, :, None] * root[:, None, :]))
+    along = np.einsum("nkj,nk->nj", vector, product.T / root)
+    new = value > DEPENDENT
+    return np.asarray(np.sum(np.where(new, along**2 / np.where(new, value, 1.0), 0.0), axis=1))
+
+
+def orthogonal_gains(library: Library, current: Solution) -> Float1D:
+    """(candidates,) fall of the residual sum of squares if a candidate were added to a solved basis.
+
+    What a selection's gains are at its start, from the solution's own Gram matrix.
+    """
+    total = np.zeros(len(library))
+    for columns, gram, design, own, residual in zip(
+        library.columns, library.grams, current.designs, current.grams, current.residuals, strict=True
+    ):
+        shadows = [design.T @ column for column in columns]
+        solved = [solve_gram(own, shadow) for shadow in shadows]
+        spanned = np.array([[np.einsum("pn,pn->n", a, b) for b in solved] for a in shadows])
+        along = np.array([residual @ column for column in columns])
+        total += _falls(gram, gram - spanned, along)
+    return total
+
+
 def residual_gains(library: Library, current: Solution) -> Float1D:
     """(candidates,) fall of the residual sum of squares if a candidate were fitted to the residual alone.
 
@@ -107,9 +165,9 @@ def residual_gains(library: Library, current: Solution) -> Float1D:
     """
     total = np.zeros(len(library))
     for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
-        product = np.array([residual @ column for column in columns])
+        along = np.array([residual @ column for column in columns])
         inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=DEPENDENT, hermitian=True)
-        total += np.einsum("kn,nkj,jn->n", product, inverse, product)
+        total += np.einsum("kn,nkj,jn->n", along, inverse, along)
     return total
 
 

@@ -79,8 +79,13 @@ class Block:
 
     def design(self, wavelets: Float2D) -> Float2D:
         """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
-        plain = np.concatenate([np.ones((len(wavelets), 1)), self.positions, wavelets], axis=1)
-        return np.concatenate([channel[:, None] * plain for channel in self.channels.T], axis=1)
+        first, n = 1 + self.positions.shape[1], wavelets.shape[1]
+        design = np.empty((self.n_channels, first + n, len(wavelets)))
+        for columns, channel in zip(design, self.channels.T, strict=True):
+            columns[0] = channel
+            np.multiply(self.positions.T, channel, out=columns[1:first])
+            np.multiply(wavelets.T, channel, out=columns[first:])
+        return design.reshape(-1, len(wavelets)).T
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,8 @@ class Solution:
     objective: float
     """rss plus the price of the weights' prior: what refinement lowers"""
     designs: tuple[Float2D, ...]
+    grams: tuple[Float2D, ...]
+    """design' design of every block, plus the prior on the weights"""
     residuals: tuple[Float1D, ...]
 
 
@@ -179,46 +186,58 @@ class SeparableProblem:
 
     def solve(self, basis: Basis) -> Solution:
         """Weights, slopes and biases of all channels for this basis."""
-        tables, designs = [], []
+        tables, designs, grams = [], [], []
         for block in self.blocks:
             design = block.design(_core.wavelet_columns(block.positions, basis.alpha, basis.beta))
-            found = solve_gram(self.gram(block, design), design.T @ block.target)
+            gram = self._gram(block, design)
+            found = solve_gram(gram, design.T @ block.target)
             tables.append(found.reshape(block.n_channels, -1))
             designs.append(design)
-        return self.solution(basis, np.concatenate(tables), tuple(designs))
+            grams.append(gram)
+        return self._solution(basis, np.concatenate(tables), tuple(designs), tuple(grams))
 
-    def solution_of(self, other: Solution) -> Solution:
-        """The solution of a problem with the same positions, with the errors that it leaves in this one."""
-        return self.solution(other.basis, other.coefficients, other.designs)
+    def with_coefficients(self, solution: Solution, coefficients: Float2D) -> Solution:
+        """Other coefficients (channels, 1 + d + N) on the wavelets of a solution, with the errors they leave.
 
-    def solution(self, basis: Basis, coefficients: Float2D, designs: tuple[Float2D, ...]) -> Solution:
-        """These coefficients with the errors they leave."""
-        tables = np.split(coefficients, np.cumsum([block.n_channels for block in self.blocks])[:-1])
+        The solution may be that of another problem with the same positions.
+        """
+        return self._solution(solution.basis, coefficients, solution.designs, solution.grams)
+
+    def _solution(
+        self,
+        basis: Basis,
+        coefficients: Float2D,
+        designs: tuple[Float2D, ...],
+        grams: tuple[Float2D, ...],
+    ) -> Solution:
         residuals = tuple(
             block.target - design @ table.ravel()
-            for block, design, table in zip(self.blocks, designs, tables, strict=True)
+            for block, design, table in zip(self.blocks, designs, self._tables(coefficients), strict=True)
         )
         rss = float(sum(residual @ residual for residual in residuals))
         price = self.prior * float((coefficients[:, 1 + self.dimension :] ** 2).sum())
-        return Solution(basis, coefficients, rss, rss + price, designs, residuals)
+        return Solution(basis, coefficients, rss, rss + price, designs, grams, residuals)
 
-    def normal_equations(self, basis: Basis) -> tuple[Float2D, Float1D]:
-        """Gauss-Newton matrix and descent direction of variable projection at this basis.
+    def _tables(self, coefficients: Float2D) -> list[Float2D]:
+        """The coefficients of each block."""
+        return np.split(coefficients, np.cumsum([block.n_channels for block in self.blocks])[:-1])
+
+    def normal_equations(self, at: Solution) -> tuple[Float2D, Float1D]:
+        """Gauss-Newton matrix and descent direction of variable projection at a solved basis.
 
         With the linear unknowns eliminated the residual is P y, P the projector off the design's columns,
         and its Jacobian in Kaufman's form is -P (d design/d theta) coefficients (Golub & Pereyra 1973,
         Kaufman 1975). Steps are dimensionless, d log(alpha) and alpha d(beta), ordered (quantity, input,
         wavelet).
         """
+        basis = at.basis
         size = 2 * self.dimension * len(basis)
         matrix, gradient = np.zeros((size, size)), np.zeros(size)
-        for block in self.blocks:
-            value, by_alpha, by_beta = _core.wavelet_jacobian(block.positions, basis.alpha, basis.beta)
-            design = block.design(value)
-            gram = self.gram(block, design)
-            found = solve_gram(gram, design.T @ block.target)
-            weights = found.reshape(block.n_channels, -1)[:, 1 + self.dimension :]
-            slope = block.channels @ weights
+        for block, design, gram, table, residual in zip(
+            self.blocks, at.designs, at.grams, self._tables(at.coefficients), at.residuals, strict=True
+        ):
+            _, by_alpha, by_beta = _core.wavelet_jacobian(block.positions, basis.alpha, basis.beta)
+            slope = block.channels @ table[:, 1 + self.dimension :]
             jacobian = np.concatenate(
                 [slope * change * scale for change, scale in zip(by_alpha, basis.alpha.T, strict=True)]
                 + [slope * change / scale for change, scale in zip(by_beta, basis.alpha.T, strict=True)],
@@ -226,27 +245,27 @@ class SeparableProblem:
             )
             cross = design.T @ jacobian
             matrix += jacobian.T @ jacobian - cross.T @ solve_gram(gram, cross)
-            gradient += jacobian.T @ (block.target - design @ found)
+            gradient += jacobian.T @ residual
         return matrix, gradient
 
     def removal_costs(self, solution: Solution) -> Float1D:
         """Growth of the objective (N,) if one wavelet left and the linear unknowns were solved again."""
-        n, first, start = len(solution.basis), 1 + self.dimension, 0
+        n, first = len(solution.basis), 1 + self.dimension
         cost = np.zeros(n)
-        for block, design in zip(self.blocks, solution.designs, strict=True):
-            inverse = solve_gram(self.gram(block, design), np.eye(design.shape[1]))
-            weights = solution.coefficients[start : start + block.n_channels, first:].T
-            start += block.n_channels
+        for block, gram, table in zip(
+            self.blocks, solution.grams, self._tables(solution.coefficients), strict=True
+        ):
+            inverse = solve_gram(gram, np.eye(len(gram)))
+            weights = table[:, first:].T
             columns = np.arange(block.n_channels) * (first + n) + first + np.arange(n)[:, None]
             minors = inverse[columns[:, :, None], columns[:, None, :]]
             cost += np.einsum("nk,nk->n", weights, np.linalg.solve(minors, weights[:, :, None])[:, :, 0])
         return cost
 
-    def gram(self, block: Block, design: Float2D) -> Float2D:
-        """design' design, plus the prior on the weights."""
+    def _gram(self, block: Block, design: Float2D) -> Float2D:
         gram = design.T @ design
-        wavelet = np.flatnonzero(np.arange(len(gram)) % (len(gram) // block.n_channels) > self.dimension)
-        gram[wavelet, wavelet] += self.prior
+        of_weights = np.einsum("ii->i", gram).reshape(block.n_channels, -1)[:, 1 + self.dimension :]
+        of_weights += self.prior
         return np.asarray(gram)
 
 
@@ -291,11 +310,11 @@ def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
     """
     norm = np.sqrt(np.diag(gram))
     norm = np.where(norm > 0.0, norm, 1.0)
-    scaled = gram / np.outer(norm, norm)
-    on_diagonal = np.diag_indices_from(scaled)
-    unit, ridge = scaled[on_diagonal].copy(), RIDGE
+    scaled = gram / (norm[:, None] * norm)
+    diagonal = np.einsum("ii->i", scaled)
+    unit, ridge = diagonal.copy(), RIDGE
     while True:
-        scaled[on_diagonal] = unit + ridge
+        diagonal[:] = unit + ridge
         factor, failed = dpotrf(scaled, lower=1)
         if not failed:
             return factor, norm

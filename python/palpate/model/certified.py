@@ -31,6 +31,7 @@ _BOUNDS = (
     "loss_max",
     "loss_per_play",
     "mean_force",
+    "drag",
 )
 _INEQUALITY = ("name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
 

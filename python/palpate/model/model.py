@@ -122,6 +122,7 @@ class Model(ForceModel):
             above=above,
             period=period,
             play_radius=play_radius,
+            of_velocity=kind == "position_velocity" and len(inputs) == 2,
         )
         self.kind = kind
         self.inputs = tuple(inputs)
@@ -237,7 +238,7 @@ class Model(ForceModel):
             damping=file.damping,
             slope_bounds=None if bounds is None else (bounds.min, bounds.max),
             plan=None if file.plan is None else file.plan.model_dump(),
-            certificate=None if file.certificate is None else file.certificate.model_dump(),
+            certificate=None if file.certificate is None else file.certificate.model_dump(exclude_unset=True),
             notes=file.notes,
             created_by=file.created_by,
         )

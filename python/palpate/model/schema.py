@@ -178,6 +178,8 @@ class BoundsRecord(_Part):
     loss_max: Number
     loss_per_play: Number
     mean_force: Number
+    drag: NotNegative = 0.0
+    """Of the velocity; files from before forces of velocity were rendered leave it out"""
 
 
 class InequalityRecord(_Part):

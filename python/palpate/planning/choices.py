@@ -40,12 +40,21 @@ def friction_slope(device: DeviceProfile, mean_force: float = 0.0) -> float:
     return 2.0 * (device.coulomb_friction - 0.5 * device.force_step - mean_force) / device.encoder_step
 
 
-def renderable_slopes(device: DeviceProfile, mean_force: float = 0.0) -> tuple[float, float]:
-    """(lowest, highest) slope that direct rendering is certified for: b >= T M/2 + n_d T L and friction."""
+def renderable_slopes(device: DeviceProfile, stick: float = 0.0) -> tuple[float, float]:
+    """(lowest, highest) slope that direct rendering is certified for: b >= T M/2 + n_d T L and friction.
+
+    With hysteresis those of sliding: a stick adds `stick` = h/r, to M and L once and to friction twice.
+    """
     held = device.viscous_damping / device.longest_period_s
-    friction = friction_slope(device, mean_force)
-    highest = min(held / (0.5 + device.delay_samples), friction)
+    friction = friction_slope(device) - 2.0 * stick
+    highest = min(held / (0.5 + device.delay_samples) - stick, friction)
     return (-highest if device.delay_samples else -friction), highest
+
+
+def steepest_stick(device: DeviceProfile) -> float:
+    """The slope h/r that leaves half of what the device holds to sliding; what is more of h is left out."""
+    held = device.viscous_damping / device.longest_period_s / (0.5 + device.delay_samples)
+    return min(0.5 * held, 0.25 * friction_slope(device))
 
 
 def coupling_for(device: DeviceProfile, damping: float) -> float:

@@ -151,7 +151,7 @@ def plan(
     Parameters
     ----------
     model : Model
-        A model of one position; a plan that stands in it is ignored.
+        A model of one position, or of position and velocity; a plan that stands in it is ignored.
     device : DeviceProfile
         In the model's unit.
     coupling : bool
@@ -199,6 +199,11 @@ def plan(
         play_radius=play_radius,
     )
     bare = Model.from_dict(content)
+    if bare.of_velocity and (wishes.coupling or wishes.dynamic):
+        raise InputError(
+            "a force of position and velocity is rendered directly: behind a coupling, or with a mass or "
+            "damping beside it, no bound is known"
+        )
     refused: list[str] = []
     last: Plan | None = None
     for name, rung in RUNGS.items():

@@ -17,6 +17,7 @@ from .choices import (
     explicit_scheme,
     play_radius_for,
     renderable_slopes,
+    steepest_stick,
     usual_play_radius,
 )
 from .plan import Plan
@@ -79,10 +80,9 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
     if high <= 0.0:
         return _no_slope(device)
     rendered = _balanced(model)
-    if model.hysteretic:
-        limited = _hysteresis_limited(rendered, device, wishes, low, high)
-    else:
-        limited = _within(rendered, low, high)
+    limited = (
+        _hysteresis_limited(rendered, device, wishes) if model.hysteretic else _within(rendered, low, high)
+    )
     if limited is None:
         return f"no network was found whose slopes lie between {low:.4g} and {high:.4g}"
     plan = Plan(limited, _direct_scheme(limited, device, wishes), loss=loss_between(model, limited))
@@ -147,13 +147,27 @@ def explicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     return Plan(model, scheme).certified_for(device)
 
 
-RUNGS: Mapping[str, Callable[[Model, DeviceProfile, Wishes], Outcome]] = {
+Rung = Callable[[Model, DeviceProfile, Wishes], Outcome]
+
+
+def _of_position(rung: Rung) -> Rung:
+    """The rung, refused to a force of velocity."""
+
+    def guarded(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
+        if not model.of_velocity:
+            return rung(model, device, wishes)
+        return "of a force of position and velocity no bound is known but for direct rendering as it is"
+
+    return guarded
+
+
+RUNGS: Mapping[str, Rung] = {
     "direct": direct,
-    "direct, slope limited": direct_limited,
-    "massless": massless,
-    "implicit": implicit,
-    "energy-consistent": energy_consistent,
-    "explicit": explicit,
+    "direct, slope limited": _of_position(direct_limited),
+    "massless": _of_position(massless),
+    "implicit": _of_position(implicit),
+    "energy-consistent": _of_position(energy_consistent),
+    "explicit": _of_position(explicit),
 }
 
 
@@ -191,24 +205,19 @@ def _balanced(model: Model) -> Model:
     return changed_network(model, bias=model.bias - turn / model.period)
 
 
-def _hysteresis_limited(
-    model: Model, device: DeviceProfile, wishes: Wishes, low: float, high: float
-) -> Model | None:
+def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model:
     """Slopes limited so that a stick has room, then as much of the loss h as the widest play can carry."""
 
     def holds(candidate: Model) -> bool:
         scheme = _direct_scheme(candidate, device, wishes)
         return not _core.certify(candidate, scheme, device).refused
 
-    travel = float(model.upper[0] - model.lower[0])
-    widest = _core.force_bounds(model, LONGEST_PLAY * travel)
-    room = max(0.5 * high, high - 2.0 * widest.loss_per_play)
-    limited = model
-    if not holds(scale_loss(model, _LEAST_LOSS)):
-        nearest = _within(model, max(low, -room) if low > -math.inf else low, room)
-        if nearest is None:
-            return None
-        limited = nearest
+    radius = wishes.play_radius or model.play_radius
+    if radius is None:
+        radius = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
+    stick = min(_core.force_bounds(model, radius).loss_per_play, steepest_stick(device))
+    low, high = renderable_slopes(device, stick)
+    limited = _within(model, low, high) or model
     if holds(limited):
         return limited
     kept, refused = 0.0, 1.0

@@ -111,12 +111,13 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     period = rendered.sample_period
     if period is None:
         raise InputError("a rendering of one tick has no force error; simulate a longer time")
-    at_end = force_at(plan, np.concatenate([start[:1], end]))[1:]
-    return ForceError(end=_rms(rendered.force - at_end), instant=_rms(rendered.force - force_at(plan, start)))
+    at_end = force_at(plan, np.concatenate([start[:1], end]), period)[1:]
+    at_start = force_at(plan, start, period)
+    return ForceError(end=_rms(rendered.force - at_end), instant=_rms(rendered.force - at_start))
 
 
-def force_at(plan: Plan, position: Float1D) -> Float1D:
-    """The model's own force along a motion, without structure or coupling, its play state included.
+def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Float1D:
+    """The model's own force along a motion, without structure or coupling, play state and velocity included.
 
     Parameters
     ----------
@@ -124,15 +125,18 @@ def force_at(plan: Plan, position: Float1D) -> Float1D:
         Model and play radius.
     position : (n,) array
         A motion, in order [rad or m].
+    period_s : float, optional
+        Time from each position to the next [s]; only a force of velocity needs it.
 
     Returns
     -------
     (n,) array
         Force [N*m or N].
     """
+    if period_s is None and plan.model.of_velocity:
+        raise InputError("the force depends on the velocity: period_s must be given")
     exact = Scheme(structure="direct", play_radius=plan.scheme.play_radius)
-    # Without a coupling nothing depends on the period.
-    force: Float1D = _core.motion_driven(plan.model, exact, position, 1.0)["force"]
+    force: Float1D = _core.motion_driven(plan.model, exact, position, period_s or 1.0)["force"]
     return force
 
 

@@ -40,7 +40,7 @@ _RESERVE = 0.985
 _CERTIFIED = 0.997
 """Share of a limit that is imposed: the rest is for bounds that are wider than what they bound [-]"""
 
-_CLOSE = 5e-5
+_CLOSE = 2e-5
 """RMS error at which no further wavelets are taken [share of the force's range]"""
 
 _CLOSE_SLOPE = 0.01
@@ -141,20 +141,18 @@ def _limited_once(model: Model, low: float, high: float, sigma: float, restoring
     """The model with the change fitted; None where its continuations would be steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
-    changes = [
-        _change(x, stroke, _RESERVE * low, _RESERVE * high, sigma, model, restoring) for stroke in strokes
-    ]
-    wanted = strokes + np.array(changes)
+    changes = _changes(x, strokes, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
+    wanted = strokes + changes
     middle, travel = wanted.mean(axis=0), x[-1] - x[0]
     pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
     if not restoring and pushed_out and np.abs(middle).max() > high * travel:
         return None
     if len(changes) == 2:  # of g and h
-        changes = [0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])]
-    alpha, beta = _candidates(x, np.any(np.array(changes) != 0.0, axis=0), sigma)
+        changes = np.array([0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])])
+    alpha, beta = _candidates(x, np.any(changes != 0.0, axis=0), sigma)
     close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
     before = model.alpha[:, 0], model.beta[:, 0]
-    chosen = _chosen(x, np.array(changes), before, (alpha, beta), sigma, close)
+    chosen = _chosen(x, changes, before, (alpha, beta), sigma, close)
     return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
 
 
@@ -196,33 +194,52 @@ def _fitted(
     return changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
 
 
-def _change(
-    x: Float1D, force: Float1D, low: float, high: float, sigma: float, model: Model, restoring: bool
-) -> Float1D:
-    """What has to be added to a force for its slopes to lie within limits, kinks rounded; zero elsewhere."""
+def _changes(
+    x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: Model, restoring: bool
+) -> Float2D:
+    """What strokes (k, n) lack for their slopes to lie within limits, kinks rounded; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
     margin = int(np.ceil(6.0 * sigma / step))
     before = after = 0
-    wide = force
     if model.period is not None:
         before = after = n - 1
-        wide = np.concatenate([force[:-1] - force[-1] + force[0], force, force[1:] + force[-1] - force[0]])
+        wide = [np.concatenate([f[:-1] - f[-1] + f[0], f, f[1:] + f[-1] - f[0]]) for f in strokes]
     else:
         # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
         before, after = (n if side == "free" else 0 for side in (model.below, model.above))
-        wide = np.pad(force, (before, after))
-    grid = x[0] + step * (np.arange(len(wide)) - before)
-    nearest = slope_limited(grid, wide, low, high)
+        wide = [np.pad(force, (before, after)) for force in strokes]
+    grid = x[0] + step * (np.arange(len(wide[0])) - before)
+    nearest = np.array([slope_limited(grid, force, low, high) for force in wide])
     if restoring and model.period is None:
         rise, fall = high * (grid - x[0]), high * (grid - x[-1])
         nearest = np.minimum(nearest, np.maximum(rise, 0.0) if model.below == "free" else rise)
         nearest = np.maximum(nearest, np.minimum(fall, 0.0) if model.above == "free" else fall)
-    nearest = _extended(nearest, margin)
+    if len(strokes) == 2 and model.below == "free":
+        nearest = _begun_together(grid, nearest, before, margin // 2, high)
     inside = slice(margin + before, margin + before + n)
-    smooth = gaussian_filter1d(nearest, sigma / step, mode="nearest")[inside]
-    touched = np.abs(nearest[inside] - force) > 1e-9 * np.ptp(force)
-    near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
-    return np.where(near, smooth - force, 0.0)
+    changes = []
+    for force, limited in zip(strokes, nearest, strict=True):
+        extended = _extended(limited, margin)
+        smooth = gaussian_filter1d(extended, sigma / step, mode="nearest")[inside]
+        touched = np.abs(extended[inside] - force) > 1e-9 * np.ptp(force)
+        near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
+        changes.append(np.where(near, smooth - force, 0.0))
+    return np.array(changes)
+
+
+def _begun_together(grid: Float1D, strokes: Float2D, edge: int, kept: int, high: float) -> Float2D:
+    """Pressing (2, n) lowered to begin as releasing ends, if it would be too steep beyond the lower edge.
+
+    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Both are the
+    same for `kept` samples: as far as the rounding of kinks reaches.
+    """
+    press, release = strokes
+    together = edge + kept
+    g, h = 0.5 * (press[edge] + release[edge]), 0.5 * float((press - release)[edge : together + 1].max())
+    slope = 0.5 * (strokes[:, edge + 1] - strokes[:, edge]).sum() / (grid[1] - grid[0])
+    if g <= 0.0 or slope * (g + h) <= high * g:
+        return strokes
+    return np.array([np.minimum(press, release[together] + high * (grid - grid[together])), release])
 
 
 def _extended(force: Float1D, margin: int) -> Float1D:

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from .._typing import Float1D
+from .look import grid
 
 _MARKERS = "os^Dv"
 _TWO_COLUMNS = 30
@@ -85,8 +86,7 @@ def draw_failure_map(
     if not linear:
         axes.set_yscale("log")
         _label_decades(axes.yaxis)
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_xlabel(_in_print(along))
     axes.set_ylabel(_in_print(limit))
     handles, _ = axes.get_legend_handles_labels()

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
 from .._typing import Float1D
+from .look import grid
 
 _LOOKS = (
     ("o", "black"),
@@ -73,8 +74,7 @@ def draw_reached(axes: Axes, title: str, reached: Sequence[Reached], methods: Se
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(numticks=9))
         axis.set_minor_locator(NullLocator())
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_title(title, fontsize=7.0)
 
 
@@ -125,8 +125,7 @@ def draw_over_speed(axes: Axes, along: str, ways: Mapping[str, tuple[Float1D, Fl
     axes.set_xticks(places, [f"{at:g}" for at in places])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_ylim(*_decades([value for _, error in ways.values() for value in error]))
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_xlabel(along)
     axes.set_ylabel("NRMSE of f against the truth")
     axes.figure.legend(frameon=False, loc="outside lower center", ncols=1)

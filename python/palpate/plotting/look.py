@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,6 +29,12 @@ def label_position(axes: Axes, units: Mapping[str, str]) -> None:
 
 def label_force(axes: Axes, units: Mapping[str, str]) -> None:
     axes.set_ylabel(label("force", units["force"]))
+
+
+def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """Thin lines behind what is drawn."""
+    axes.grid(axis=axis, color="0.88", linewidth=0.5)
+    axes.set_axisbelow(True)
 
 
 def thinned(*arrays: Float1D, most: int = MOST_POINTS) -> list[Float1D]:

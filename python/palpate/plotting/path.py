@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from .look import label
+from .look import grid, label
 
 _MARKERS = "os^Dv<>p"
 
@@ -51,8 +51,7 @@ def draw_path(
         error_axes.set_yscale("log")
     criterion_axes.set_yscale("symlog", linthresh=10.0)
     for axes in (error_axes, criterion_axes):
-        axes.grid(color="0.88", linewidth=0.5)
-        axes.set_axisbelow(True)
+        grid(axes)
     criterion_axes.set_ylim(bottom=-2.0)
     criterion_axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     criterion_axes.set_xlabel("wavelets")

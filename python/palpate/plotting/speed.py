@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from matplotlib.axes import Axes
 
 from .._typing import Float1D
-from .look import label
+from .look import grid, label
 
 _MARKERS = "os^Dv<>pP*Xhd"
 
@@ -99,8 +99,7 @@ def draw_work_precision(axes: Axes, steps: Sequence[WorkPrecision], position_uni
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_ylim(top=2.5 * ceiling)
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_xlabel("computing time for 1 ms of motion [ns]")
     axes.set_ylabel(label("error of the motion, RMS", position_unit))
     axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)
@@ -153,8 +152,7 @@ def draw_rendered_force(
             va="bottom",
             fontsize=7.0,
         )
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_xlabel("time of a tick [ns]")
     axes.set_ylabel(label("force error, RMS", force_unit))
     axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)
@@ -200,8 +198,7 @@ def draw_model_error(axes: Axes, methods: Sequence[ModelError], cost: str) -> No
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(x=0.08, y=0.12)
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_xlabel(cost)
     axes.set_ylabel("NRMSE")
 
@@ -233,7 +230,6 @@ def draw_over_wavelets(axes: Axes, curves: Sequence[OverWavelets], quantity: str
     axes.set_xscale("log", base=2)
     axes.set_yscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.grid(color="0.88", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes)
     axes.set_xlabel("wavelets")
     axes.set_ylabel(quantity)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from .look import label
+from .look import grid, label
 
 
 def draw_structures(
@@ -41,7 +41,6 @@ def draw_structures(
     axes.set_xscale("log")
     axes.set_yticks(place, [name.replace(", ", ",\n", 1) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.grid(axis="x", color="0.85", linewidth=0.5)
-    axes.set_axisbelow(True)
+    grid(axes, "x")
     axes.set_xlabel(label("force error, RMS", force_unit))
     axes.figure.legend(frameon=False, loc="outside upper center", ncols=2)

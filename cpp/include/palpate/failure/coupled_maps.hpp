@@ -77,24 +77,11 @@ inline constexpr double coupling_time = 0.2e-3;
 
 /// The stiffest coupling, over the damping of the device.
 [[nodiscard]] inline FailureMap coupling_map(int points) {
-    FailureMap map{"coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]", {}};
-    for (int delay = 0; delay <= 2; ++delay) {
-        const auto device = [&](double damping) {
-            DeviceProfile knob = smooth_knob();
-            knob.viscous_damping = damping;
-            knob.delay_samples = delay;
-            return knob;
-        };
-        map.lines.push_back(failure_line(
-            "delay " + std::to_string(delay), logarithmic(0.005, 0.5, points),
-            [&](double damping) { return coupling_limit(device(damping)); },
-            [&](double damping, double stiffness) {
-                return detail::coupling_loses_balance({stiffness, coupling_time * stiffness},
-                                                      device(damping));
-            },
-            3.0));
-    }
-    return map;
+    return {
+        "coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
+        lines_over_damping(points, 3.0, coupling_limit, [](const DeviceProfile& device, double stiffness) {
+            return detail::coupling_loses_balance({stiffness, coupling_time * stiffness}, device);
+        })};
 }
 
 /// How steeply an object may fall behind a coupling, over the coupling's stiffness, on a device that the

@@ -40,9 +40,12 @@ namespace palpate {
     return 2.0 * device.viscous_damping / ((1.0 + 2.0 * device.delay_samples) * device.period_s);
 }
 
-/// The stiffest spring that a device can render directly, over its damping.
-[[nodiscard]] inline FailureMap damping_map(int points) {
-    FailureMap map{"damping", "device damping b [N*m*s/rad]", "stiffness K [N*m/rad]", {}};
+/// A limit over the damping of the device, a line for each delay: `limit(device)` says theory, and it is searched
+/// up to `reach` times that for where `fails(device, stiffness)`.
+template <class Limit, class Fails>
+[[nodiscard]] std::vector<FailureLine> lines_over_damping(int points, double reach, Limit limit,
+                                                          Fails fails) {
+    std::vector<FailureLine> lines;
     for (int delay = 0; delay <= 2; ++delay) {
         const auto device = [&](double damping) {
             DeviceProfile knob = smooth_knob();
@@ -50,12 +53,18 @@ namespace palpate {
             knob.delay_samples = delay;
             return knob;
         };
-        map.lines.push_back(failure_line(
+        lines.push_back(failure_line(
             "delay " + std::to_string(delay), logarithmic(0.005, 0.5, points),
-            [&](double damping) { return direct_limit(device(damping)); },
-            [&](double damping, double stiffness) { return spring_swings_up(device(damping), stiffness); }));
+            [&](double damping) { return limit(device(damping)); },
+            [&](double damping, double stiffness) { return fails(device(damping), stiffness); }, reach));
     }
-    return map;
+    return lines;
+}
+
+/// The stiffest spring that a device can render directly, over its damping.
+[[nodiscard]] inline FailureMap damping_map(int points) {
+    return {"damping", "device damping b [N*m*s/rad]", "stiffness K [N*m/rad]",
+            lines_over_damping(points, 10.0, direct_limit, spring_swings_up)};
 }
 
 /// Ways over an edge between two encoder counts, most of them far below a count: where friction, damping or the

@@ -63,21 +63,6 @@ template <Structure S>
     return growth.grows();
 }
 
-/// Whether it does behind its coupling while the device is held.
-template <Structure S>
-[[nodiscard]] bool oscillates_held(S structure, std::size_t ticks) noexcept {
-    structure.reset(0.0);
-    detail::Growth growth{ticks};
-    (void)structure.step(1.0);
-    for (std::size_t k = 0; k < ticks; ++k) {
-        const Rendered now = structure.step(0.0);
-        if (!growth.add(now.status == Status::Ok ? now.environment_position : detail::not_finite)) {
-            break;
-        }
-    }
-    return growth.grows();
-}
-
 inline constexpr Guards unguarded{.limit = {1e9}};
 
 /// Whether a hand that only takes energy swings more and more with the object, a spring of this stiffness at 0.

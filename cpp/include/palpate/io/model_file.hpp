@@ -130,7 +130,8 @@ inline ForceModel read_network(const JsonField& file) {
     network["dimension"].require(loss.is_null() || d == 1, "1 in a model with hysteresis");
     const Domain domain = read_domain(file, d);
     if (loss.is_null()) {
-        return {read, domain};
+        return kind == "position_velocity" && d == 2 ? ForceModel::of_velocity(read, domain)
+                                                     : ForceModel{read, domain};
     }
     const std::vector<double> linear = network["linear_hysteresis"].numbers();
     loss.require(loss.value().is_array(), "a list");

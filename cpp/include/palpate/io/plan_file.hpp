@@ -99,7 +99,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
 
 [[nodiscard]] inline ForceBounds read_bounds(const JsonField& bounds, bool hysteresis) {
     bounds.only({"slope_min", "slope_max", "steepest", "sliding", "loss_min", "loss_max", "loss_per_play",
-                 "mean_force"});
+                 "mean_force", "drag"});
     ForceBounds read;
     read.hysteresis = hysteresis;
     read.slope = {bounds["slope_min"].number(), bounds["slope_max"].number()};
@@ -108,6 +108,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     read.loss = {bounds["loss_min"].number(), bounds["loss_max"].number()};
     read.loss_per_play = bounds["loss_per_play"].number();
     read.mean_force = bounds["mean_force"].number();
+    read.drag = bounds.value().contains("drag") ? bounds["drag"].not_negative() : 0.0;
     return read;
 }
 

@@ -42,9 +42,52 @@ namespace detail {
 
 }  // namespace detail
 
-/// The energy range of a model of one position.
+/// The same of a force of position and velocity, at rest: by Simpson's rule, because it has no antiderivative.
+[[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force) {
+    constexpr double cells_per_width = 16.0;
+    constexpr double most_cells = 1e5;
+    constexpr int halvings = 60;
+    const auto at = [&](double x) noexcept { return force.force(x, 0.0); };
+    const auto between = [&](double from, double at_from, double to, double at_to) noexcept {
+        return (to - from) / 6.0 * (at_from + 4.0 * at(0.5 * (from + to)) + at_to);
+    };
+    const auto cells = static_cast<int>(
+        std::min(most_cells, 64.0 + cells_per_width * force.travel() / force.finest_width()));
+    double energy = 0.0;
+    double from = force.lower();
+    double at_from = at(from);
+    EnergyRange range;
+    for (int k = 1; k <= cells; ++k) {
+        const double to = force.lower() + force.travel() * k / cells;
+        const double at_to = at(to);
+        if (at_from < 0.0 && at_to >= 0.0) {  // the object rests in between
+            double below = from;
+            double above = to;
+            for (int halving = 0; halving < halvings; ++halving) {
+                const double middle = 0.5 * (below + above);
+                (at(middle) < 0.0 ? below : above) = middle;
+            }
+            range.least = std::min(range.least, energy + between(from, at_from, below, 0.0));
+        }
+        energy += between(from, at_from, to, at_to);
+        range.least = std::min(range.least, energy);
+        range.largest = std::max(range.largest, energy);
+        from = to;
+        at_from = at_to;
+    }
+    EdgeLine above = force.above();
+    above.at_edge.integral = energy;
+    range.least = std::min({range.least, detail::least_energy_beyond(force.below(), -1.0),
+                            detail::least_energy_beyond(above, +1.0)});
+    return range;
+}
+
+/// The energy range of a model of one position, or of position and velocity.
 [[nodiscard]] inline EnergyRange energy_range(const ForceModel& model) {
-    require_one_input(model.parameters());
+    require_renderable(model);
+    if (const VelocityNetwork* of_velocity = model.velocity()) {
+        return energy_range(*of_velocity);
+    }
     constexpr double cells_per_width = 16.0;
     constexpr double most_cells = 1e6;
     const HysteresisNetwork* both = model.hysteresis();

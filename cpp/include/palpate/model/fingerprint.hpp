@@ -60,6 +60,9 @@ class NumberHash {
     hash.add(static_cast<std::uint64_t>(domain.above));
     hash.add(domain.period.value_or(0.0));
     hash.add(model.play_radius().value_or(0.0));
+    if (model.velocity() != nullptr) {
+        hash.add(std::uint64_t{1});  // the second input is the velocity
+    }
     constexpr std::array<char, 17> digits{"0123456789abcdef"};
     std::string text;
     for (unsigned digit = 16; digit-- > 0;) {

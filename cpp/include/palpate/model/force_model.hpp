@@ -10,6 +10,7 @@
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/network.hpp"
 #include "palpate/model/radial_network.hpp"
+#include "palpate/model/velocity_network.hpp"
 
 namespace palpate {
 
@@ -19,7 +20,7 @@ namespace palpate {
 /// choice of the rendering, made with `with_play_radius`.
 class ForceModel {
   public:
-    using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork>;
+    using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork, VelocityNetwork>;
 
     ForceModel(NetworkParameters network, Domain domain)
         : kind_{make_network(std::move(network), std::move(domain))} {}
@@ -28,6 +29,11 @@ class ForceModel {
                std::optional<double> play_radius)
         : kind_{make_hysteresis(network, loss, domain, play_radius)}, play_radius_{play_radius} {}
 
+    /// A force whose second input is the velocity of the first.
+    [[nodiscard]] static ForceModel of_velocity(NetworkParameters network, Domain domain) {
+        return ForceModel{VelocityNetwork{std::move(network), std::move(domain)}};
+    }
+
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
     [[nodiscard]] const WaveletNetwork* network() const noexcept {
         return std::get_if<WaveletNetwork>(&kind_);
@@ -35,7 +41,13 @@ class ForceModel {
     [[nodiscard]] const HysteresisNetwork* hysteresis() const noexcept {
         return std::get_if<HysteresisNetwork>(&kind_);
     }
-    [[nodiscard]] const RadialNetwork* radial() const noexcept { return std::get_if<RadialNetwork>(&kind_); }
+    [[nodiscard]] const VelocityNetwork* velocity() const noexcept {
+        return std::get_if<VelocityNetwork>(&kind_);
+    }
+    /// The network of several inputs, whatever they mean.
+    [[nodiscard]] const RadialNetwork* radial() const noexcept {
+        return velocity() != nullptr ? &velocity()->network() : std::get_if<RadialNetwork>(&kind_);
+    }
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept {
@@ -51,11 +63,14 @@ class ForceModel {
         return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
-    /// Proved bounds of the slope inside the domain (d = 1), sliding either way; with a play radius r also
+    /// Proved bounds of the slope inside the domain, at rest or sliding either way; with a play radius r also
     /// while it sticks, where h / r adds to it.
     [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
         if (const WaveletNetwork* single = network()) {
             return single->curve().slope_bounds();
+        }
+        if (velocity() != nullptr) {
+            return velocity()->resting_bounds(0.01).gradient[0];
         }
         const Interval common = hysteresis()->force().slope_bounds();
         const double loss = hysteresis()->loss().slope_bounds().largest();
@@ -80,6 +95,8 @@ class ForceModel {
     }
 
   private:
+    explicit ForceModel(Kind kind) : kind_{std::move(kind)} {}
+
     static Kind make_network(NetworkParameters network, Domain domain) {
         if (network.dimension == 1) {
             return WaveletNetwork{network, std::move(domain)};
@@ -98,5 +115,12 @@ class ForceModel {
     Kind kind_;
     std::optional<double> play_radius_;
 };
+
+/// Throws unless it is a force of the position, with or without hysteresis or velocity: what can be rendered.
+inline void require_renderable(const ForceModel& model) {
+    if (model.velocity() == nullptr) {
+        require_one_input(model.parameters());
+    }
+}
 
 }  // namespace palpate

@@ -2,18 +2,16 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "palpate/model/bounds.hpp"
-#include "palpate/model/derivatives.hpp"
 #include "palpate/model/parameters.hpp"
-#include "palpate/model/wavelet.hpp"
+#include "palpate/model/radial_sum.hpp"
 
 namespace palpate {
 
@@ -25,120 +23,83 @@ struct RadialBounds {
 
 namespace detail {
 
-/// Bounds of |D^4 psi(a, b, c, e)| for unit vectors, of the radial hat of d inputs: psi is the Laplacian of a
-/// Gaussian, so along a direction it is a sum of Hermite functions of order 6 and 4; the largest value of a
-/// symmetric form is taken on equal vectors. Cramer's inequality gives what is left at a distance r from the
-/// centre, times e^{-r^2/4}.
-struct FourthDerivative {
-    double supremum;
-    double tail;
-
-    explicit FourthDerivative(std::size_t dimension) noexcept {
-        const double others = static_cast<double>(dimension) - 1.0;
-        supremum = hat_suprema[4] + std::max(others, 0.7358) * hat_suprema[2];
-        tail = hat_tails[4] + std::max(others, 1.4716) * hat_tails[2];
+/// Where c + b't + t'A t / 2 lies for |t_j| <= 1, a rest added: each t_j with its square exactly, products of two
+/// by their size.
+[[nodiscard]] inline Interval quadratic_range(std::size_t d, double c, const double* b, const double* a,
+                                              double rest) noexcept {
+    Interval range{c - rest, c + rest};
+    for (std::size_t j = 0; j < d; ++j) {
+        const double slope = std::abs(b[j]);
+        const double bend = a[j * d + j];
+        Interval along{0.5 * bend - slope, 0.5 * bend + slope};
+        if (slope < std::abs(bend)) {
+            const double vertex = -0.5 * slope * slope / bend;
+            along = along.with({vertex, vertex});
+        }
+        double products = 0.0;
+        for (std::size_t k = 0; k < j; ++k) {
+            products += std::abs(a[j * d + k]);
+        }
+        range = {range.lower + along.lower - products, range.upper + along.upper + products};
     }
+    return range;
+}
 
-    [[nodiscard]] double beyond(double square) const noexcept {
-        return std::min(supremum, tail * std::exp(-0.25 * std::min(square, 2800.0)));
-    }
-};
-
-/// A box in the search, with the ranges of value and gradient over it: Taylor's formula about its middle, with
-/// the fourth derivative bounded wavelet by wavelet at the least distance.
-class RadialBox {
+/// Ranges of value and gradient over a box by Taylor's formula about its middle, the fourth derivative bounded
+/// wavelet by wavelet at the least distance.
+class RadialEnclosure {
   public:
-    RadialBox(const NetworkParameters& network, std::vector<double> middle, std::vector<double> radius)
-        : middle_{std::move(middle)}, radius_{std::move(radius)} {
-        const std::size_t d = network.dimension;
-        const auto inputs = static_cast<double>(d);
-        const FourthDerivative fourth{d};
-        std::vector<double> u(d);
-        std::vector<double> bend(d * d, 0.0);       // D^2 f at the middle
-        std::vector<double> twist(d * d * d, 0.0);  // D^3 f
-        std::vector<double> gradient_rest(d, 0.0);
-        gradient = network.linear;
-        value = network.bias;
-        for (std::size_t j = 0; j < d; ++j) {
-            value += network.linear[j] * middle_[j];
-        }
-        double value_rest = 0.0;
-        for (std::size_t i = 0; i < network.weight.size(); ++i) {
-            const double* alpha = &network.alpha[i * d];
-            double square = 0.0;
-            double least_square = 0.0;
-            double spread = 0.0;
-            for (std::size_t j = 0; j < d; ++j) {
-                const double distance = middle_[j] - network.beta[i * d + j];
-                u[j] = std::clamp(alpha[j] * distance, -wavelet_reach, wavelet_reach);
-                square += u[j] * u[j];
-                const double least = alpha[j] * std::max(std::abs(distance) - radius_[j], 0.0);
-                least_square += least * least;
-                spread += alpha[j] * radius_[j] * (alpha[j] * radius_[j]);
-            }
-            // With A_n = w (d + n - r^2) E: psi = -A_0, D psi = A_2 u, D^2 psi = A_2 I - A_4 u u', and D^3 psi =
-            // A_6 u u u less A_4 u_j wherever the other two indices are equal.
-            const double factor = network.weight[i] * std::exp(-0.5 * std::min(square, 1600.0));
-            const double first = (inputs + 2.0 - square) * factor;
-            const double second = (inputs + 4.0 - square) * factor;
-            const double third = (inputs + 6.0 - square) * factor;
-            value += (square - inputs) * factor;
-            for (std::size_t j = 0; j < d; ++j) {
-                gradient[j] += first * alpha[j] * u[j];
-                for (std::size_t k = 0; k <= j; ++k) {
-                    const double by_two = alpha[j] * alpha[k];
-                    bend[j * d + k] += by_two * ((j == k ? first : 0.0) - second * u[j] * u[k]);
-                    for (std::size_t l = 0; l <= k; ++l) {
-                        twist[(j * d + k) * d + l] +=
-                            by_two * alpha[l] *
-                            (third * u[j] * u[k] * u[l] -
-                             second *
-                                 ((j == k ? u[l] : 0.0) + (j == l ? u[k] : 0.0) + (k == l ? u[j] : 0.0)));
-                    }
-                }
-            }
-            const double rest = std::abs(network.weight[i]) * fourth.beyond(least_square) * spread;
-            value_rest += rest * spread / 24.0;
-            for (std::size_t j = 0; j < d; ++j) {
-                gradient_rest[j] += rest * std::sqrt(spread) / 6.0 * alpha[j];
-            }
-        }
-        for (std::size_t j = 0; j < d; ++j) {
-            double by_component = std::abs(gradient[j]);
-            double rest = gradient_rest[j];
-            for (std::size_t k = 0; k < d; ++k) {
-                const double once = std::abs(bend[std::max(j, k) * d + std::min(j, k)]) * radius_[k];
-                by_component += once / 2.0;
-                rest += once;
-                for (std::size_t l = 0; l < d; ++l) {
-                    std::array<std::size_t, 3> at{j, k, l};
-                    std::sort(at.begin(), at.end());
-                    const double twice =
-                        std::abs(twist[(at[2] * d + at[1]) * d + at[0]]) * radius_[k] * radius_[l];
-                    by_component += twice / 6.0;
-                    rest += twice / 2.0;
-                }
-            }
-            value_rest += by_component * radius_[j];
-            ranges.gradient.push_back({gradient[j] - rest, gradient[j] + rest});
-        }
-        ranges.value = {value - value_rest, value + value_rest};
+    RadialEnclosure(const NetworkParameters& network, const RadialSum& hats)
+        : network_{network},
+          hats_{hats},
+          sums_{hats.expansion()},
+          middle_(network.dimension),
+          radius_(network.dimension) {
+        gradient.resize(network.dimension);
+        ranges.gradient.resize(network.dimension);
     }
 
-    /// Both halves across the side that spans most wavelets.
-    [[nodiscard]] std::pair<RadialBox, RadialBox> halves(const NetworkParameters& network,
-                                                         std::span<const double> finest) const {
-        std::size_t widest = 0;
-        for (std::size_t j = 1; j < radius_.size(); ++j) {
-            widest = radius_[j] * finest[j] > radius_[widest] * finest[widest] ? j : widest;
+    void over(const double* lower, const double* upper) noexcept {
+        const std::size_t d = network_.dimension;
+        for (std::size_t j = 0; j < d; ++j) {
+            middle_[j] = 0.5 * (lower[j] + upper[j]);
+            // Rounded up, and never the 0 that the gradient could not be divided by.
+            radius_[j] = std::max(upper[j] - middle_[j], middle_[j] - lower[j]) * (1.0 + 1e-15) + 1e-200;
         }
-        std::vector<double> radius = radius_;
-        radius[widest] *= 0.5;
-        std::vector<double> left = middle_;
-        std::vector<double> right = middle_;
-        left[widest] -= radius[widest];
-        right[widest] += radius[widest];
-        return {RadialBox{network, std::move(left), radius}, RadialBox{network, std::move(right), radius}};
+        hats_.expand(middle_.data(), radius_.data(), sums_);
+        value = sums_.value + network_.bias;
+        double twists = 0.0;
+        for (const double twist : sums_.twist) {
+            twists += std::abs(twist);
+        }
+        // Not only their own rounding: where a box is wide for a wavelet, that of all its terms is less.
+        constexpr double rounded_up = 1.0 + 1e-9;
+        const double fourth = rounded_up * std::reduce(sums_.rest.begin(), sums_.rest.end());
+        for (std::size_t j = 0; j < d; ++j) {
+            value += network_.linear[j] * middle_[j];
+            sums_.gradient[j] += network_.linear[j] * radius_[j];
+            gradient[j] = sums_.gradient[j] / radius_[j];
+            const Interval scaled =
+                quadratic_range(d, sums_.gradient[j], &sums_.bend[j * d], &sums_.twist[j * d * d],
+                                std::sqrt(rounded_up * sums_.rest[j] * fourth) / 6.0);
+            ranges.gradient[j] = {scaled.lower / radius_[j], scaled.upper / radius_[j]};
+        }
+        ranges.value =
+            quadratic_range(d, value, sums_.gradient.data(), sums_.bend.data(), twists / 6.0 + fourth / 24.0);
+    }
+
+    /// The input along which most may change.
+    [[nodiscard]] std::size_t widest() const noexcept {
+        std::size_t widest = 0;
+        double most = 0.0;
+        for (std::size_t j = 0; j < network_.dimension; ++j) {
+            const double change = std::abs(sums_.gradient[j]) + sums_.rest[j];
+            if (change > most) {
+                widest = j;
+                most = change;
+            }
+        }
+        return widest;
     }
 
     double value = 0.0;            ///< in the middle
@@ -146,6 +107,9 @@ class RadialBox {
     RadialBounds ranges;
 
   private:
+    const NetworkParameters& network_;
+    const RadialSum& hats_;
+    RadialExpansion sums_;
     std::vector<double> middle_;
     std::vector<double> radius_;
 };
@@ -160,6 +124,59 @@ struct Seen {
     }
 };
 
+/// What rounding may cost value and gradient anywhere in a box: 64 (N + 8) units of the sums of absolute terms,
+/// where |psi| <= d, |grad psi| and its terms <= d + 4.
+struct RadialRounding {
+    double value;
+    std::vector<double> gradient;
+
+    RadialRounding(const NetworkParameters& network, std::span<const double> lower,
+                   std::span<const double> upper)
+        : value{std::abs(network.bias)}, gradient(network.dimension) {
+        const std::size_t d = network.dimension;
+        const double units =
+            64.0 * static_cast<double>(network.weight.size() + 8) * std::numeric_limits<double>::epsilon();
+        for (std::size_t j = 0; j < d; ++j) {
+            value += std::abs(network.linear[j]) * std::max(std::abs(lower[j]), std::abs(upper[j]));
+            gradient[j] = std::abs(network.linear[j]);
+        }
+        for (std::size_t i = 0; i < network.weight.size(); ++i) {
+            const double weight = std::abs(network.weight[i]);
+            value += weight * static_cast<double>(d);
+            for (std::size_t j = 0; j < d; ++j) {
+                gradient[j] += weight * network.alpha[i * d + j] * static_cast<double>(d + 4);
+            }
+        }
+        value *= units;
+        for (double& component : gradient) {
+            component *= units;
+        }
+    }
+};
+
+/// Calls visit(x) where value or gradient may be largest: at the wavelets' centres and on their flanks.
+template <class Visitor>
+void where_hats_are_steep(const NetworkParameters& network, std::span<const double> lower,
+                          std::span<const double> upper, Visitor visit) {
+    const std::size_t d = network.dimension;
+    std::vector<double> x(d);
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        const double* centre = &network.beta[i * d];
+        for (std::size_t j = 0; j < d; ++j) {
+            x[j] = std::clamp(centre[j], lower[j], upper[j]);
+        }
+        visit(x);
+        for (std::size_t j = 0; j < d; ++j) {
+            const double inside = x[j];
+            for (const double side : {-0.742, 0.742}) {
+                x[j] = std::clamp(centre[j] + side / network.alpha[i * d + j], lower[j], upper[j]);
+                visit(x);
+            }
+            x[j] = inside;
+        }
+    }
+}
+
 }  // namespace detail
 
 /// Proved bounds over the box [lower, upper] of a network of any number of inputs without continuation, at most
@@ -167,89 +184,68 @@ struct Seen {
 /// that are still too coarse when the budget ends only make the result wider.
 [[nodiscard]] inline RadialBounds radial_bounds(const NetworkParameters& network,
                                                 std::span<const double> lower, std::span<const double> upper,
-                                                double relative = 0.01, int budget = 50'000) {
+                                                double relative = 0.01, std::size_t budget = 50'000,
+                                                const detail::HatKernel& kernel = detail::hat_kernel()) {
     const std::size_t d = network.dimension;
-    std::vector<double> middle(d);
-    std::vector<double> radius(d);
-    std::vector<double> finest(d, 0.0);
-    // 64 (N + 8) units of the sums of absolute terms: |psi| <= d, |grad psi| and its terms <= d + 4.
-    const double units =
-        64.0 * static_cast<double>(network.weight.size() + 8) * std::numeric_limits<double>::epsilon();
-    double value_margin = std::abs(network.bias);
-    std::vector<double> margin(d);
-    for (std::size_t j = 0; j < d; ++j) {
-        middle[j] = 0.5 * (lower[j] + upper[j]);
-        radius[j] = std::max(upper[j] - middle[j], middle[j] - lower[j]);
-        value_margin += std::abs(network.linear[j]) * std::max(std::abs(lower[j]), std::abs(upper[j]));
-        margin[j] = std::abs(network.linear[j]);
-        for (std::size_t i = 0; i < network.weight.size(); ++i) {
-            const double alpha = network.alpha[i * d + j];
-            margin[j] += std::abs(network.weight[i]) * alpha * static_cast<double>(d + 4);
-            finest[j] = std::max(finest[j], alpha);
-        }
-        margin[j] *= units;
-    }
-    for (const double weight : network.weight) {
-        value_margin += std::abs(weight) * static_cast<double>(d);
-    }
-    value_margin *= units;
-
+    const RadialSum hats{network, lower, upper, kernel};
+    const detail::RadialRounding rounding{network, lower, upper};
     detail::Seen value;
     std::vector<detail::Seen> gradient(d);
-    const auto look = [&](const detail::RadialBox& box) {
-        value.add(box.value);
+    const auto look = [&](double at, std::span<const double> slopes) {
+        value.add(at);
         for (std::size_t j = 0; j < d; ++j) {
-            gradient[j].add(box.gradient[j]);
+            gradient[j].add(slopes[j]);
         }
     };
-    const auto done = [&](const RadialBounds& box) {
-        bool all = value.settles(box.value, relative * value.range.largest() + value_margin);
+    // What may be largest is looked at first: a search that has met it settles the rest sooner.
+    std::vector<double> slopes(d);
+    detail::where_hats_are_steep(network, lower, upper, [&](const std::vector<double>& x) {
+        slopes = network.linear;
+        double at = std::inner_product(x.begin(), x.end(), network.linear.begin(), network.bias);
+        hats.add(x.data(), at, slopes.data());
+        look(at, slopes);
+    });
+    const auto settled = [&](const RadialBounds& box) {
+        bool all = value.settles(box.value, relative * value.range.largest() + rounding.value);
         for (std::size_t j = 0; j < d && all; ++j) {
-            all = gradient[j].settles(box.gradient[j], relative * gradient[j].range.largest() + margin[j]);
+            all = gradient[j].settles(box.gradient[j],
+                                      relative * gradient[j].range.largest() + rounding.gradient[j]);
         }
         return all;
     };
-    // What may be largest is looked at first: a search that has met it settles the rest sooner.
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        std::vector<double> centre(d);
-        for (std::size_t j = 0; j < d; ++j) {
-            centre[j] = std::clamp(network.beta[i * d + j], lower[j], upper[j]);
-        }
-        look(detail::RadialBox{network, centre, std::vector<double>(d, 0.0)});
-        for (std::size_t j = 0; j < d; ++j) {
-            for (const double side : {-1.0, 1.0}) {
-                std::vector<double> flank = centre;
-                const double steepest = network.beta[i * d + j] + side * 0.742 / network.alpha[i * d + j];
-                flank[j] = std::clamp(steepest, lower[j], upper[j]);
-                look(detail::RadialBox{network, std::move(flank), std::vector<double>(d, 0.0)});
+    detail::RadialEnclosure box{network, hats};
+    RadialBounds bounds;
+    // The edges of all boxes, 2 d numbers each, wide ones first: where the budget ends, all are equally coarse.
+    std::vector<double> edges{lower.begin(), lower.end()};
+    edges.insert(edges.end(), upper.begin(), upper.end());
+    edges.reserve(4096);
+    for (std::size_t next = 0; next < edges.size(); next += 2 * d) {
+        box.over(&edges[next], &edges[next + d]);
+        look(box.value, box.gradient);
+        const std::size_t widest = box.widest();
+        const double from = edges[next + widest];
+        const double to = edges[next + d + widest];
+        const double cut = 0.5 * (from + to);
+        if (settled(box.ranges) || edges.size() >= 2 * d * budget || cut <= from || cut >= to) {
+            if (bounds.gradient.empty()) {
+                bounds = box.ranges;
             }
-        }
-    }
-    std::vector<detail::RadialBox> open{detail::RadialBox{network, middle, radius}};
-    look(open.front());
-    RadialBounds bounds{value.range, {}};
-    for (const detail::Seen& seen : gradient) {
-        bounds.gradient.push_back(seen.range);
-    }
-    for (int boxes = 1; !open.empty(); ++boxes) {
-        const detail::RadialBox box = std::move(open.back());
-        open.pop_back();
-        if (done(box.ranges) || boxes >= budget) {
             bounds.value = bounds.value.with(box.ranges.value);
             for (std::size_t j = 0; j < d; ++j) {
                 bounds.gradient[j] = bounds.gradient[j].with(box.ranges.gradient[j]);
             }
             continue;
         }
-        auto [left, right] = box.halves(network, finest);
-        look(left);
-        look(right);
-        open.push_back(std::move(right));
-        open.push_back(std::move(left));
+        for (const std::size_t side : {d, std::size_t{0}}) {
+            for (std::size_t j = 0; j < 2 * d; ++j) {
+                edges.push_back(j == side + widest ? cut : edges[next + j]);
+            }
+        }
     }
-    bounds.value = {bounds.value.lower - value_margin, bounds.value.upper + value_margin};
+    bounds.value = {bounds.value.lower - rounding.value, bounds.value.upper + rounding.value};
     for (std::size_t j = 0; j < d; ++j) {
-        bounds.gradient[j] = {bounds.gradient[j].lower - margin[j], bounds.gradient[j].upper + margin[j]};
+        bounds.gradient[j] = {bounds.gradient[j].lower - rounding.gradient[j],
+                              bounds.gradient[j].upper + rounding.gradient[j]};
     }
     return bounds;
 }

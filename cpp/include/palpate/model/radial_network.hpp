@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/model/hat_sum.hpp"
 #include "palpate/model/parameters.hpp"
 #include "palpate/model/radial_bounds.hpp"
+#include "palpate/model/radial_sum.hpp"
 #include "palpate/model/wavelet.hpp"
 
 namespace palpate {
@@ -26,9 +26,9 @@ class RadialNetwork {
   public:
     RadialNetwork(NetworkParameters network, Domain domain,
                   const detail::HatKernel& kernel = detail::hat_kernel())
-        : network_{std::move(network)}, domain_{std::move(domain)}, kernel_{kernel} {
-        validate(network_, domain_);
-        fill_columns();
+        : network_{valid(std::move(network), domain)},
+          domain_{std::move(domain)},
+          hats_{network_, domain_.lower, domain_.upper, kernel} {
         gradient_cap_ = largest_gradient();
     }
 
@@ -57,7 +57,7 @@ class RadialNetwork {
                 sum += clamped_partial(x, j) * (x[j] - inside);
             }
         }
-        kernel_.radial(columns(), x.data(), sum, nullptr);
+        hats_.add(x.data(), sum, nullptr);
         return sum;
     }
 
@@ -69,7 +69,7 @@ class RadialNetwork {
             sum += network_.linear[j] * projected(x, j);
             gradient[j] = network_.linear[j];
         }
-        kernel_.radial(columns(), x.data(), sum, gradient.data());
+        hats_.add(x.data(), sum, gradient.data());
         for (std::size_t j = 0; j < dimension(); ++j) {
             const double beyond = x[j] - projected(x, j);
             if (beyond != 0.0) {
@@ -91,6 +91,11 @@ class RadialNetwork {
     }
 
   private:
+    [[nodiscard]] static NetworkParameters valid(NetworkParameters network, const Domain& domain) {
+        validate(network, domain);
+        return network;
+    }
+
     [[nodiscard]] double projected(std::span<const double> x, std::size_t j) const noexcept {
         return std::clamp(x[j], domain_.lower[j], domain_.upper[j]);
     }
@@ -119,33 +124,6 @@ class RadialNetwork {
         return std::clamp(partial(x, j), 0.0, gradient_cap_[j]);
     }
 
-    void fill_columns() {
-        const std::size_t d = dimension();
-        columns_.assign((2 * d + 1) * padded(), 0.0);
-        std::fill_n(columns_.begin(), d * padded(), 1.0);
-        for (std::size_t i = 0; i < size(); ++i) {
-            for (std::size_t j = 0; j < d; ++j) {
-                columns_[j * padded() + i] = network_.alpha[i * d + j];
-                columns_[(d + j) * padded() + i] = network_.beta[i * d + j];
-            }
-            columns_[2 * d * padded() + i] = network_.weight[i];
-        }
-    }
-
-    [[nodiscard]] std::size_t padded() const noexcept { return (size() + 7) / 8 * 8; }
-
-    [[nodiscard]] detail::RadialColumns columns() const noexcept {
-        const double* first = columns_.data();
-        const std::size_t d = dimension();
-        return {d,
-                padded(),
-                first,
-                first + d * padded(),
-                first + 2 * d * padded(),
-                domain_.lower.data(),
-                domain_.upper.data()};
-    }
-
     /// Largest partial derivatives, at least 0, over the wavelets' centres and 1024 points of an additive
     /// recurrence: multiples of the powers of 1/g, g^(d+1) = g + 1, spread evenly over the box.
     [[nodiscard]] std::vector<double> largest_gradient() const {
@@ -155,7 +133,7 @@ class RadialNetwork {
         const auto visit = [&](std::span<const double> x) {
             double value = 0.0;
             gradient = network_.linear;
-            kernel_.radial(columns(), x.data(), value, gradient.data());
+            hats_.add(x.data(), value, gradient.data());
             for (std::size_t j = 0; j < d; ++j) {
                 cap[j] = std::max(cap[j], gradient[j]);
             }
@@ -183,9 +161,8 @@ class RadialNetwork {
 
     NetworkParameters network_;
     Domain domain_;
-    detail::HatKernel kernel_;
+    RadialSum hats_;
     std::vector<double> gradient_cap_;
-    std::vector<double> columns_;
 };
 
 }  // namespace palpate

@@ -17,6 +17,7 @@
 #include "palpate/readable.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/direct_velocity.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
@@ -69,7 +70,11 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     };
     const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
     const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
-    require_one_input(model.parameters());
+    require_renderable(model);
+    detail::require(model.velocity() == nullptr || scheme.structure == StructureKind::Direct,
+                    "structure is " + std::string(name_of(scheme.structure)) +
+                        ", must be direct: of a force of position and velocity behind a coupling no bound is "
+                        "known");
     if (scheme.structure != StructureKind::Direct) {
         require(positive(scheme.coupling.stiffness), "coupling_stiffness", scheme.coupling.stiffness, "> 0");
         require(not_negative(scheme.coupling.damping), "coupling_damping", scheme.coupling.damping, ">= 0");
@@ -125,6 +130,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
 template <class Visitor>
 auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, Visitor visit) {
     validate(scheme, given);
+    if (const VelocityNetwork* force = given.velocity()) {
+        return visit(DirectVelocity{*force, period_s});
+    }
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const auto build = [&](auto environment, auto solver_of) {
         using E = decltype(environment);

@@ -51,23 +51,40 @@ struct Certificate {
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
 };
 
-/// The inequalities of a scheme, whatever they say. Fields that the structure has no use for are ignored.
-[[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
-                                                             const DeviceProfile& device) {
+namespace detail {
+
+/// The inequalities of a structure behind a coupling, of a force of position.
+[[nodiscard]] inline std::vector<Inequality> inequalities_behind_a_coupling(const ForceBounds& bounds,
+                                                                            const Scheme& scheme,
+                                                                            const DeviceProfile& device) {
     switch (scheme.structure) {
-        case StructureKind::Direct:
-            return bounds.hysteresis ? hysteresis_inequalities(bounds, device)
-                                     : direct_inequalities(bounds, device);
         case StructureKind::Massless:
             return massless_inequalities(bounds, scheme.coupling, device);
         case StructureKind::Implicit:
             return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
         case StructureKind::EnergyConsistent:
             return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
-        case StructureKind::Explicit:
-            break;
+        default:
+            return explicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
     }
-    return explicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
+}
+
+}  // namespace detail
+
+/// The inequalities of a scheme, whatever they say. Fields that the structure has no use for are ignored.
+[[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
+                                                             const DeviceProfile& device) {
+    if (scheme.structure == StructureKind::Direct) {
+        return bounds.hysteresis   ? hysteresis_inequalities(bounds, device)
+               : bounds.drag > 0.0 ? velocity_inequalities(bounds, device)
+                                   : direct_inequalities(bounds, device);
+    }
+    std::vector<Inequality> lines = detail::inequalities_behind_a_coupling(bounds, scheme, device);
+    if (bounds.drag > 0.0) {
+        lines.push_back({"force of velocity behind a coupling", "B_v = 0", 0.0, bounds.drag, Basis::None,
+                         "docs/certificate.md"});
+    }
+    return lines;
 }
 
 namespace detail {

@@ -45,7 +45,8 @@ namespace detail {
                                             {"sliding", stored.sliding, now.sliding},
                                             {"loss_max", stored.loss.upper, now.loss.upper},
                                             {"loss_per_play", stored.loss_per_play, now.loss_per_play},
-                                            {"mean_force", stored.mean_force, now.mean_force}}) {
+                                            {"mean_force", stored.mean_force, now.mean_force},
+                                            {"drag", stored.drag, now.drag}}) {
         if (!(left >= right || agree(left, right))) {
             return sentence(name, left, "at least", right);
         }

@@ -52,23 +52,17 @@ namespace detail {
                                         bounds.mean_force, "(max(|g'| + |h'|) + 2 max h / r) Delta / 2")};
 }
 
-/// Bounds of a force f(x, v) of position and velocity.
-struct VelocityBounds {
-    double rising = 0.0;    ///< M = max(0, max df/dx) at v = 0
-    double steepest = 0.0;  ///< L = max |df/dx| at v = 0
-    double damping = 0.0;   ///< B_v = max |f(x, v) - f(x, 0)| / |v|
-    double position = 0.0;  ///< L_x = max |df/dx| over all v
-};
-
-/// A force of position and velocity rendered directly, the velocity a backward difference or a mean of several.
-[[nodiscard]] inline std::vector<Inequality> velocity_inequalities(const VelocityBounds& bounds,
+/// A force f(x, v) of position and velocity rendered directly, the velocity a backward difference or a mean of
+/// several: M and L are of f(., 0), L_x = max |df/dx| is over all v.
+[[nodiscard]] inline std::vector<Inequality> velocity_inequalities(const ForceBounds& bounds,
                                                                    const DeviceProfile& device) {
     const double T = device.longest_period_s();
     const double late = T / device.period_s;  // differences are taken over the nominal period
-    return {{"viscous damping against hold and delay", "b >= T M / 2 + n_d T L + B_v", device.viscous_damping,
-             T * (0.5 * bounds.rising + device.delay_samples * bounds.steepest) + late * bounds.damping,
+    return {{"viscous damping against hold and delay", "b >= T M / 2 + n_d T L + B_v T / period",
+             device.viscous_damping,
+             T * (0.5 * bounds.rising() + device.delay_samples * bounds.steepest) + late * bounds.drag,
              Basis::Proved, "docs/certificate.md"},
-            detail::friction_inequality(device, bounds.position + 2.0 * bounds.damping / device.period_s, 0.0,
+            detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.drag / device.period_s, 0.0,
                                         "L_x Delta / 2 + B_v Delta / T")};
 }
 

@@ -19,10 +19,11 @@ struct ForceBounds {
     bool hysteresis = false;
     Interval slope;              ///< of every path: f', or g' - |h'| to g' + |h'| + h/r
     double steepest = 0.0;       ///< L = max |f'|, or max(|g'| + |h'| + h/r)
-    double sliding = 0.0;        ///< max |f'|, or max(|g'| + |h'|)
+    double sliding = 0.0;        ///< max |f'|, or max(|g'| + |h'|); of all velocities
     Interval loss;               ///< h; 0 without hysteresis
     double loss_per_play = 0.0;  ///< max h/r
     double mean_force = 0.0;     ///< |mean| over a period; what is left of it makes a motor
+    double drag = 0.0;           ///< B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone
 
     /// M = max(0, max f'); NaN stays NaN
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
@@ -33,7 +34,7 @@ struct ForceBounds {
     [[nodiscard]] bool finite() const noexcept {
         return std::isfinite(slope.lower) && std::isfinite(slope.upper) && std::isfinite(steepest) &&
                std::isfinite(sliding) && std::isfinite(loss.lower) && std::isfinite(loss.upper) &&
-               std::isfinite(loss_per_play) && std::isfinite(mean_force);
+               std::isfinite(loss_per_play) && std::isfinite(mean_force) && std::isfinite(drag);
     }
 };
 
@@ -59,6 +60,8 @@ namespace detail {
 /// How much wider than the true range the bounds of a slope may be [of the steepest]: what they are wider by is
 /// stiffness that is not rendered.
 inline constexpr double slope_slack = 1e-4;
+/// The same of a force of two inputs, whose box takes many more cells.
+inline constexpr double velocity_slack = 1e-3;
 
 /// Proved bounds over [from, to] of a g' + b h' + c h, where h shares the wavelets of g.
 struct SlopeReading {
@@ -175,12 +178,30 @@ struct SlopeReading {
     return bounds;
 }
 
+/// Slopes at rest, continuations included, and over all velocities what drags and what an encoder step costs.
+[[nodiscard]] inline ForceBounds velocity_bounds(const VelocityNetwork& force) {
+    const RadialBounds rest = force.resting_bounds(velocity_slack);
+    const RadialBounds moving = force.moving_bounds(velocity_slack);
+    ForceBounds bounds;
+    bounds.slope = rest.gradient[0];
+    for (const EdgeLine& line : {force.below(), force.above()}) {
+        bounds.slope = bounds.slope.with(line_slopes(line));
+    }
+    bounds.steepest = bounds.slope.largest();
+    bounds.sliding = std::max(bounds.steepest, moving.gradient[0].largest());
+    bounds.drag = moving.gradient[1].largest();
+    return bounds;
+}
+
 }  // namespace detail
 
-/// The bounds of a model of one position; `play_radius` in place of the model's own where it is above 0.
-/// Throws std::invalid_argument for a model of several inputs.
+/// The bounds of a model of one position, or of position and velocity; `play_radius` in place of the model's own
+/// where it is above 0. Throws std::invalid_argument for other models of several inputs.
 [[nodiscard]] inline ForceBounds force_bounds(const ForceModel& model, double play_radius = 0.0) {
-    require_one_input(model.parameters());
+    require_renderable(model);
+    if (const VelocityNetwork* force = model.velocity()) {
+        return detail::velocity_bounds(*force);
+    }
     if (const WaveletNetwork* network = model.network()) {
         return detail::static_bounds(network->curve());
     }

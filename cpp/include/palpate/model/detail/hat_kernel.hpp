@@ -174,20 +174,124 @@ PALPATE_TARGET inline void radial(const RadialColumns& of, const double* x, doub
     value += total(values);
 }
 
+PALPATE_TARGET inline void multiply(Lanes& product, const double* column) noexcept {
+    Lanes factor;
+    load(factor, column);
+    product *= factor;
+}
+
+/// The sum over the wavelets of a product of columns.
+template <class... Columns>
+PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns) noexcept {
+    Lanes sum{};
+    for (std::size_t i = 0; i < size; i += PALPATE_LANES) {
+        Lanes product = Lanes{} + 1.0;
+        (multiply(product, columns + i), ...);
+        sum += product;
+    }
+    return total(sum);
+}
+
+/// Taylor's formula about the middle of a box. With A_n = w (d + n - r^2) E of each wavelet, psi = -A_0,
+/// D psi = A_2 u, D^2 psi = A_2 I - A_4 u u', and D^3 psi = A_6 u u u less A_4 u_j wherever the other two indices
+/// are equal. First all of a wavelet, then sums over the wavelets.
+PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* middle, const double* radius,
+                                     RadialExpansion& sums) noexcept {
+    const std::size_t n = of.size;
+    const std::size_t d = of.dimension;
+    const auto inputs = static_cast<double>(d);
+    double* const first = sums.room.data();  // A_2, A_4, A_6
+    double* const second = first + n;
+    double* const third = second + n;
+    double* const rest = third + n;
+    double* const offset = rest + n;        // input by input: u_j s_j, s = alpha times the radius
+    double* const spread = offset + d * n;  // s_j^2
+    double* const mixed = spread + d * n;   // d x d: sums of A_4 s_j^2 u_l s_l
+    const Lanes nothing{};
+    const Lanes reach = nothing + hat_reach;
+    Lanes values{};
+    for (std::size_t i = 0; i < n; i += PALPATE_LANES) {
+        Lanes square{};
+        Lanes least{};
+        Lanes whole{};
+        for (std::size_t j = 0; j < d; ++j) {
+            Lanes alpha, beta;
+            load(alpha, of.alpha + j * n + i);
+            load(beta, of.beta + j * n + i);
+            const Lanes scale = alpha * radius[j];
+            Lanes u = alpha * (middle[j] - beta);
+            u = u > reach ? reach : u;
+            u = u < -reach ? -reach : u;
+            Lanes near = (u < nothing ? -u : u) - scale;
+            near = near > nothing ? near : nothing;
+            square += u * u;
+            least += near * near;
+            const Lanes along = scale * scale;
+            whole += along;
+            u *= scale;
+            __builtin_memcpy(offset + j * n + i, &u, sizeof(u));
+            __builtin_memcpy(spread + j * n + i, &along, sizeof(along));
+        }
+        Lanes weight, uncancelled, e, beyond;
+        load(weight, of.weight + i);
+        load(uncancelled, of.uncancelled + i);
+        gaussian(square, e);
+        least *= 2.0 * fourth_derivative_decay;
+        gaussian(least, beyond);
+        e *= weight;
+        values += (square - inputs) * e;
+        const Lanes factors[] = {(inputs + 2.0 - square) * e, (inputs + 4.0 - square) * e,
+                                 (inputs + 6.0 - square) * e};
+        const Lanes left = uncancelled * (fourth_derivative_supremum(d) * beyond) * whole;
+        __builtin_memcpy(first + i, &factors[0], sizeof(left));
+        __builtin_memcpy(second + i, &factors[1], sizeof(left));
+        __builtin_memcpy(third + i, &factors[2], sizeof(left));
+        __builtin_memcpy(rest + i, &left, sizeof(left));
+    }
+    sums.value = total(values);
+    for (std::size_t j = 0; j < d; ++j) {
+        sums.gradient[j] = sum_of(n, first, offset + j * n);
+        sums.rest[j] = sum_of(n, rest, spread + j * n);
+        for (std::size_t l = 0; l < d; ++l) {
+            mixed[j * d + l] = sum_of(n, second, spread + j * n, offset + l * n);
+        }
+    }
+    for (std::size_t j = 0; j < d; ++j) {
+        for (std::size_t k = 0; k <= j; ++k) {
+            const double bend = (j == k ? sum_of(n, first, spread + j * n) : 0.0) -
+                                sum_of(n, second, offset + j * n, offset + k * n);
+            sums.bend[j * d + k] = bend;
+            sums.bend[k * d + j] = bend;
+            for (std::size_t l = 0; l <= k; ++l) {
+                const double twist = sum_of(n, third, offset + j * n, offset + k * n, offset + l * n) -
+                                     (j == k ? mixed[j * d + l] : 0.0) - (j == l ? mixed[j * d + k] : 0.0) -
+                                     (k == l ? mixed[k * d + j] : 0.0);
+                for (const std::size_t at : {(j * d + k) * d + l, (j * d + l) * d + k, (k * d + j) * d + l,
+                                             (k * d + l) * d + j, (l * d + j) * d + k, (l * d + k) * d + j}) {
+                    sums.twist[at] = twist;
+                }
+            }
+        }
+    }
+}
+
 /// e^{-s/2} for many s >= 0.
 PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
-    for (std::size_t k = 0; k < n; k += PALPATE_LANES) {
-        const std::size_t here = n - k < PALPATE_LANES ? n - k : PALPATE_LANES;
-        double padded[PALPATE_LANES] = {};
-        for (std::size_t j = 0; j < here; ++j) {
-            padded[j] = square[k + j];
-        }
-        Lanes s, result;
-        load(s, padded);
+    Lanes s, result;
+    std::size_t k = 0;
+    for (; k + PALPATE_LANES <= n; k += PALPATE_LANES) {
+        load(s, square + k);
         gaussian(s, result);
-        for (std::size_t j = 0; j < here; ++j) {
-            e[k + j] = result[j];
-        }
+        __builtin_memcpy(e + k, &result, sizeof(result));
+    }
+    double rest[PALPATE_LANES] = {};
+    for (std::size_t j = 0; k + j < n; ++j) {
+        rest[j] = square[k + j];
+    }
+    load(s, rest);
+    gaussian(s, result);
+    for (std::size_t j = 0; k + j < n; ++j) {
+        e[k + j] = result[j];
     }
 }
 
@@ -195,6 +299,7 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
     return {at,
             {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},
             radial,
+            expansion,
             gaussians};
 }
 

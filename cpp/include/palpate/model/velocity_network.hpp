@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/model/continuation.hpp"
+#include "palpate/model/parameters.hpp"
+#include "palpate/model/radial_bounds.hpp"
+#include "palpate/model/radial_network.hpp"
+
+namespace palpate {
+
+/// A force over position and velocity as it is rendered: the network N of eq. 4 within the box of its data,
+///
+///     f(x, v) = N(clip x, clip v) + s (x - clip x).
+///
+/// Outside the box it is kept from growing: the velocity counts no further than the data reach, and beyond an
+/// edge of the positions the force goes on with the slope s of the object at rest there, whatever the velocity.
+/// (The continuation of `RadialNetwork` bends: far outside no bound of its slopes holds.)
+class VelocityNetwork {
+  public:
+    VelocityNetwork(NetworkParameters network, Domain domain)
+        : network_{checked(std::move(network)), std::move(domain)} {
+        const RadialBounds rest = resting_bounds(0.01);
+        const CurveExtent extent{travel(), rest.value.largest(), std::max(0.0, rest.gradient[0].upper)};
+        below_ = continue_force(lower(), resting(lower()), -1.0, Continuation::Linear, extent);
+        above_ = continue_force(upper(), resting(upper()), +1.0, Continuation::Linear, extent);
+    }
+
+    [[nodiscard]] const RadialNetwork& network() const noexcept { return network_; }
+    [[nodiscard]] double lower() const noexcept { return network_.domain().lower[0]; }
+    [[nodiscard]] double upper() const noexcept { return network_.domain().upper[0]; }
+    [[nodiscard]] double travel() const noexcept { return upper() - lower(); }
+    /// How the force at rest goes on; the antiderivative is not in them.
+    [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
+    [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
+
+    [[nodiscard]] double force(double position, double velocity) const noexcept {
+        const double inside = std::clamp(position, lower(), upper());
+        const double slope = (position < inside ? below_ : above_).at_edge.slope;
+        return network_.value(std::array{inside, clipped(velocity)}) + slope * (position - inside);
+    }
+
+    [[nodiscard]] bool extrapolated(double position, double velocity) const noexcept {
+        return network_.extrapolated(std::array{position, velocity});
+    }
+
+    /// The narrowest width of a wavelet along the positions; the travel when there is none.
+    [[nodiscard]] double finest_width() const noexcept {
+        const std::vector<double>& alpha = network_.parameters().alpha;
+        double finest = travel();
+        for (std::size_t i = 0; i < alpha.size(); i += 2) {
+            finest = std::min(finest, 1.0 / alpha[i]);
+        }
+        return finest;
+    }
+
+    /// Proved bounds of N and its gradient over the box, within `relative` of their largest.
+    [[nodiscard]] RadialBounds moving_bounds(double relative) const {
+        return radial_bounds(network_.parameters(), network_.domain().lower, network_.domain().upper,
+                             relative);
+    }
+
+    /// The same along the line of positions at rest.
+    [[nodiscard]] RadialBounds resting_bounds(double relative) const {
+        const double rest = clipped(0.0);
+        return radial_bounds(network_.parameters(), std::array{lower(), rest}, std::array{upper(), rest},
+                             relative);
+    }
+
+  private:
+    static NetworkParameters checked(NetworkParameters network) {
+        detail::require(network.dimension == 2, "the network has " + std::to_string(network.dimension) +
+                                                    " inputs, must have 2: position and velocity");
+        return network;
+    }
+
+    [[nodiscard]] double clipped(double velocity) const noexcept {
+        return std::clamp(velocity, network_.domain().lower[1], network_.domain().upper[1]);
+    }
+
+    /// Value and slope at rest.
+    [[nodiscard]] Curve resting(double position) const noexcept {
+        std::array<double, 2> gradient{};
+        const double value = network_.at(std::array{position, clipped(0.0)}, gradient);
+        return {value, gradient[0], 0.0, 0.0};
+    }
+
+    RadialNetwork network_;
+    EdgeLine below_;
+    EdgeLine above_;
+};
+
+}  // namespace palpate
