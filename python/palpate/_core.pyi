@@ -656,7 +656,7 @@ def measure(device: str = 'simulated', *, object: ForceModel | None = None, tran
     
     A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;
     with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: until
-    Ctrl-C) without holding the interpreter; `progress(ticks, position, force)` is called ten times a
+    Ctrl-C) without holding the interpreter; `progress(ticks, position, force, lost)` is called ten times a
     second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows as record.part; with `keep` the summary, returned
     by name, holds the ticks. ValueError where it is refused before anything moves.
     """
