@@ -4,7 +4,8 @@
 python bench/identification.py [P1 ...] [--draws 7] [--json FILE] [--only NAME ...]
 
 With every noise draw all methods take their turn, so that what the machine did meanwhile happened to all of
-them; the slowest take part in the first draws only. "over ours" is a rival's fit and tuning over palpate's whole time, median of the draws.
+them; the slowest take part in the first draws only. "over ours" is a rival's fit and tuning over palpate's
+whole time, median of the draws.
 """
 
 from __future__ import annotations
