@@ -197,11 +197,12 @@ class Ladder:
         start = problem.solve(hysteresis.solution.basis)
         problem.set_prior(start.rss)
         solution = prune(problem, problem.solve(start.basis), self._options)
+        line = self._straight(rows)
+        if len(solution.basis) == 0:
+            return line
         n_parameters = problem.n_parameters(len(solution.basis))
-        name = "position" if len(solution.basis) else "linear"
-        return self._recorded(
-            self._constrained(Rung(name, rows, problem, solution, n_parameters, hysteresis.stop_reason))
-        )
+        rung = Rung("position", rows, problem, solution, n_parameters, hysteresis.stop_reason)
+        return self._better(line, self._recorded(self._constrained(rung)))
 
     def _better(self, below: Rung, above: Rung) -> Rung:
         """The upper rung if it earns its place, else the lower one; and a note on what it gains."""
