@@ -145,6 +145,8 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
         (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; there is EMU-1"),
         (["--device", "usb:"], [], "--device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
         ([], ["--somebody-elses"], "is 1209:0001 but not of this protocol"),
+        ([], ["--info-bytes", "31"], "its answer to GET_INFO has the wrong size"),
+        ([], ["--info-bytes", "33"], "its answer to GET_INFO has the wrong size"),
         ([], ["--denied"], "sudo palpate devices --install-udev-rule"),
         (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: choose --rate-hz 1000"),
         (["--force-limit", "6"], [], "--force-limit is 6, the device makes 5"),

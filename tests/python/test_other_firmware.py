@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices of other people's making: whatever the protocol leaves open is drawn by a seed, palpate works the same."""
+"""Devices of other people's making: whatever the protocol leaves open is drawn by a seed."""
 
 from __future__ import annotations
 
 import json
 import os
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,15 +29,18 @@ def other(seed: int, *words: Any) -> list[str]:
 
 
 @needs_program
-def test_it_is_found_by_its_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
-    listed = emulated(*PALPATE, "devices", "--json", device=other(seed))
-    (found,) = json.loads(listed.stdout)["devices"]
-    assert found["problem"] == ""
-    trace, record = tmp_path / "trace.csv", tmp_path / "felt.csv"
-    words = [PROGRAM, SPRING, "--device", f"usb:{found['serial']}", "--uncertified", *PATIENT]
-    run = [*words, "--wait-ms", 10_000, "--priority", 0, "--json", "--duration-s", 0.5, "--record", record]
-    answer = emulated(*run, device=other(seed, "--trace", trace))
+def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
+    trace, record, listed = (tmp_path / name for name in ("trace.csv", "felt.csv", "devices.json"))
+    control = shlex.join(map(str, [PROGRAM, SPRING, "--uncertified", *PATIENT, "--wait-ms", 10_000]))
+    script = f"""
+        {shlex.join(PALPATE)} devices --zero --json > '{listed}' &&
+        serial=$({sys.executable} -c 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])' \
+            < '{listed}') &&
+        {control} --device "usb:$serial" --priority 0 --json --duration-s 0.5 --record '{record}'
+    """
+    answer = emulated("sh", "-c", script, device=other(seed, "--trace", trace))
     assert answer.returncode == 0, answer.stderr
+    assert json.loads(listed.read_text(encoding="utf-8"))["devices"][0]["problem"] == ""
     summary = json.loads(answer.stdout)
     assert summary["ticks"] == summary["recorded"] == 500
     assert summary["lost_samples"] == summary["usb"]["malformed"] == summary["usb"]["late_echoes"] == 0
@@ -44,7 +48,7 @@ def test_it_is_found_by_its_serial_number_and_rendered_on(seed: int, tmp_path: P
     assert min(frame.torque for frame in felt) < -1e-3  # the spring was felt
     assert felt[-1].torque == 0.0
     assert not felt[-1].enabled
-    assert len(read_recording(record)) > 0
+    assert read_recording(record).force.max() > 1e-3
 
 
 def test_its_sign_and_mechanics_are_measured(seed: int) -> None:
@@ -53,6 +57,7 @@ def test_its_sign_and_mechanics_are_measured(seed: int) -> None:
     assert answer.returncode in (0, 1), answer.stderr  # this machine may be late
     told = json.loads(answer.stdout)
     findings = {one["name"]: one for one in told["findings"]}
-    assert findings["sign of the force"]["right"], answer.stdout
+    # A coarse encoder does not see such a push.
+    assert findings["sign of the force"]["right"] or told["encoder_step"] > 1e-3, answer.stdout
     assert told["delay_samples"] in (0, 1, 2, 3)
     assert findings["wire"]["right"]

@@ -106,6 +106,7 @@ def test_devices_lists_what_is_plugged_in() -> None:
     ("device", "sentence"),
     [
         (["--no-device"], "no haptic USB device is plugged in; --device simulated needs none"),
+        (["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),
         (["--somebody-elses"], "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
     ],
 )

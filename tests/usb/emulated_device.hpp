@@ -221,6 +221,7 @@ class EmulatedDevice {
         put(bytes, identity_.capabilities);
         bytes.insert(bytes.end(), {32, 16, 1, 0});
         put(bytes, identity_.uid);
+        bytes.resize(identity_.info_size);
         return bytes;
     }
 

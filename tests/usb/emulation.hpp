@@ -41,6 +41,7 @@ inline constexpr const char* options_text =
     "  --no-transducer        capabilities without bit 0\n"
     "  --no-velocity          capabilities without bit 1\n"
     "  --somebody-elses       another magic in GET_INFO\n"
+    "  --info-bytes SIZE      of the answer to GET_INFO [32]\n"
     "  --flipped              a torque that points the wrong way\n"
     "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
     "  --from-zero            counters begin at 0, and not close to where they wrap around\n"
@@ -89,6 +90,8 @@ inline constexpr const char* options_text =
             none = true;
         } else if (word == "--somebody-elses") {
             common.magic = 'X';
+        } else if (word == "--info-bytes") {
+            common.info_size = std::stoul(value());
         } else if (word == "--flipped") {
             common.flipped = true;
         } else if (word == "--takes-out-first") {

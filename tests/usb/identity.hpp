@@ -21,6 +21,7 @@ struct Identity {
     std::uint16_t watchdog_ms = 20;
     std::uint32_t capabilities = 3;  ///< bit 0 force transducer, bit 1 measured velocity
     std::uint64_t uid = 0x5041'4C50'0001ULL;
+    std::size_t info_size = 32;              ///< another one makes it a device of another protocol
     bool tells_watchdog_that_is_set = true;  ///< else the one that it starts with
 
     // Descriptors

@@ -105,8 +105,6 @@ TEST(UsbDevice, ForcesBeyondTheDeviceAreClippedAndNoNumbersAreZero) {
     EXPECT_EQ(state("torque_uNm"), 0.0);
 }
 
-// The device stops no run for one late command, but a certified one ends with the first.
-
 TEST(UsbDevice, ClosingLeavesZeroTorqueADisabledDeviceAndNothingInFlight) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());

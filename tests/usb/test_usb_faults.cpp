@@ -75,6 +75,7 @@ TEST(UsbDevice, ADeviceThatDoesNotAnswerIsATimeoutAndNoMore) {
     EXPECT_EQ(status, Status::Ok);
 }
 
+// A certified run ends with the first late command, so none may be late because an earlier one was.
 TEST(UsbDevice, ACommandThatMissesItsFrameDoesNotMakeAllThatFollowLate) {
     constexpr int rounds = 20;
     constexpr int commands = 40;
@@ -84,14 +85,19 @@ TEST(UsbDevice, ACommandThatMissesItsFrameDoesNotMakeAllThatFollowLate) {
     UsbDevice device{options};
     ASSERT_EQ(device.open().reason, "");
     int late = 0;
+    int in_time_again = 0;
     for (int round = 0; round < rounds; ++round) {  // the first is that of the stream's first command
         tell("fault busy 1");
+        int in_a_row = 0;
         for (int k = 0; k < commands; ++k) {
-            late += device.exchange({0.1}).status == Status::Timeout ? 1 : 0;
+            const bool in_time = device.exchange({0.1}).status != Status::Timeout;
+            late += in_time ? 0 : 1;
+            in_a_row = in_time ? in_a_row + 1 : 0;
         }
+        in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
     EXPECT_GE(late, rounds);
-    EXPECT_LT(late, rounds * commands / 4);  // a few more where this machine is late
+    EXPECT_GE(in_time_again, rounds / 2);  // all of them, where this machine is not late by itself
 }
 
 TEST(UsbDevice, SamplesLeftOutShowInTheSequence) {

@@ -87,10 +87,12 @@ class UsbDevice {
             return failed(Status::Fault);
         }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
-        if (!begins_anew()) {
+        // Nothing follows from a stream that has just begun; but a device may keep silent until it is spoken to.
+        const bool listened = begins_anew() && next_packet(monotonic_now() + 2 * open_->frame);
+        if (!listened) {
             answer(command.force, deadline);
         }
-        if (next_packet(deadline)) {
+        if (listened || next_packet(deadline)) {
             const Reading reading = judged(open_->stream.reading());
             open_->sound = sends_force(reading.status);
             return reading;

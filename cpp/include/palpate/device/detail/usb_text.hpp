@@ -37,6 +37,11 @@ namespace palpate::detail {
     }
 }
 
+/// An integer of two bytes, the least first.
+[[nodiscard]] inline std::uint16_t two_bytes(std::span<const std::uint8_t> bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] + 256U * bytes[at + 1]);
+}
+
 /// UTF-8 of one character.
 inline void append_utf8(std::string& text, std::uint32_t character) {
     const auto byte = [&](std::uint32_t bits) { text.push_back(static_cast<char>(bits)); };
@@ -64,7 +69,7 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
     std::string text;
     std::uint32_t high = 0;  // the first half of a pair
     for (std::size_t k = 0; k + 1 < bytes.size(); k += 2) {
-        const auto unit = static_cast<std::uint32_t>(bytes[k] | bytes[k + 1] << 8U);
+        const std::uint32_t unit = two_bytes(bytes, k);
         const bool is_low = unit >= 0xDC00 && unit < 0xE000;
         if (is_low != (high != 0)) {
             return "";
@@ -102,7 +107,7 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
     if (languages.size() < 4) {
         return "";
     }
-    const auto text = read(index, static_cast<std::uint16_t>(languages[2] | languages[3] << 8U));
+    const auto text = read(index, two_bytes(languages, 2));
     return text.size() < 2 ? "" : text_of_utf16(text.subspan(2));
 }
 
