@@ -4,7 +4,8 @@
 python bench/identification.py [P1 ...] [--draws 7] [--json FILE] [--only NAME ...]
 
 With every noise draw all methods take their turn, so that what the machine did meanwhile happened to all of
-them. "over ours" is a rival's fit and tuning over palpate's whole time, median of the draws.
+them; the slowest take part in the first draws only. "over ours" is a rival's fit and tuning over palpate's
+whole time, median of the draws.
 """
 
 from __future__ import annotations
@@ -26,6 +27,11 @@ from run import SCALE, count, leave
 
 OURS = METHODS[0].name
 
+SLOW = 5.0
+"""A rival that takes so many times as long as ours takes part in the first FEW draws only."""
+
+FEW = 3
+
 
 def skipped(method: Method, rows: Problem) -> str | None:
     """Why a method does not take part in a problem."""
@@ -46,6 +52,8 @@ def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str
             if (reason := reasons.get(method.name) or skipped(method, rows)) is not None:
                 reasons[method.name] = reason
                 continue
+            if _sits_out(found[method.name], found.get(OURS)):
+                continue
             try:
                 fitted = method.fit(rows.X, rows.y)
             except ImportError as missing:
@@ -60,10 +68,15 @@ def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str
     ]
 
 
+def _sits_out(theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None) -> bool:
+    """Whether a rival is so slow that its first draws have to do."""
+    return len(theirs) >= FEW and ours is not None and _medians(theirs, ours)["over_ours"] > SLOW
+
+
 def _medians(
     theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None
 ) -> dict[str, Any]:
-    over = [each.seconds / own.seconds for (_, each), (_, own) in zip(theirs, ours or theirs, strict=True)]
+    over = [each.seconds / own.seconds for (_, each), (_, own) in zip(theirs, ours or theirs, strict=False)]
     return {
         "nrmse": median(error for error, _ in theirs),
         "worst": max(error for error, _ in theirs),

@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forward orthogonal least squares is least squares, one wavelet at a time."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from palpate.identification.compression import Compressed, Compressor
 from palpate.identification.frame import truncated_frame
-from palpate.identification.selection import Library, OrthogonalSelection, select_forward
+from palpate.identification.selection import (
+    STRETCHES,
+    UNLIKE,
+    Library,
+    OrthogonalSelection,
+    orthogonal_gains,
+    select_forward,
+)
 from palpate.identification.separable import Basis, SeparableProblem, problem_of
 from palpate.identification.stopping import CRITERIA, ON_FRESH_ROWS, deviance
 
@@ -37,8 +46,8 @@ def test_gains_are_what_a_new_least_squares_would_gain(kind: str) -> None:
     problem = problem_of(rows, resolved_by=5)
     library = library_of(problem, rows)
     start = problem.solve(Basis(np.array([[6.0]]), np.array([[0.3]])))
-    selection = OrthogonalSelection(library, start)
-    gains = selection.gains()
+    gains = OrthogonalSelection(library, start).gains()
+    np.testing.assert_allclose(orthogonal_gains(library, start), gains, rtol=1e-5, atol=1e-7 * gains.max())
     for index in np.argsort(gains)[-5:]:
         added = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
         direct = start.rss - problem.solve(start.basis.joined(added)).rss
@@ -78,6 +87,32 @@ def test_selection_finds_the_wavelets_that_made_the_force() -> None:
     path = select_forward(problem, library, max_wavelets=2, criterion="bic")
     chosen = {(library.basis.alpha[i, 0], library.basis.beta[i, 0]) for i in path.order}
     assert chosen == {(16.0, 0.5), (8.0, 0.25)}
+
+
+def test_stretched_members_differ_from_a_member_in_one_dilation() -> None:
+    X = np.random.default_rng(1).uniform(size=(400, 2))
+    problem = problem_of(Compressor(X, X[:, 0], max_positions=1000).rows(), resolved_by=5)
+    round_ones = Library(
+        problem, Basis(np.array([[2.0, 2.0], [4.0, 4.0]]), np.array([[0.3, 0.5], [0.7, 0.2]]))
+    )
+    stretched = round_ones.stretched(problem, [1, 0]).basis
+    assert len(stretched) == 2 * (1 + 2 * len(STRETCHES))
+    for alpha, beta in zip(stretched.alpha, stretched.beta, strict=True):
+        own = int(np.flatnonzero((round_ones.basis.beta == beta).all(axis=1))[0])
+        changed = alpha != round_ones.basis.alpha[own]
+        assert changed.sum() <= 1
+        assert set(alpha[changed] / round_ones.basis.alpha[own][changed]) <= set(STRETCHES)
+
+
+def test_wavelets_that_are_tried_beside_each_other_are_unlike() -> None:
+    rows = rows_of("one force")
+    library = library_of(problem_of(rows, resolved_by=5), rows)
+    chosen = library.unlike(range(len(library)), 8)
+    assert len(chosen) == 8
+    for first, second in itertools.combinations(chosen, 2):
+        alpha, beta = library.basis.alpha[[first, second], 0], library.basis.beta[[first, second], 0]
+        apart = abs(beta[0] - beta[1]) * np.sqrt(alpha[0] * alpha[1])
+        assert max(apart, abs(np.log(alpha[0] / alpha[1]))) > UNLIKE
 
 
 @pytest.mark.parametrize("criterion", sorted(set(CRITERIA) - set(ON_FRESH_ROWS)))

@@ -20,12 +20,8 @@ from scipy.optimize import isotonic_regression, nnls
 from .. import _core
 from .._typing import Float1D, Float2D
 from .compression import Compressed
-from .separable import (
-    Basis,
-    SeparableProblem,
-    Solution,
-    factored,
-)
+from .gram import factored
+from .separable import Basis, SeparableProblem, Solution
 
 MARGIN = 1e-2
 """A bound is imposed tighter than it is certified by this share of the RMS error, so that certifying ends."""

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from .. import _core
 from .._typing import Float1D, Float2D
 from ..recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
+from .gram import solve_gram
 from .options import IdentifyOptions
-from .separable import TINY, Basis, solve_gram
+from .separable import TINY, Basis
 from .stopping import CRITERIA, ON_FRESH_ROWS
 
 PER_TIME_CONSTANT = 2.0

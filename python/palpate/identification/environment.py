@@ -207,11 +207,12 @@ def _with_dynamics(
     if not terms:
         return ladder, best, terms
     notes, path = ladder.notes, ladder.path
+    again = None
     for _ in range(DYNAMIC_ROUNDS):
         moving, known = dynamics.force_of(terms)
         weight = known if data.weight is None else known * data.weight
-        ladder, best = replace(data, force=data.force - moving, weight=weight).climbed(cells)
-        found = terms
+        ladder, best = replace(data, force=data.force - moving, weight=weight).climbed(cells, again)
+        again, found = ladder, terms
         terms = dynamics.terms(
             best.solution.basis, best.side, data.options, allowed=terms.names, settled=True
         )

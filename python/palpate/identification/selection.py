@@ -15,8 +15,9 @@ import numpy as np
 
 from .. import _core
 from .._typing import Float1D, Float2D
+from .gram import solve_gram
 from .refinement import COARSEST
-from .separable import Basis, SeparableProblem, Solution, solve_gram
+from .separable import Basis, SeparableProblem, Solution
 from .stopping import deviance
 
 DEPENDENT = 1e-7

@@ -14,17 +14,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotrs
-from scipy.spatial import cKDTree
 
 from .. import _core
 from .._typing import Float1D, Float2D
 from .compression import Compressed
 from .fresh import FreshRows
-
-RIDGE = 1e-11
-"""Relative ridge on unit-norm columns: keeps a nearly dependent basis solvable, far below any noise."""
+from .gram import solve_gram
+from .resolution import Resolution
 
 RESOLVED = 2.0**-16
 """Share of the force's range below which no error counts: one step of a 16-bit converter. What was rendered
@@ -143,9 +139,8 @@ class SeparableProblem:
         self.n_channels = sum(block.n_channels for block in blocks)
         self.force_range = force_range
         self.prior = 0.0
-        distinct = [np.unique(block.positions, axis=0) for block in blocks]
-        self._trees = [cKDTree(positions) for positions in distinct]
-        self.resolved_by = min(resolved_by, *(len(positions) for positions in distinct))
+        self._resolutions = [Resolution(block.positions) for block in blocks]
+        self.resolved_by = min(resolved_by, *map(len, self._resolutions))
 
     def n_parameters(self, n_wavelets: int) -> int:
         """Fitted numbers: d dilations, d translations and a weight a channel; a slope and bias a channel."""
@@ -181,8 +176,8 @@ class SeparableProblem:
 
     def finest(self, beta: Float2D) -> Float2D:
         """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
-        reach = [np.asarray(tree.query(beta, k=[self.resolved_by])[0])[:, 0] for tree in self._trees]
-        return np.asarray(CORE / np.maximum(np.max(reach, axis=0), 1e-9))[:, None]
+        reach = np.max([each.reach(beta, self.resolved_by) for each in self._resolutions], axis=0)
+        return np.asarray(CORE / np.maximum(reach, 1e-9))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
         """Weights, slopes and biases of all channels for this basis."""
@@ -293,29 +288,3 @@ def problem_of(rows: Compressed, *, resolved_by: int, fresh: FreshRows | None = 
         resolved_by=resolved_by,
         fresh=fresh,
     )
-
-
-def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve a positive semidefinite system by Cholesky on unit-norm columns."""
-    factor, norm = factored(gram)
-    columns = right.reshape(len(gram), -1) / norm[:, None]
-    solved, _ = dpotrs(factor, columns, lower=1)
-    return np.asarray(solved / norm[:, None]).reshape(right.shape)
-
-
-def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
-    """(L, norm) with gram = D L L' D, D = diag(norm); only the lower triangle of L counts.
-
-    The ridge is raised until the factorisation succeeds.
-    """
-    norm = np.sqrt(np.diag(gram))
-    norm = np.where(norm > 0.0, norm, 1.0)
-    scaled = gram / (norm[:, None] * norm)
-    diagonal = np.einsum("ii->i", scaled)
-    unit, ridge = diagonal.copy(), RIDGE
-    while True:
-        diagonal[:] = unit + ridge
-        factor, failed = dpotrf(scaled, lower=1)
-        if not failed:
-            return factor, norm
-        ridge *= 100.0

@@ -206,25 +206,28 @@ def _balanced(model: Model) -> Model:
 
 
 def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model:
-    """Slopes limited so that a stick has room, then as much of the loss h as the widest play can carry."""
+    """Slopes limited so that a stick has room, or less of the loss h, whichever loses less; else both."""
 
     def holds(candidate: Model) -> bool:
         scheme = _direct_scheme(candidate, device, wishes)
         return not _core.certify(candidate, scheme, device).refused
 
+    def as_much_loss_as_holds(candidate: Model) -> Model:
+        kept, refused = 0.0, 1.0
+        for _ in range(10):
+            share = 0.5 * (kept + refused)
+            kept, refused = (share, refused) if holds(scale_loss(candidate, share)) else (kept, share)
+        return scale_loss(candidate, max(kept, _LEAST_LOSS))
+
     radius = wishes.play_radius or model.play_radius
     if radius is None:
         radius = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
     stick = min(_core.force_bounds(model, radius).loss_per_play, steepest_stick(device))
-    low, high = renderable_slopes(device, stick)
-    limited = _within(model, low, high) or model
-    if holds(limited):
-        return limited
-    kept, refused = 0.0, 1.0
-    for _ in range(10):
-        share = 0.5 * (kept + refused)
-        kept, refused = (share, refused) if holds(scale_loss(limited, share)) else (kept, share)
-    return scale_loss(limited, max(kept, _LEAST_LOSS))
+    limited = _within(model, *renderable_slopes(device, stick)) or model
+    found = [limited if holds(limited) else as_much_loss_as_holds(limited)]
+    if limited is not model and holds(scale_loss(model, _LEAST_LOSS)):
+        found.append(as_much_loss_as_holds(model))
+    return min(found, key=lambda candidate: loss_between(model, candidate).rms)
 
 
 def _with_mass(structure: str, model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:

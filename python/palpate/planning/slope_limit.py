@@ -16,15 +16,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from .. import _core
 from .._core import ForceBounds
 from .._typing import Float1D, Float2D
-from ..identification.constraints import domain_bounds, impose, slope_limited
+from ..identification.constraints import domain_bounds, impose
 from ..identification.identified import Readings
 from ..identification.separable import Basis, Block, SeparableProblem
 from ..model import Model
+from .nearest_force import changes_needed
 
 _SAMPLES = 1001
 """Positions over the domain [-]"""
@@ -141,7 +141,7 @@ def _limited_once(model: Model, low: float, high: float, sigma: float, restoring
     """The model with the change fitted; None where its continuations would be steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
     strokes = _strokes(model, x)
-    changes = _changes(x, strokes, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
+    changes = changes_needed(x, strokes, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
     wanted = strokes + changes
     middle, travel = wanted.mean(axis=0), x[-1] - x[0]
     pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
@@ -192,62 +192,6 @@ def _fitted(
         return limited
     # What is imposed holds but for rounding, and h >= 0 is proved or not: raise it by that much.
     return changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
-
-
-def _changes(
-    x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: Model, restoring: bool
-) -> Float2D:
-    """What strokes (k, n) lack for their slopes to lie within limits, kinks rounded; zero elsewhere."""
-    n, step = len(x), x[1] - x[0]
-    margin = int(np.ceil(6.0 * sigma / step))
-    before = after = 0
-    if model.period is not None:
-        before = after = n - 1
-        wide = [np.concatenate([f[:-1] - f[-1] + f[0], f, f[1:] + f[-1] - f[0]]) for f in strokes]
-    else:
-        # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
-        before, after = (n if side == "free" else 0 for side in (model.below, model.above))
-        wide = [np.pad(force, (before, after)) for force in strokes]
-    grid = x[0] + step * (np.arange(len(wide[0])) - before)
-    nearest = np.array([slope_limited(grid, force, low, high) for force in wide])
-    if restoring and model.period is None:
-        rise, fall = high * (grid - x[0]), high * (grid - x[-1])
-        nearest = np.minimum(nearest, np.maximum(rise, 0.0) if model.below == "free" else rise)
-        nearest = np.maximum(nearest, np.minimum(fall, 0.0) if model.above == "free" else fall)
-    if len(strokes) == 2 and model.below == "free":
-        nearest = _begun_together(grid, nearest, before, margin // 2, high)
-    inside = slice(margin + before, margin + before + n)
-    changes = []
-    for force, limited in zip(strokes, nearest, strict=True):
-        extended = _extended(limited, margin)
-        smooth = gaussian_filter1d(extended, sigma / step, mode="nearest")[inside]
-        touched = np.abs(extended[inside] - force) > 1e-9 * np.ptp(force)
-        near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
-        changes.append(np.where(near, smooth - force, 0.0))
-    return np.array(changes)
-
-
-def _begun_together(grid: Float1D, strokes: Float2D, edge: int, kept: int, high: float) -> Float2D:
-    """Pressing (2, n) lowered to begin as releasing ends, if it would be too steep beyond the lower edge.
-
-    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Both are the
-    same for `kept` samples: as far as the rounding of kinks reaches.
-    """
-    press, release = strokes
-    together = edge + kept
-    g, h = 0.5 * (press[edge] + release[edge]), 0.5 * float((press - release)[edge : together + 1].max())
-    slope = 0.5 * (strokes[:, edge + 1] - strokes[:, edge]).sum() / (grid[1] - grid[0])
-    if g <= 0.0 or slope * (g + h) <= high * g:
-        return strokes
-    return np.array([np.minimum(press, release[together] + high * (grid - grid[together])), release])
-
-
-def _extended(force: Float1D, margin: int) -> Float1D:
-    """A force and its straight continuations."""
-    steps = np.arange(1, margin + 1)
-    before = force[0] - steps[::-1] * (force[1] - force[0])
-    after = force[-1] + steps * (force[-1] - force[-2])
-    return np.concatenate([before, force, after])
 
 
 def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:

@@ -14,10 +14,8 @@ PALPATE_TARGET inline void load(Lanes& lanes, const double* from) noexcept {
 }
 
 /// e^{-s/2} for 0 <= s <= hat_reach^2: 2^n e^r, n an integer, |r| <= ln 2 / 2, e^r a polynomial. Without
-/// branches; larger s are taken for hat_reach^2, NaN stays NaN.
-PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
-    const Lanes farthest = Lanes{} + hat_reach * hat_reach;
-    square = square > farthest ? farthest : square;
+/// branches; NaN stays NaN.
+PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexcept {
     const Lanes exponent = -0.5 * square;
     const Lanes rounded = exponent * 0x1.71547652b82fep+0 + 0x1.8p52;  // log2(e)
     const Lanes n = rounded - 0x1.8p52;
@@ -38,13 +36,20 @@ PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
     e = (low + (middle + high * r4) * r4) * power;
 }
 
+/// The same; larger s are taken for hat_reach^2.
+PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
+    const Lanes farthest = Lanes{} + hat_reach * hat_reach;
+    square = square > farthest ? farthest : square;
+    gaussian_within(square, e);
+}
+
 /// u within +-hat_reach, its square and e^{-u^2/2}.
 PALPATE_TARGET inline void gaussian(Lanes& u, Lanes& square, Lanes& e) noexcept {
     const Lanes reach = Lanes{} + hat_reach;
     u = u > reach ? reach : u;
     u = u < -reach ? -reach : u;
     square = u * u;
-    gaussian(square, e);
+    gaussian_within(square, e);
 }
 
 PALPATE_TARGET inline double total(const Lanes& lanes) noexcept {
@@ -92,12 +97,15 @@ PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, L
     for (std::size_t i = 0; i < of.count; ++i) {
         Lanes u = of.alpha[i] * (position - of.beta[i]);
         Lanes square, e;
-        gaussian(u, square, e);
         if constexpr (quantity == HatQuantity::Value) {
+            square = u * u;
+            gaussian(square, e);
             sum += of.weight[i] * ((square - 1.0) * e);
         } else if constexpr (quantity == HatQuantity::Slope) {
+            gaussian(u, square, e);
             sum += of.weight_by_width[i] * ((3.0 - square) * (u * e));
         } else {
+            gaussian(u, square, e);
             sum -= of.weight_width[i] * (u * e);
         }
     }
