@@ -67,6 +67,7 @@ INCLUDES = {
 # Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
 LEAF_HEADERS = {
     "device/detail/usb_connection.hpp",
+    "device/detail/usb_text.hpp",
     "device/detail/usb_transfers.hpp",
     "device/inverse3.hpp",
     "device/usb.hpp",

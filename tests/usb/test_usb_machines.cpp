@@ -91,7 +91,7 @@ TEST(UsbOtherFirmware, IsTheSameDevice) {
     EXPECT_EQ(device.health().stream.lost, before.stream.lost);
     EXPECT_EQ(device.health().stream.late_echoes, 0U);
     EXPECT_EQ(device.health().stream.watchdog_trips, 0U);
-    EXPECT_GE(device.health().stream.delay.count(), 200U);
+    EXPECT_GE(device.health().stream.delay.count(), 195U);         // the last ones may wait in the device
     EXPECT_LE(device.health().stream.delay.quantile(0.5), 2.1e6);  // two samples at most
     EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-3);
     EXPECT_NEAR(state("torque_uNm"), -0.25e6, 1e3);
