@@ -59,15 +59,17 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
     for (int k = 0; k < 4; ++k) {
         reading = device.exchange({force});
     }
-    const auto is_newest = [&] {
-        return static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("told"));
+    const auto is_settled = [&] {
+        const bool newest =
+            static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("told"));
+        return reading.status != Status::Lost && device.in_flight() <= 2 && newest;
     };
-    for (int k = 0; k < 1000 && reading.status != Status::Fault &&
-                    (reading.status == Status::Lost || device.in_flight() > 2 || !is_newest());
-         ++k) {
+    for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {
         std::this_thread::sleep_for(
             std::chrono::milliseconds{2});  // one is still on its way, and will be waiting
-        reading = device.exchange({force});
+        if (!is_settled()) {
+            reading = device.exchange({force});
+        }
     }
     return reading;
 }
