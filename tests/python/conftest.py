@@ -2,12 +2,17 @@
 """Where measured data is found, and small files to read."""
 
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
+
+# A shell that starts the tests in the background lets them ignore Ctrl-C, and they what they start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def measured_data() -> Path | None:
