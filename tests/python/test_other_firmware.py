@@ -38,7 +38,7 @@ def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_
     control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *PATIENT, "--wait-ms", 10_000]))
     script = f"""
         {shlex.join(PALPATE)} devices --zero --json > '{listed}' &&
-        serial=$({sys.executable} -c 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])' \
+        serial=$({shlex.quote(sys.executable)} -c 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])' \
             < '{listed}') &&
         {control} --device "usb:$serial" --priority 0 --json --duration-s 0.5 --record '{record}'
     """
