@@ -36,10 +36,10 @@ def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
     control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *PATIENT, "--wait-ms", 10_000]))
+    name = [sys.executable, "-c", 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])']
     script = f"""
         {shlex.join(PALPATE)} devices --zero --json > '{listed}' &&
-        serial=$({shlex.quote(sys.executable)} -c 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])' \
-            < '{listed}') &&
+        serial=$({shlex.join(name)} < '{listed}') &&
         {control} --device "usb:$serial" --priority 0 --json --duration-s 0.5 --record '{record}'
     """
     answer = emulated("sh", "-c", script, device=other(seed, "--trace", trace))
