@@ -17,7 +17,7 @@ asan | tsan)
     sample=(test_realtime test_wire test_usb_device)
     export PALPATE_TEST_SCALE=$(((scale + 9) / 10))
     ;;
-release) sample=(test_bounds test_compiled_network test_resolvent) ;;
+release) sample=(test_compiled_network) ;;
 esac
 # The thread sanitizer of older compilers cannot cope with the address randomization of newer kernels.
 if [ "$preset" = tsan ] && setarch "$(uname -m)" --addr-no-randomize true 2>/dev/null; then

@@ -24,8 +24,9 @@ import sys, sysconfig
 with open(sysconfig.get_path("purelib") + "/dependencies.pth", "w") as file:
     file.write(sys.argv[1] + "\n")
 PYTHON
+# The compiled module is the one of the editable installation: the same options, so that nothing is compiled twice.
 .venv/bin/python -m pip --python "$place/venv/bin/python" install --quiet --no-deps --ignore-installed \
-    --config-settings "build-dir=$PWD/$place/wheel" .
+    --no-build-isolation --config-settings cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON .
 cd "$place"
 venv/bin/python -c '
 import importlib.metadata, palpate, palpate._core
