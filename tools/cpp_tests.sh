@@ -3,8 +3,7 @@
 # Builds and runs the C++ tests of one preset: tools/cpp_tests.sh dev|release|asan|tsan
 #
 # The sanitizers slow a program ten times and get a tenth of the cases. Below a test scale of 10 the presets of the
-# long run take a sample of the tests only, to see that they have not rotted: threads, foreign bytes and USB under the
-# sanitizers, numbers with all optimization.
+# long run take a sample of the tests only, to see that they have not rotted: threads and USB under the sanitizers, numbers with all optimization.
 set -euo pipefail
 
 preset=$1
@@ -14,7 +13,7 @@ with=()
 
 case $preset in
 asan | tsan)
-    sample=(test_realtime test_wire test_usb_device)
+    sample=(test_realtime test_usb_device)
     export PALPATE_TEST_SCALE=$(((scale + 9) / 10))
     ;;
 release) sample=(test_compiled_network) ;;

@@ -30,7 +30,7 @@ MODEL = ROOT / "bench" / "click_and_wall.json"
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) >= 100
 SWEEP_S = 2.0
-DURATION_S = 30.0 if LONG else 6.0
+DURATION_S = 30.0 if LONG else 4.0
 UNPLUGGED_AT = 500
 SLOW_FROM = 2000
 DIRECT = "--uncertified --structure direct"
