@@ -76,9 +76,8 @@ demo: $(stamps)/core
 test: lint test-cpp | setup
 	$(MAKE) --no-print-directory test-python
 
-# One process more than cores: some tests wait for a clock.
 test-python: setup control
-	$(python) -m pytest --numprocesses $$(( CMAKE_BUILD_PARALLEL_LEVEL + 1 )) --dist loadfile
+	$(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile
 
 # The real-time program; the build tool knows what is up to date.
 control: $(stamps)/develop

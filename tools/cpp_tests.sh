@@ -3,7 +3,8 @@
 # Builds and runs the C++ tests of one preset: tools/cpp_tests.sh dev|release|asan|tsan
 #
 # The sanitizers slow a program ten times and get a tenth of the cases. Below a test scale of 10 the presets of the
-# long run take a sample of the tests only, to see that they have not rotted: threads and USB under the sanitizers, numbers with all optimization.
+# long run take a sample of the tests only, to see that they have not rotted: threads and USB under the sanitizers,
+# numbers with all optimization.
 set -euo pipefail
 
 preset=$1

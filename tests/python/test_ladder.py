@@ -246,3 +246,17 @@ def test_named_inputs_decide_the_rung() -> None:
 def test_a_bad_option_is_refused_by_name_and_value(options: dict[str, object], told: str) -> None:
     with pytest.raises(InputError, match=told):
         IdentifyOptions(**options)  # type: ignore[arg-type]
+
+
+def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() -> None:
+    """As a recording whose time has a gap every few rows."""
+    x = np.linspace(0.0, 1.0, 600)
+    force = 2.0 * x + np.random.default_rng(5).normal(0.0, 1e-3, len(x))
+    starts = [0, *range(70, len(x), 3)]
+    network = fit_environment(x[:, None], force, starts=starts)
+    assert network.rung == "linear"
+    assert any(note.startswith("hysteresis was not tried: the motions") for note in network.notes)
+    with pytest.raises(InputError, match="inputs names hysteresis, but the motions"):
+        fit_environment(
+            x[:, None], force, starts=starts, options=IdentifyOptions(inputs=("position", "hysteresis"))
+        )

@@ -117,10 +117,15 @@ class Ladder:
             return best
         if self._side is not None:
             return self._hysteresis(best, HysteresisInput.of_strokes(self._side))
-        if self._play is not None:
-            return self._play.with_first_states(
-                self._hysteresis(best, self._play.best_tried(best.solution.basis))
-            )
+        if self._play is None:
+            return best
+        strokes = self._play.best_tried(best.solution.basis)
+        if strokes is not None:
+            return self._play.with_first_states(self._hysteresis(best, strokes))
+        short = "the motions between gaps of time are too short to tell hysteresis"
+        if "hysteresis" in self._options.inputs:
+            raise InputError(f"inputs names hysteresis, but {short}")
+        self.notes.append(f"hysteresis was not tried: {short}")
         return best
 
     def _constant(self, rows: Compressed) -> Rung:

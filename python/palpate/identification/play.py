@@ -33,11 +33,14 @@ class PlaySearch:
     def __init__(self, evidence: Evidence, starts: Sequence[int], options: IdentifyOptions) -> None:
         self._evidence, self._starts, self._options = evidence, list(starts), options
 
-    def best_tried(self, basis: Basis) -> HysteresisInput:
-        """The hysteresis input of that radius of the options which helps most on given wavelets."""
+    def best_tried(self, basis: Basis) -> HysteresisInput | None:
+        """The hysteresis input of that radius of the options which helps most on given wavelets.
+
+        None where the motions between gaps of time are too short for any of them.
+        """
         tried = [self._of(radius) for radius in self._options.play_radius]
-        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN] or tried
-        return min(judged, key=lambda strokes: self._left_by(strokes, basis))
+        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN]
+        return min(judged, key=lambda strokes: self._left_by(strokes, basis), default=None)
 
     def with_first_states(self, rung: Rung) -> Rung:
         """The rung with each motion's play begun where its first force says."""
