@@ -74,9 +74,9 @@ EVALUATIONS = {
 
 BOUNDS = {
     "slope_bound": "one input",
-    "slope_bound_cancelling": "one input, weights of 10⁶ that cancel",
+    "slope_bound_cancelling": "one input, weights cancel",
     "gradient_bound_two_inputs": "two inputs",
-    "gradient_bound_two_inputs_cancelling": "two inputs, weights of 10⁶ that cancel",
+    "gradient_bound_two_inputs_cancelling": "two inputs, weights cancel",
 }
 
 
