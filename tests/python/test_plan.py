@@ -22,6 +22,19 @@ WEAK = DeviceProfile(id="weak knob", viscous_damping=0.003, coulomb_friction=0.0
 SMOOTH = DeviceProfile(id="smooth knob", encoder_step=0.0)
 
 
+def slide(viscous_damping: float) -> DeviceProfile:
+    """For key switches."""
+    return DeviceProfile(
+        id="slide",
+        position_unit="m",
+        inertia=0.05,
+        viscous_damping=viscous_damping,
+        coulomb_friction=0.2,
+        encoder_step=1e-6,
+        force_limit=20.0,
+    )
+
+
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -113,15 +126,7 @@ def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
 def test_a_switch_that_is_too_steep_where_contact_begins_is_left_alone_behind_it() -> None:
     """Both strokes begin there with one force: h, dying out beyond the edge, would be too steep."""
     model = keyswitch_by_hand(beta=[[0.0]], weight=[0.3], bias=0.33, bias_hysteresis=0.02)
-    weak = DeviceProfile(
-        id="weak slide",
-        position_unit="m",
-        inertia=0.05,
-        viscous_damping=0.35,
-        coulomb_friction=0.2,
-        encoder_step=1e-6,
-        force_limit=20.0,
-    )
+    weak = slide(viscous_damping=0.35)
     chosen = plan(model, weak)
     assert chosen.certificate is not None
     assert chosen.certificate.certified
@@ -140,16 +145,7 @@ def test_a_switch_that_is_too_steep_where_contact_begins_is_left_alone_behind_it
 
 
 def test_press_and_release_are_rendered_with_a_play_that_is_proved() -> None:
-    slide = DeviceProfile(
-        id="slide",
-        position_unit="m",
-        inertia=0.05,
-        viscous_damping=6.0,
-        coulomb_friction=0.2,
-        encoder_step=1e-6,
-        force_limit=20.0,
-    )
-    chosen = plan(keyswitch_by_hand(), slide)
+    chosen = plan(keyswitch_by_hand(), slide(viscous_damping=6.0))
     assert chosen.structure == "direct"
     assert chosen.certificate is not None
     assert chosen.certificate.certified

@@ -11,12 +11,11 @@ from pathlib import Path
 import click
 
 from .._core import __version__
-from ..devices import DeviceError
 from ..errors import InputError
 from .arguments import PATH
 from .device_options import device_options
 from .ending import FAILED
-from .live_line import LiveLine
+from .live_line import live_line
 from .output import number, print_json, print_numbers, require_writable, talk
 from .verb import Verb
 
@@ -83,8 +82,7 @@ def check_device(
             raise InputError("--push moves the handle; at no terminal it needs --yes")
         click.confirm("The handle will be pushed a little to either side. Is it free?", abort=True, err=True)
     talk(f"checking {device} for {number(duration_s)} s; move the handle, and hold it still for a second")
-    line = LiveLine(rate_hz, ("rad", "Nm"))
-    try:
+    with live_line(rate_hz, ("rad", "Nm")) as line:
         found = check(
             device,
             object=mounted,
@@ -97,10 +95,6 @@ def check_device(
             wait_s=None if wait_ms is None else 1e-3 * wait_ms,
             progress=line.show,
         )
-    except DeviceError as error:
-        raise InputError(str(error)) from None
-    finally:
-        line.end()
     if as_json:
         print_json(
             {

@@ -6,10 +6,26 @@ from __future__ import annotations
 import math
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import click
 
+from ..devices import DeviceError
+from ..errors import InputError
 from .output import number
+
+
+@contextmanager
+def live_line(rate_hz: float, units: tuple[str, str]) -> Iterator[LiveLine]:
+    """A `LiveLine` while a device is at work; what the device refuses is an InputError of one sentence."""
+    line = LiveLine(rate_hz, units)
+    try:
+        yield line
+    except DeviceError as error:
+        raise InputError(str(error)) from None
+    finally:
+        line.end()
 
 
 class LiveLine:

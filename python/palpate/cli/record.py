@@ -8,12 +8,11 @@ from typing import Any
 
 import click
 
-from ..devices import DeviceError
 from ..errors import InputError
 from .arguments import PATH, json_option
 from .device_options import device_options
 from .ending import WorkError, terminated_as_interrupted
-from .live_line import LiveLine
+from .live_line import live_line
 from .output import number, print_json, print_numbers, require_writable, talk
 from .verb import Verb
 
@@ -77,26 +76,20 @@ def record(
     units = ("rad", "Nm") if mounted is None else (mounted.units["position"], mounted.units["force"])
     who = "the device moves the handle" if probe else "move the handle over the whole object, slowly"
     talk(f"{device}: recording to {recording} for {number(duration_s)} s; {who}; Ctrl-C ends it")
-    line = LiveLine(rate_hz, units)
-    try:
-        with terminated_as_interrupted():
-            summary = record_object(
-                recording,
-                device=device,
-                object=mounted,
-                transducer=transducer,
-                probe=probe,
-                duration_s=duration_s,
-                rate_hz=rate_hz,
-                wait_s=None if wait_ms is None else 1e-3 * wait_ms,
-                lowest_rate_share=lowest_rate_share,
-                progress=line.show,
-                **sweep,
-            )
-    except DeviceError as error:
-        raise InputError(str(error)) from None
-    finally:
-        line.end()
+    with live_line(rate_hz, units) as line, terminated_as_interrupted():
+        summary = record_object(
+            recording,
+            device=device,
+            object=mounted,
+            transducer=transducer,
+            probe=probe,
+            duration_s=duration_s,
+            rate_hz=rate_hz,
+            wait_s=None if wait_ms is None else 1e-3 * wait_ms,
+            lowest_rate_share=lowest_rate_share,
+            progress=line.show,
+            **sweep,
+        )
     for note in summary["notes"]:
         talk(f"  {note}")
     if not summary["orderly"]:

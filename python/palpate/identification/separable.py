@@ -81,8 +81,7 @@ class Block:
             columns[0] = channel
             np.multiply(self.positions.T, channel, out=columns[1:first])
             np.multiply(wavelets.T, channel, out=columns[first:])
-        # Not -1: a block may have no rows.
-        return design.reshape(self.n_channels * (first + n), len(wavelets)).T
+        return design.reshape(-1, len(wavelets)).T
 
 
 @dataclass(frozen=True)
