@@ -105,6 +105,42 @@ def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None
     assert any(note.startswith("velocity taken as an input") for note in model.notes["identification"])
 
 
+def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float = 2e-3) -> Recording:
+    """A spring that something draws over 0.3 rad and lets back, time by time at one of the speeds."""
+    path = np.cumsum(np.repeat(speeds, [round(300 / speed) for speed in speeds])) * 1e-3
+    x = 0.3 * np.abs((path / 0.3 + 1.0) % 2.0 - 1.0)
+    time = 1e-3 * np.arange(len(x))
+    force = 3.0 * x + damping * np.gradient(x, time)
+    force = force + np.random.default_rng(seed).normal(0.0, noise, len(x))
+    return Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=time)
+
+
+def test_one_speed_tells_no_damping_from_hysteresis_but_two_do() -> None:
+    """v is then its sign, and a loop of constant height as likely friction."""
+    for seed in range(1 if SCALE == 1 else 20):
+        one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
+        assert (one.kind, one.damping) == ("hysteresis", None)
+        told = [note for note in one.notes["identification"] if note.startswith("velocity was not tried")]
+        assert len(told) == 1
+        assert "does not tell damping from hysteresis" in told[0]
+        two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45, 0.15, 0.15, 0.45, 0.45], damping=0.06))
+        assert two.kind == "position"
+        assert two.damping == pytest.approx(0.06, rel=0.05)
+
+
+def test_what_is_taken_gains_more_on_fresh_rows_than_its_standard_error() -> None:
+    """Of a spring alone the criterion has something more to say now and then: what the draw's noise holds."""
+    time = 1e-3 * np.arange(3000)
+    for seed in range(4):
+        x = 0.3 * (1.0 - np.abs((2.0 * time / (2.0 + 0.3 * seed)) % 2.0 - 1.0))
+        force = 3.0 * x + np.random.default_rng(seed).normal(0.0, 2e-3, len(x))
+        model = identify(Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=time))
+        taken = [note.split() for note in model.notes["identification"] if " taken: " in note]
+        gains = [(float(words[-4]), float(words[-2])) for words in taken]
+        assert gains
+        assert all(gain > error for gain, error in gains)
+
+
 def test_a_negative_damping_is_refused() -> None:
     model = identify(moved(2, damping=-0.03))
     assert model.damping is None

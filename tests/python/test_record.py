@@ -89,8 +89,9 @@ def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: P
     assert "the friction of the device is in it" in recording.metadata["force"]
     assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
     # The motor holds the handle's damping too: 0.018 N*m at this speed, of 0.72 N*m between the ends.
-    # To and fro at one speed tells nothing of velocity.
-    model = identify(recording, inputs="position")
+    model = identify(recording)
+    assert "velocity" not in model.inputs  # to and fro at one speed tells nothing of it
+    assert model.damping is None
     assert stiffness(model) == pytest.approx(STIFFNESS, rel=2 * 0.018 / 0.72)
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.2
     assert frames(trace)[-1].torque == 0.0

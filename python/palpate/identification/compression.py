@@ -24,6 +24,9 @@ SIDE_LEVELS = 16
 POOLED_CELLS = 4
 """Neighbouring cells that share one slope (2 per input where there are several)."""
 
+SIDE_PARTS = 8
+"""Parts of the travel in each of which the force's slope over the hysteresis input is taken to be one."""
+
 LEAST_PER_AXIS = 8
 """Cells along each input below which gathering says too little of a force; rows are left out instead."""
 
@@ -116,14 +119,24 @@ class Compressor:
         x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
         y = _mean(group, count, weight * self._force)
         dy = self._force - y[group]
-        within = self._within + float(dy @ (weight * dy))
-        spread = np.zeros_like(x)
+        spread, merged_side = np.zeros_like(x), None
+        ds = np.zeros_like(dy)
+        if side is not None:
+            merged_side = _mean(group, count, weight * side)
+            ds = side - merged_side[group]
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
-            within -= self._explained_by_slopes(dx, dy)
-        merged_side = None if side is None else _mean(group, count, weight * side)
-        return Compressed(x, y, count, merged_side, spread, max(within, 0.0), float(weight.sum()))
+            # All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same
+            # few degrees of freedom.
+            block = self._pooled()
+            dy = _without_slopes(dy, dx, block, weight)
+            ds = _without_slopes(ds, dx, block, weight) if ds.any() else ds
+        if ds.any():
+            part, _ = _ranked(self._key * SIDE_PARTS // (int(self._key.max()) + 1), weight)
+            dy = _without_slopes(dy, ds[:, None], part, weight)
+        within = self._within + float(dy @ (weight * dy))
+        return Compressed(x, y, count, merged_side, spread, within, float(weight.sum()))
 
     def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
         """The same cells with fewer rows."""
@@ -134,21 +147,13 @@ class Compressor:
         part._within = self._within * float(part._weight.sum() / self._weight.sum())
         return part
 
-    def _explained_by_slopes(self, dx: Float2D, dy: Float1D) -> float:
-        """Part of the within-sum that slopes across the cells explain, from deviations within the groups.
-
-        All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same few
-        degrees of freedom.
-        """
-        d = dx.shape[1]
+    def _pooled(self) -> NDArray[np.int64]:
+        """(rows,) the block of neighbouring cells that a row's cell belongs to."""
+        d = self._positions.shape[1]
         grid = (self._per_axis,) * d
         together = max(2, round(POOLED_CELLS ** (1.0 / d)))
         pooled = np.array(np.unravel_index(self._key, grid)) // together
-        block, _ = _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)
-        products = [[np.bincount(block, self._weight * a * b) for b in (*dx.T, dy)] for a in dx.T]
-        table = np.array(products).transpose(2, 0, 1)
-        slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
-        return float(np.sum(slope * table[:, :, d]))
+        return _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)[0]
 
 
 def binning_error(rows: Compressed, curvature: Float2D) -> float:
@@ -158,6 +163,15 @@ def binning_error(rows: Compressed, curvature: Float2D) -> float:
     """
     bias = 0.5 * np.sum(curvature * rows.spread, axis=1)
     return float(np.sqrt(np.average(bias * bias, weights=rows.weight)))
+
+
+def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], weight: Float1D) -> Float1D:
+    """Values (n,) less what one slope over each column of (n, d) explains of them in every block (n,)."""
+    d = over.shape[1]
+    products = [[np.bincount(block, weight * a * b) for b in (*over.T, values)] for a in over.T]
+    table = np.array(products).transpose(2, 0, 1)
+    slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
+    return np.asarray(values - np.einsum("nj,nj->n", slope[block], over))
 
 
 def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], int]:

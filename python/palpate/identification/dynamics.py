@@ -17,25 +17,24 @@ from numpy.typing import NDArray
 from .. import _core
 from .._typing import Float1D, Float2D
 from ..recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
+from .folded_regression import FOLDS, NAMES, FoldedRegression
 from .gram import solve_gram
 from .options import IdentifyOptions
-from .separable import TINY, Basis
-from .stopping import CRITERIA, ON_FRESH_ROWS
+from .separable import RESOLVED, TINY, Basis
+from .stopping import ON_FRESH_ROWS
 
 PER_TIME_CONSTANT = 2.0
 """Samples kept of a filtered column in each time constant of L."""
 
-FOLDS = 10
-"""Stretches of the recording that are fresh in turn."""
-
 LEAST_SAMPLES = 40.0
 """Independent samples below which nothing is said about velocity or mass."""
 
+LEAST_SPREAD = 0.19
+"""Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
+v is hardly more than its sign, and damping no other than friction."""
+
 MOST_ROWS = 20_000
 """Rows that are enough to see what a residual depends on."""
-
-NAMES = ("damping", "mass")
-"""What multiplies the columns v and a."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +115,13 @@ class Dynamics:
         regression = self._regression(basis, side)
         if regression is None:
             return Terms(None, None, side is not None, ())
+        notes = []
+        if not settled and "damping" in allowed and (spread := self._spread_of_speeds()) < LEAST_SPREAD:
+            notes.append(
+                f"velocity was not tried: along the way the speed differs by {100 * spread:.2g} %, and what "
+                "moves at one speed does not tell damping from hysteresis; move slowly and fast"
+            )
+            allowed = tuple(name for name in allowed if name != "damping")
         choices = [
             (use, names)
             for use in ((False, True) if side is not None else (False,))
@@ -132,7 +138,6 @@ class Dynamics:
         use, names = min(valued, key=lambda choice: valued[choice])
         if settled:
             return Terms(*_values(regression.solved(use, names), names), use, ())
-        notes = []
         for name in allowed:
             with_it = tuple(other for other in allowed if other in names or other == name)
             without = tuple(other for other in with_it if other != name)
@@ -183,7 +188,13 @@ class Dynamics:
         product = columns.T @ r
         return float(product @ solve_gram(columns.T @ columns, product) / max(float(r @ r), TINY))
 
-    def _regression(self, basis: Basis, side: Float1D | None) -> "_Regression | None":
+    def _spread_of_speeds(self) -> float:
+        """Standard deviation of |v| over its mean, both along the way: rests and turns hardly count there."""
+        speed = np.abs(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
+        first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
+        return float(np.sqrt(max(third * first / second**2 - 1.0, 0.0)))
+
+    def _regression(self, basis: Basis, side: Float1D | None) -> FoldedRegression | None:
         tables, folds = [], []
         rows = sum(len(fixed) for fixed in self._fixed)
         done = 0
@@ -204,7 +215,11 @@ class Dynamics:
         independent = rows * self._step / self._correlation_time()
         if independent < LEAST_SAMPLES + 2 * len(basis):
             return None
-        return _Regression(np.concatenate(tables), np.concatenate(folds), independent, side is not None)
+        forces = np.concatenate([part.force for part in self._parts])
+        least = (RESOLVED * float(np.ptp(forces))) ** 2
+        return FoldedRegression(
+            np.concatenate(tables), np.concatenate(folds), independent, side is not None, least
+        )
 
     def _filtered(self, part: Piece, columns: Float2D) -> Float2D:
         margin = self._low_pass.margin(part.period)
@@ -225,67 +240,8 @@ class Dynamics:
         return float(np.sum(correlation**2) / correlation[0] ** 2)
 
 
-class _Regression:
-    """Least squares of a filtered force on filtered columns, any choice of them, fold by fold."""
-
-    def __init__(self, table: Float2D, folds: Float1D, independent: float, two_sided: bool) -> None:
-        self._independent = independent
-        self._grams = np.array([table[folds == fold].T @ table[folds == fold] for fold in range(FOLDS)])
-        self._rows = np.bincount(folds.astype(np.int64), minlength=FOLDS)
-        n_static = table.shape[1] - 3
-        self._single = n_static // 2 if two_sided else n_static
-        self._n_static = n_static
-
-    def value(self, two_sided: bool, names: Sequence[str], criterion: str) -> float:
-        """Criterion of the regression on these columns."""
-        columns = self._columns(two_sided, names)
-        gram = self._grams.sum(axis=0)
-        rss = _rss(gram, columns, self._solution(gram, columns))
-        share = max(rss / self._rows.sum(), TINY)
-        p = min(len(columns), int(self._independent) - 2)
-        return self._independent * float(np.log(share)) + CRITERIA[criterion](self._independent, p)
-
-    def solved(self, two_sided: bool, names: Sequence[str]) -> list[float]:
-        """The coefficients of these names."""
-        columns = self._columns(two_sided, names)
-        return [float(value) for value in self._solution(self._grams.sum(axis=0), columns)[: len(names)]]
-
-    def fresh_gain(
-        self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
-    ) -> tuple[float, float]:
-        """Fall of the squared error in folds that were left out of the fit, as a share, and its error."""
-        errors = np.array(
-            [
-                [self._left_out(fold, self._columns(two_sided, names)) for fold in range(FOLDS)]
-                for names in (without, with_it)
-            ]
-        )
-        before, after = errors.mean(axis=1)
-        scatter = errors[1] - after / before * errors[0]
-        return float(1.0 - after / before), float(scatter.std(ddof=1) / before / np.sqrt(FOLDS))
-
-    def _left_out(self, fold: int, columns: list[int]) -> float:
-        kept = self._grams.sum(axis=0) - self._grams[fold]
-        return _rss(self._grams[fold], columns, self._solution(kept, columns))
-
-    def _columns(self, two_sided: bool, names: Sequence[str]) -> list[int]:
-        """Columns of the table: target, v, a, then those of f (and of s)."""
-        static = self._n_static if two_sided else self._single
-        return [1 + NAMES.index(name) for name in names] + list(range(3, 3 + static))
-
-    @staticmethod
-    def _solution(gram: Float2D, columns: list[int]) -> Float1D:
-        return solve_gram(gram[np.ix_(columns, columns)], gram[columns, 0])
-
-
 def _moving(part: Piece) -> tuple[Float1D, Float1D, Float1D]:
     return part.force, part.velocity, part.acceleration
-
-
-def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
-    """Residual sum of squares of a solution on the rows of a Gram matrix whose column 0 is the target."""
-    quadratic = solution @ gram[np.ix_(columns, columns)] @ solution
-    return max(float(gram[0, 0] - 2.0 * solution @ gram[columns, 0] + quadratic), 0.0)
 
 
 def _values(found: Sequence[float], names: Sequence[str]) -> tuple[float | None, float | None]:

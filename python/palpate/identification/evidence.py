@@ -16,7 +16,10 @@ from .options import IdentifyOptions
 from .rung import Rung
 from .selection import Library
 from .separable import Basis, SeparableProblem, problem_of
-from .stopping import ON_FRESH_ROWS
+from .stopping import ON_FRESH_ROWS, enough, standard_error
+
+LEAST_FRESH = 20
+"""Fresh rows below which they are too few to refuse a rung."""
 
 
 class Evidence:
@@ -76,7 +79,28 @@ class Evidence:
         rows = self._fresh if known is None else self._fresh & known
         return FreshRows.of(self.box, self.force, None if strokes is None else strokes.side, rows)
 
-    def fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
+    def earned(self, below: Rung, above: Rung) -> tuple[bool, str]:
+        """Whether the upper rung earns its place, and what it gains in words."""
+        options, name = self._options, self._options.criterion
+        if enough(name, below.criterion(options)):
+            return False, f"{below.name} is already closer than a hand can tell"
+        falls = below.criterion(options) - above.criterion(options)
+        changes = f"{name} {'falls' if falls > 0 else 'rises'} by {abs(falls):.4g}"
+        fresh = self.fresh_rows(above.strokes)
+        evidence = options.rung_evidence
+        if name in ON_FRESH_ROWS:
+            evidence = max(evidence, standard_error(len(fresh.force)))
+        if falls < evidence:
+            return False, f"{changes}, it has to fall by {evidence:.4g} or more"
+        share, error = self._fresh_gain(below, above)
+        way = "falls" if share > 0.0 else "rises"
+        by = f"{_percent(abs(share), 4)} +- {_percent(error, 2)} %"
+        measured = f"the squared error on fresh rows {way} by {by}"
+        if share <= error and len(fresh.force) >= LEAST_FRESH:
+            return False, f"{changes}, but {measured}"
+        return True, f"{changes}, {measured}"
+
+    def _fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
         """Fall of the squared error on fresh rows as a share, and its standard error."""
         errors = []
         known = None if above.strokes is None else above.strokes.known
@@ -98,3 +122,7 @@ class Evidence:
         problem = self.problem(rows, strokes)
         library = Library(problem, resolved_frame(problem, options))
         return problem, grow(problem, library, start, name, options, single=self._single)
+
+
+def _percent(share: float, digits: int) -> str:
+    return f"{100 * share:.{digits}g}" if share < 1.0 else f"{100 * share:.0f}"

@@ -23,7 +23,6 @@ from .options import IdentifyOptions
 from .play import PlaySearch
 from .rung import Rung
 from .separable import Basis, SeparableProblem, Solution
-from .stopping import ON_FRESH_ROWS, enough, standard_error
 
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
@@ -31,8 +30,11 @@ WORTH_REGROWING = 1.01
 GAINS_ENERGY = 2.0
 """Ratio of the RMS errors with and without h >= 0 above which the loop is run through the wrong way."""
 
-LEAST_FRESH = 20
-"""Fresh rows below which they are too few to refuse a rung."""
+FIRST_SIZE = 8
+"""Wavelets with hysteresis until the play radius is sought again."""
+
+RADIUS_ROUNDS = 6
+"""Times that it is sought at most."""
 
 
 class Ladder:
@@ -155,9 +157,14 @@ class Ladder:
         )
 
     def _grown(
-        self, rows: Compressed, strokes: HysteresisInput | None, name: str, start: Basis
+        self,
+        rows: Compressed,
+        strokes: HysteresisInput | None,
+        name: str,
+        start: Basis,
+        options: IdentifyOptions | None = None,
     ) -> tuple[SeparableProblem, Grown]:
-        problem, grown = self._evidence.grown(rows, strokes, name, start, self._options)
+        problem, grown = self._evidence.grown(rows, strokes, name, start, options or self._options)
         self.path.extend(grown.path)
         return problem, grown
 
@@ -173,22 +180,45 @@ class Ladder:
         first = problem.solve(below.solution.basis)
         free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
         if named or free.criterion(options) < below.criterion(options):
-            start = self._grown_before.get("hysteresis", first.basis)
-            problem, grown = self._grown(rows, strokes, "hysteresis", start)
-            self._grown_before["hysteresis"] = grown.solution.basis
-            free = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
-        if not named and self._better(below, free) is below:
-            return below
+            free = self._grown_hysteresis(below, free, named=named)
+        if not named and not self._evidence.earned(below, free)[0]:
+            return self._better(below, free)
         kept = self._constrained(free)
-        if named or kept is free:
+        if named:
             return kept
-        best = self._better(self._single_valued(kept) if len(below.solution.basis) else below, kept)
+        single = kept is not free and len(below.solution.basis) > 0
+        best = self._better(self._single_valued(kept) if single else below, kept)
         if best.name != "hysteresis" and kept.rmse > GAINS_ENERGY * free.rmse:
             self.notes.append(
                 "press and release differ, but the loop would gain energy; if position or force is turned, "
                 "give --negate position or --negate force"
             )
         return best
+
+    def _grown_hysteresis(self, below: Rung, rung: Rung, *, named: bool) -> Rung:
+        """A network with hysteresis; the play radius is found once it is sure that there is hysteresis.
+
+        Wavelets grown at a wrong radius model what is wrong with it, and a radius found on few wavelets makes
+        up for those that are missing: it is sought again whenever the network may be twice as large.
+        """
+        assert rung.strokes is not None
+        strokes, most = rung.strokes, self._options.max_wavelets
+        basis = self._grown_before.get(rung.name, rung.solution.basis)
+        complete = False
+        for _ in range(RADIUS_ROUNDS):
+            before = strokes
+            if self._play and (named or self._evidence.earned(below, rung)[0]):
+                strokes = self._play.nearer(strokes, basis)
+            if complete and strokes is before:
+                break
+            rows = self._evidence.rows(strokes)
+            limit = min(most, max(FIRST_SIZE, 2 * len(basis))) if self._play else most
+            options = replace(self._options, max_wavelets=limit)
+            problem, grown = self._grown(rows, strokes, rung.name, basis, options)
+            basis = self._grown_before[rung.name] = grown.solution.basis
+            rung = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
+            complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
+        return rung
 
     def _single_valued(self, hysteresis: Rung) -> Rung:
         """A force of position alone on the wavelets of a hysteresis rung, those it does not need removed.
@@ -211,33 +241,9 @@ class Ladder:
 
     def _better(self, below: Rung, above: Rung) -> Rung:
         """The upper rung if it earns its place, else the lower one; and a note on what it gains."""
-        options, name = self._options, self._options.criterion
-        if enough(name, below.criterion(options)):
-            self.notes.append(f"{above.name} refused: {below.name} is already closer than a hand can tell")
-            return below
-        falls = below.criterion(options) - above.criterion(options)
-        changes = f"falls by {falls:.4g}" if falls > 0 else f"rises by {-falls:.4g}"
-        fresh = self._evidence.fresh_rows(above.strokes)
-        evidence = options.rung_evidence
-        if name in ON_FRESH_ROWS:
-            evidence = max(evidence, standard_error(len(fresh.force)))
-        if falls < evidence:
-            self.notes.append(
-                f"{above.name} refused: {name} {changes}, it has to fall by {evidence:.4g} or more"
-            )
-            return below
-        share, error = self._evidence.fresh_gain(below, above)
-        if share <= 0.0 and len(fresh.force) >= LEAST_FRESH:
-            self.notes.append(
-                f"{above.name} refused: {name} {changes}, but the squared error on fresh rows rises by "
-                f"{-100 * share:.3g} %"
-            )
-            return below
-        self.notes.append(
-            f"{above.name} taken: {name} {changes}, the squared error on fresh rows falls by "
-            f"{100 * share:.4g} +- {100 * error:.2g} %"
-        )
-        return above
+        earned, why = self._evidence.earned(below, above)
+        self.notes.append(f"{above.name} {'taken' if earned else 'refused'}: {why}")
+        return above if earned else below
 
     def _constrained(self, rung: Rung) -> Rung:
         """The rung with its constraints, their price in the notes.

@@ -86,7 +86,8 @@ class IdentifyOptions:
     coupling_stiffness: float | None = None
     """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
-    """Play radii tried for hysteresis where a file does not tell directions [share of the travel]"""
+    """Play radii tried for hysteresis where a file does not tell directions; where it is there, the best
+    one between the least and the largest is found [share of the travel]"""
     contact_share: float = 0.02
     """Where |f(lower)| is below this share of the force's range the object is left there: "free" below [-]"""
     period: float | None = None

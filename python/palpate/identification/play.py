@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from .evidence import Evidence
 from .hysteresis_input import HysteresisInput
@@ -16,6 +18,12 @@ from .separable import Basis
 
 LEAST_KNOWN = 0.5
 """Share of the rows whose hysteresis input must be known, for a play radius to be considered."""
+
+NEAR = 1e-3
+"""Share of itself to which a play radius is found."""
+
+WITHIN = 2.0
+"""Ratio to the radius that helped most so far within which a better one is sought."""
 
 
 class PlaySearch:
@@ -41,6 +49,27 @@ class PlaySearch:
         tried = [self._of(radius) for radius in self._options.play_radius]
         judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN]
         return min(judged, key=lambda strokes: self._left_by(strokes, basis), default=None)
+
+    def nearer(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
+        """The hysteresis input of the radius around the one tried that helps most on given wavelets.
+
+        The same one, if another would not be worth to be told apart.
+
+        For hysteresis that is known to be there: a radius that may be anything also passes for what else
+        differs between press and release, such as damping.
+        """
+        tried, radius = self._options.play_radius, strokes.play_radius or min(self._options.play_radius)
+        lower, upper = max(radius / WITHIN, min(tried)), min(radius * WITHIN, max(tried))
+        if lower >= upper:
+            return strokes
+        found = minimize_scalar(
+            lambda log_radius: self._left_by(self._of(math.exp(log_radius)), basis),
+            bounds=(math.log(lower), math.log(upper)),
+            method="bounded",
+            options={"xatol": NEAR},
+        )
+        falls = math.log(self._left_by(strokes, basis) / found.fun) * len(strokes.known)
+        return self._of(math.exp(found.x)) if falls > self._options.rung_evidence else strokes
 
     def with_first_states(self, rung: Rung) -> Rung:
         """The rung with each motion's play begun where its first force says."""
