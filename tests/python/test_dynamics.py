@@ -128,19 +128,6 @@ def test_one_speed_tells_no_damping_from_hysteresis_but_two_do() -> None:
         assert two.damping == pytest.approx(0.06, rel=0.05)
 
 
-def test_what_is_taken_gains_more_on_fresh_rows_than_its_standard_error() -> None:
-    """Of a spring alone the criterion has something more to say now and then: what the draw's noise holds."""
-    time = 1e-3 * np.arange(3000)
-    for seed in range(4):
-        x = 0.3 * (1.0 - np.abs((2.0 * time / (2.0 + 0.3 * seed)) % 2.0 - 1.0))
-        force = 3.0 * x + np.random.default_rng(seed).normal(0.0, 2e-3, len(x))
-        model = identify(Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=time))
-        taken = [note.split() for note in model.notes["identification"] if " taken: " in note]
-        gains = [(float(words[-4]), float(words[-2])) for words in taken]
-        assert gains
-        assert all(gain > error for gain, error in gains)
-
-
 def test_a_negative_damping_is_refused() -> None:
     model = identify(moved(2, damping=-0.03))
     assert model.damping is None

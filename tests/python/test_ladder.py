@@ -8,6 +8,7 @@ import pytest
 
 from palpate import InputError, _core
 from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification.evidence import Evidence
 
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) > 1
 DRAWS = 100 if LONG else 40
@@ -127,6 +128,31 @@ def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -
     force = force + network.linear[0] * between + network.bias
     assert np.abs(force - 0.3 * between).max() < 0.05
     assert any(note.startswith("hysteresis: h >= 0 imposed") for note in network.notes)
+
+
+def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> None:
+    """Where a motion begins its hysteresis input is unknown: luck with the noise there is no gain."""
+    for draw in range(20 if not LONG else 200):
+        time = np.arange(3000) / (2000.0 + 30.0 * draw)
+        x = 1.0 - np.abs((2.0 * time) % 2.0 - 1.0)
+        noise = np.random.default_rng(draw).normal(0.0, 0.01, len(x))
+        network = fit_environment(x[:, None], 3.0 * x + noise, starts=[0])
+        (told,) = (note for note in network.notes if note.startswith("hysteresis"))
+        assert told.startswith("hysteresis refused: bic rises by ")
+
+
+@pytest.mark.parametrize(("gain", "rung"), [(0.01, "constant"), (0.03, "position")])
+def test_a_gain_on_fresh_rows_below_its_standard_error_earns_nothing(
+    gain: float, rung: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Evidence, "_fresh_gain", lambda *rungs: (gain, 0.02))
+    x = np.linspace(0.0, 1.0, 400)
+    y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
+    network = fit_environment(x[:, None], y)
+    assert network.rung == rung
+    verdict = "taken" if rung == "position" else "refused"
+    assert all(note.split()[1] == f"{verdict}:" for note in network.notes)
+    assert all(note.endswith(f"falls by {100 * gain:g} +- 2 %") for note in network.notes)
 
 
 def test_play_radius_is_found_from_the_motion_when_no_direction_is_given() -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,7 +86,7 @@ class Evidence:
         options, name = self._options, self._options.criterion
         if enough(name, below.criterion(options)):
             return False, f"{below.name} is already closer than a hand can tell"
-        falls = below.criterion(options) - above.criterion(options)
+        falls = self.fall(below, above)
         changes = f"{name} {'falls' if falls > 0 else 'rises'} by {abs(falls):.4g}"
         fresh = self.fresh_rows(above.strokes)
         evidence = options.rung_evidence
@@ -99,6 +101,21 @@ class Evidence:
         if share <= error and len(fresh.force) >= LEAST_FRESH:
             return False, f"{changes}, but {measured}"
         return True, f"{changes}, {measured}"
+
+    def fall(self, below: Rung, above: Rung) -> float:
+        """Fall of the criterion from one rung to another, on the rows whose hysteresis input is known.
+
+        What noise left in the other rows, by luck, is as much as a rung has to gain.
+        """
+        options, strokes = self._options, above.strokes
+        if strokes is not None and not strokes.known.all() and not self._judges_on_fresh:
+            rows = self._compressor.rows(below.side, strokes.known).standing_for(above.rows.samples)
+            problem = self.problem(rows)
+            solution = problem.with_coefficients(
+                problem.solve(below.solution.basis), below.solution.coefficients
+            )
+            below = replace(below, problem=problem, solution=solution)
+        return below.criterion(options) - above.criterion(options)
 
     def _fresh_gain(self, below: Rung, above: Rung) -> tuple[float, float]:
         """Fall of the squared error on fresh rows as a share, and its standard error."""

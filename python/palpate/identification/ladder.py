@@ -179,7 +179,7 @@ class Ladder:
         problem = self._evidence.problem(rows, strokes)
         first = problem.solve(below.solution.basis)
         free = _hysteresis_rung(strokes, rows, problem, first, options.criterion)
-        if named or free.criterion(options) < below.criterion(options):
+        if named or self._evidence.fall(below, free) > 0.0:
             free = self._grown_hysteresis(below, free, named=named)
         if not named and not self._evidence.earned(below, free)[0]:
             return self._better(below, free)

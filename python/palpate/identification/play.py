@@ -6,8 +6,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from .evidence import Evidence
@@ -46,29 +48,31 @@ class PlaySearch:
 
         None where the motions between gaps of time are too short for any of them.
         """
-        tried = [self._of(radius) for radius in self._options.play_radius]
-        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN]
-        return min(judged, key=lambda strokes: self._left_by(strokes, basis), default=None)
+        if not self._judged:
+            return None
+        known = self._judged[-1].known
+        return min(self._judged, key=lambda strokes: self._left_by(strokes, basis, known))
 
     def nearer(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
         """The hysteresis input of the radius around the one tried that helps most on given wavelets.
 
-        The same one, if another would not be worth to be told apart.
-
-        For hysteresis that is known to be there: a radius that may be anything also passes for what else
-        differs between press and release, such as damping.
+        The same one, if no other is better by as much as a rung has to be. For hysteresis that is known to
+        be there: a radius that may be anything also passes for what else differs between press and release,
+        such as damping.
         """
-        tried, radius = self._options.play_radius, strokes.play_radius or min(self._options.play_radius)
-        lower, upper = max(radius / WITHIN, min(tried)), min(radius * WITHIN, max(tried))
+        radius = strokes.play_radius or 0.0
+        least, most = (each.play_radius or 0.0 for each in (self._judged[0], self._judged[-1]))
+        lower, upper = max(radius / WITHIN, least), min(radius * WITHIN, most)
         if lower >= upper:
             return strokes
+        known = self._of(upper).known
         found = minimize_scalar(
-            lambda log_radius: self._left_by(self._of(math.exp(log_radius)), basis),
+            lambda log_radius: self._left_by(self._of(math.exp(log_radius)), basis, known),
             bounds=(math.log(lower), math.log(upper)),
             method="bounded",
             options={"xatol": NEAR},
         )
-        falls = math.log(self._left_by(strokes, basis) / found.fun) * len(strokes.known)
+        falls = math.log(self._left_by(strokes, basis, known) / found.fun) * len(strokes.known)
         return self._of(math.exp(found.x)) if falls > self._options.rung_evidence else strokes
 
     def with_first_states(self, rung: Rung) -> Rung:
@@ -84,7 +88,17 @@ class PlaySearch:
         motions = np.split(self._evidence.box[:, 0], self._starts[1:])
         return HysteresisInput.of_play(motions, radius, first)
 
-    def _left_by(self, strokes: HysteresisInput, basis: Basis) -> float:
-        """Sum of squares that the best weights on given wavelets leave."""
+    @cached_property
+    def _judged(self) -> list[HysteresisInput]:
+        """The plays of the radii tried for which enough rows are known, the smallest first."""
+        tried = [self._of(radius) for radius in sorted(self._options.play_radius)]
+        return [one for one in tried if one.known.mean() >= LEAST_KNOWN]
+
+    def _left_by(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
+        """Sum of squares that the best weights on given wavelets leave in these rows, for all radii the same.
+
+        What noise left in some row and not in another, by luck, is no reason to prefer a radius.
+        """
+        strokes = replace(strokes, known=known)
         problem = self._evidence.problem(self._evidence.rows(strokes), strokes)
         return problem.total(problem.solve(basis).rss)
