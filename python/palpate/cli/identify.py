@@ -108,6 +108,8 @@ def identify(
         result["baselines"] = as_records(others)
     rows = sum(len(recording) for recording in judged_on)
     judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
+    if hold_out_every is None and options["loss"] == "huber":
+        judged += ", those far from the others weighed down"
     with finishing():
         if plot is not None:
             picture_verification(plot, model, verified, recordings)

@@ -33,6 +33,8 @@ LEAST_SPREAD = 0.19
 """Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
 v is hardly more than its sign, and damping no other than friction."""
 
+TOO_SHORT = "velocity and mass were not tried: the motion between gaps of time is too short, or too noisy"
+
 MOST_ROWS = 20_000
 """Rows that are enough to see what a residual depends on."""
 
@@ -114,7 +116,7 @@ class Dynamics:
         """
         regression = self._regression(basis, side)
         if regression is None:
-            return Terms(None, None, side is not None, ())
+            return Terms(None, None, side is not None, (TOO_SHORT,))
         notes = []
         if not settled and "damping" in allowed and (spread := self._spread_of_speeds()) < LEAST_SPREAD:
             notes.append(
@@ -150,12 +152,17 @@ class Dynamics:
                 continue
             share, error = regression.fresh_gain(use, without, with_it)
             found = dict(zip(with_it, regression.solved(use, with_it), strict=True))[name]
-            fresh = f"the squared error on fresh stretches falls by {100 * share:.3g} +- {100 * error:.2g} %"
-            if share <= error or found <= 0.0:
-                names = tuple(other for other in names if other != name)
-                notes.append(f"{name} refused: {changes}, but it would be {found:.4g}, and {fresh}")
-            else:
+            way = "falls" if share > 0.0 else "rises"
+            fresh = (
+                f"the squared error on fresh stretches {way} by {100 * abs(share):.3g} +- {100 * error:.2g} %"
+            )
+            if share > error and found > 0.0:
                 notes.append(f"{name} taken: {changes}, {fresh}")
+                continue
+            names = tuple(other for other in names if other != name)
+            notes.append(
+                f"{name} refused: {changes}, but {fresh if found > 0.0 else f'it would be {found:.4g}'}"
+            )
         return Terms(*_values(regression.solved(use, names), names), use, tuple(notes))
 
     def force_of(self, terms: Terms) -> tuple[Float1D, Float1D]:

@@ -47,7 +47,9 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     kept = [rows for _, rows in found]
     columns = [X[rows] for X, rows in found]
     lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
-    notes = (f"{lost} rows at the ends and at gaps of time have no velocity",) if lost else ()
+    notes: tuple[str, ...] = (
+        (f"{lost} rows at the ends and at gaps of time have no velocity",) if lost else ()
+    )
     side, starts = None, None
     if all(part.direction is not None for part in recordings):
         sides = [np.asarray(part.direction, dtype=float) for part in recordings]
@@ -62,6 +64,8 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
         )
     if side is None and all(part.time is not None for part in recordings):
         starts = _starts(recordings, kept)
+    elif side is None and any(part.direction is not None or part.time is not None for part in recordings):
+        notes += ("hysteresis was not tried: every recording has to have a direction, or every one time",)
     if options.filters == "matched":
         forces = [part.force for part in recordings]
     else:

@@ -186,8 +186,13 @@ class Ladder:
         kept = self._constrained(free)
         if named:
             return kept
-        single = kept is not free and len(below.solution.basis) > 0
-        best = self._better(self._single_valued(kept) if single else below, kept)
+        single = self._single_valued(kept) if kept is not free and len(below.solution.basis) else below
+        best = self._better(single, kept)
+        left, of = len(best.solution.basis), len(below.solution.basis)
+        if best is single and left < of:
+            self.notes.append(
+                f"{left} of the {of} wavelets over position are left: the others were of the loop"
+            )
         if best.name != "hysteresis" and kept.rmse > GAINS_ENERGY * free.rmse:
             self.notes.append(
                 "press and release differ, but the loop would gain energy; if position or force is turned, "
@@ -237,7 +242,8 @@ class Ladder:
             return line
         n_parameters = problem.n_parameters(len(solution.basis))
         rung = Rung("position", rows, problem, solution, n_parameters, hysteresis.stop_reason)
-        return self._better(line, self._recorded(self._constrained(rung)))
+        rung = self._recorded(self._constrained(rung))
+        return rung if self._evidence.earned(line, rung)[0] else line
 
     def _better(self, below: Rung, above: Rung) -> Rung:
         """The upper rung if it earns its place, else the lower one; and a note on what it gains."""
