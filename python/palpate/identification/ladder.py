@@ -122,10 +122,10 @@ class Ladder:
         strokes = self._play.best_tried(best.solution.basis)
         if strokes is not None:
             return self._play.with_first_states(self._hysteresis(best, strokes))
-        short = "the motions between gaps of time are too short to tell hysteresis"
+        untold = "the motions between gaps of time are too short to tell it, or never turn back"
         if "hysteresis" in self._options.inputs:
-            raise InputError(f"inputs names hysteresis, but {short}")
-        self.notes.append(f"hysteresis was not tried: {short}")
+            raise InputError(f"inputs names hysteresis, but {untold}")
+        self.notes.append(f"hysteresis was not tried: {untold}")
         return best
 
     def _constant(self, rows: Compressed) -> Rung:
