@@ -23,6 +23,9 @@ from .verb import Verb
 _PAGE = "identification.md"
 _OURS = "palpate"
 
+LIMIT = 1.3
+"""Files whose error is more than this many times that of their splines are counted."""
+
 Row = Mapping[str, Any]
 
 
@@ -73,25 +76,35 @@ def _measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
         good = [row for row in files if "nrmse" in row]
         if not good:
             continue
-        ratios = [row["nrmse"] / row["splines"]["nrmse"] for row in good if row["splines"]["nrmse"] > 0]
-        told.append(_set_row(f"{name} ({len(good)} files), palpate", good, f"{max(ratios):.2f}"))
+        worst = _worst(good, "splines"), _worst(good, "passive_splines")
+        told.append(_set_row(f"{name} ({len(good)} files), palpate", good, worst))
         for baseline in dict.fromkeys(key for row in good for key in row["baselines"]):
             theirs = [row["baselines"][baseline] for row in good if baseline in row["baselines"]]
             finite = [each for each in theirs if each["nrmse"] is not None and math.isfinite(each["nrmse"])]
+            of = "" if len(finite) == len(good) else f" ({len(finite)} files)"
             if finite:
-                told.append(_set_row(f"{name}, {baseline}", finite, ""))
-    return markdown_table(
-        ("recordings, method", "NRMSE", "parameters", "s a file", "worst file over its splines"), told
-    )
+                told.append(_set_row(f"{name}, {baseline}{of}", finite, ("", "")))
+    over = "worst file over its splines", "over splines with h >= 0"
+    return markdown_table(("recordings, method", "NRMSE", "parameters", "s a file", *over), told)
 
 
-def _set_row(name: str, each: Sequence[Row], worst: str) -> tuple[str, ...]:
+def _worst(files: Sequence[Row], splines: str) -> str:
+    """The largest ratio of a model's error and its splines', and how many are above the limit, if any."""
+    pairs = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
+    ratios = [own / theirs for own, theirs in pairs if theirs is not None and theirs > 0]
+    if not ratios:
+        return ""
+    over = sum(ratio > LIMIT for ratio in ratios)
+    return f"{max(ratios):.2f}" + (f" ({over} above {LIMIT:g})" if over else "")
+
+
+def _set_row(name: str, each: Sequence[Row], worst: tuple[str, str]) -> tuple[str, ...]:
     return (
         name,
         f"{median(row['nrmse'] for row in each):.4f}",
         f"{median(row['n_parameters'] for row in each):.0f}",
         number(median(row["seconds"] for row in each)),
-        worst,
+        *worst,
     )
 
 
