@@ -20,6 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from crossing import Crossing
 from run import SCALE, count, leave
 
 import palpate
@@ -44,14 +45,17 @@ class Set:
     options: Mapping[str, Any] = field(default_factory=dict)
     folder: str = ""
     """Where it is not the set's name"""
-    force_late_s: float = 0.0
-    """How late the force was recorded: a row's force belongs to the position that much earlier"""
+    beside: bool = True
+    """Whether baselines are told beside it; not where they are those of another set"""
 
 
 SETS = {
     "keyswitches": Set(),
     "rubber_domes": Set(),
-    "rubber_domes_force_25_ms_earlier": Set(folder="rubber_domes", force_late_s=0.025),
+    "rubber_domes_h_of_any_sign": Set(
+        options={"hysteresis_nonnegative": False}, folder="rubber_domes", beside=False
+    ),
+    "rubber_domes_force_25_ms_earlier": Set(reading={"force_late_s": 0.025}, folder="rubber_domes"),
     "switch_springs": Set(),
     "motor_cogging": Set("map_*.csv"),
     "organ_probing": Set(
@@ -85,8 +89,16 @@ def ours(
     check = palpate.verify(model, recording)
     held_out = np.arange(len(recording)) % EVERY == EVERY - 1
     judged = held_out & comparable(recording) & check.rows
-    error = root_mean_square(check.residual[judged[check.rows]])
-    nrmse = normalised(error, recording.force[judged])
+    error = check.residual[judged[check.rows]]
+    nrmse = normalised(root_mean_square(error), recording.force[judged])
+    crossed: dict[str, float] = {}
+    if (crossing := Crossing.of(recording, judged)) is not None:
+        late = error[crossing.at_turn[judged]]
+        crossed = {
+            "floor": crossing.floor,
+            "release_above_press": crossing.above,
+            "share_at_turn": float(late @ late / (error @ error)),
+        }
     return {
         "nrmse": nrmse,
         "n_parameters": model.n_parameters,
@@ -94,6 +106,7 @@ def ours(
         "rung": model.fit.rung,
         "seconds": seconds,
         "finite": bool(np.isfinite(nrmse) and nrmse < 1.5),
+        **crossed,
     }
 
 
@@ -113,9 +126,6 @@ def row_of(path: Path, kind: Set) -> dict[str, Any]:
         # derived before rows are held out: a derivative needs its neighbours in time
         speed, _ = velocity(recording)
         recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
-    if kind.force_late_s:
-        earlier = np.interp(recording.time - kind.force_late_s, recording.time, recording.position)
-        recording = replace(recording, position=earlier)
     train, _ = recording.split(EVERY)
     try:
         found = ours(recording, train, kind.options)
@@ -128,7 +138,7 @@ def row_of(path: Path, kind: Set) -> dict[str, Any]:
         **found,
         "splines": _numbers(splines),
         "passive_splines": _numbers(others[PASSIVE]) if PASSIVE in others else None,
-        "baselines": {name: _numbers(each) for name, each in others.items()},
+        "baselines": {name: _numbers(each) for name, each in others.items()} if kind.beside else {},
     }
 
 
@@ -214,7 +224,9 @@ def main() -> None:
                     f"  {row['file'][:48]:50}{row['nrmse']:9.4f}{row['n_parameters']:6d} {row['rung']:12}"
                     f"{row['seconds']:7.2f} s   splines {row['splines']['nrmse']:.4f} "
                     f"{row['splines']['n_parameters']:5d}"
-                    + (f", with h >= 0 {passive['nrmse']:.4f}" if passive else ""),
+                    + (f", with h >= 0 {passive['nrmse']:.4f}" if passive else "")
+                    + (f"; floor {row['floor']:.4f}" if "floor" in row else "")
+                    + (f", at the turn {100 * row['share_at_turn']:.0f} %" if "floor" in row else ""),
                     flush=True,
                 )
         report(name, results[name])
