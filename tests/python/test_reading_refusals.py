@@ -87,12 +87,12 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "rows beyond the end": (
         lines("depth_mm,force_N", PLAIN),
         {"rows": (30, 41)},
-        "press.csv: rows 30 to 41 were asked for, but it has 40 rows",
+        "press.csv: rows 30:41 were asked for; it has 40 rows",
     ),
     "no rows": (
         lines("depth_mm,force_N", PLAIN),
         {"rows": (9, 9)},
-        "press.csv: rows 9 to 9 were asked for, but it has 40 rows",
+        "press.csv: rows 9:9 were asked for; it has 40 rows, and START must be below STOP",
     ),
     "a sign of nothing": (
         lines("depth_mm,force_N", PLAIN),

@@ -40,7 +40,7 @@ HELP = {
     "monotone": "Impose that the force never falls with position.",
     "fixed_force": "Position and force that the model goes through.",
     "coupling_stiffness": "Keep the slope below 0.9 of it, in force per position.",
-    "play_radius": "Play radii tried without a direction, as shares of the travel, joined by commas.",
+    "play_radius": "Play radii tried first without a direction, as shares of the travel, joined by commas.",
     "contact_share": "Share of the force range below which the force at the start counts as free contact.",
     "period": "Period of a periodic environment, in its position unit.",
 }

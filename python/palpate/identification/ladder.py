@@ -15,6 +15,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
 from .constraints import domain_bounds, impose, moved_to_bounds
+from .crossing import crossing
 from .evidence import Evidence
 from .fresh import kept_back
 from .growth import Grown, PathPoint, judge, prune
@@ -81,7 +82,8 @@ class Ladder:
         self.notes: list[str] = []
         self.path: list[PathPoint] = list(before.path) if before else []
         self._grown_before: dict[str, Basis] = dict(before._grown_before) if before else {}
-        self._options, self._name, self._slope_unit = options, network, reach
+        self._options, self._name = options, network
+        self._lower, self._slope_unit = lower, reach
         self._fixed_force = None
         if options.fixed_force is not None:
             place, fixed = options.fixed_force
@@ -124,10 +126,10 @@ class Ladder:
         strokes = self._play.best_tried(best.solution.basis)
         if strokes is not None:
             return self._play.with_first_states(self._hysteresis(best, strokes))
-        short = "the motions between gaps of time are too short to tell hysteresis"
+        untold = "the motions between gaps of time are too short to tell it, or never turn back"
         if "hysteresis" in self._options.inputs:
-            raise InputError(f"inputs names hysteresis, but {short}")
-        self.notes.append(f"hysteresis was not tried: {short}")
+            raise InputError(f"inputs names hysteresis, but {untold}")
+        self.notes.append(f"hysteresis was not tried: {untold}")
         return best
 
     def _constant(self, rows: Compressed) -> Rung:
@@ -157,14 +159,9 @@ class Ladder:
         )
 
     def _grown(
-        self,
-        rows: Compressed,
-        strokes: HysteresisInput | None,
-        name: str,
-        start: Basis,
-        options: IdentifyOptions | None = None,
+        self, rows: Compressed, strokes: HysteresisInput | None, name: str, start: Basis
     ) -> tuple[SeparableProblem, Grown]:
-        problem, grown = self._evidence.grown(rows, strokes, name, start, options or self._options)
+        problem, grown = self._evidence.grown(rows, strokes, name, start, self._options)
         self.path.extend(grown.path)
         return problem, grown
 
@@ -188,11 +185,8 @@ class Ladder:
             return kept
         single = self._single_valued(kept) if kept is not free and len(below.solution.basis) else below
         best = self._better(single, kept)
-        left, of = len(best.solution.basis), len(below.solution.basis)
-        if best is single and left < of:
-            self.notes.append(
-                f"{left} of the {of} wavelets over position are left: the others were of the loop"
-            )
+        if best is single and (left := len(best.solution.basis)) < len(below.solution.basis):
+            self.notes.append(f"{left} wavelets over position are left: the others were of the loop")
         if best.name != "hysteresis" and kept.rmse > GAINS_ENERGY * free.rmse:
             self.notes.append(
                 "press and release differ, but the loop would gain energy; if position or force is turned, "
@@ -219,7 +213,8 @@ class Ladder:
             rows = self._evidence.rows(strokes)
             limit = min(most, max(FIRST_SIZE, 2 * len(basis))) if self._play else most
             options = replace(self._options, max_wavelets=limit)
-            problem, grown = self._grown(rows, strokes, rung.name, basis, options)
+            problem, grown = self._evidence.grown(rows, strokes, rung.name, basis, options)
+            self.path.extend(grown.path)
             basis = self._grown_before[rung.name] = grown.solution.basis
             rung = _hysteresis_rung(strokes, rows, problem, grown.solution, grown.stop_reason)
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
@@ -275,7 +270,10 @@ class Ladder:
                 kept = trial
         names = " and ".join(dict.fromkeys(bound.name for bound in bounds))
         price = f"RMS error {problem.rmse(kept):.4g} with, {rung.rmse:.4g} without"
-        self.notes.append(f"{rung.name}: {names} imposed over the domain, {price}")
+        crossed = ""
+        if options.hysteresis_nonnegative:
+            crossed = crossing(problem, rung.solution, self._lower, self._slope_unit)
+        self.notes.append(f"{rung.name}: {names} imposed over the domain, {price}{crossed}")
         more = problem.n_parameters(len(kept.basis)) - problem.n_parameters(len(rung.solution.basis))
         return replace(rung, solution=kept, n_parameters=rung.n_parameters + more)
 

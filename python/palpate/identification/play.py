@@ -46,7 +46,8 @@ class PlaySearch:
     def best_tried(self, basis: Basis) -> HysteresisInput | None:
         """The hysteresis input of that radius of the options which helps most on given wavelets.
 
-        None where the motions between gaps of time are too short for any of them.
+        None where the motions between gaps of time are too short for any of them, or never turn back: g + h
+        alone is one force of position, and h could be anything.
         """
         if not self._judged:
             return None
@@ -90,9 +91,9 @@ class PlaySearch:
 
     @cached_property
     def _judged(self) -> list[HysteresisInput]:
-        """The plays of the radii tried for which enough rows are known, the smallest first."""
+        """The plays of the radii tried for which enough rows are known, both ways, the smallest first."""
         tried = [self._of(radius) for radius in sorted(self._options.play_radius)]
-        return [one for one in tried if one.known.mean() >= LEAST_KNOWN]
+        return [one for one in tried if one.known.mean() >= LEAST_KNOWN and one.both_ways]
 
     def _left_by(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
         """Sum of squares that the best weights on given wavelets leave in these rows, for all radii the same.
