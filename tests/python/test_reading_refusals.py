@@ -87,7 +87,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "rows beyond the end": (
         lines("depth_mm,force_N", PLAIN),
         {"rows": (30, 41)},
-        "press.csv: rows 30:41 were asked for; it has 40 rows",
+        "press.csv: rows 30:41 were asked for; it has 40 rows, and START must be below STOP",
     ),
     "no rows": (
         lines("depth_mm,force_N", PLAIN),
