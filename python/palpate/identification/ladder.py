@@ -31,7 +31,7 @@ WORTH_REGROWING = 1.01
 GAINS_ENERGY = 2.0
 """Ratio of the RMS errors with and without h >= 0 above which the loop is run through the wrong way."""
 
-FIRST_SIZE = 8
+FIRST_SIZE = 4
 """Wavelets with hysteresis until the play radius is sought again."""
 
 RADIUS_ROUNDS = 6
@@ -197,17 +197,19 @@ class Ladder:
     def _grown_hysteresis(self, below: Rung, rung: Rung, *, named: bool) -> Rung:
         """A network with hysteresis; the play radius is found once it is sure that there is hysteresis.
 
-        Wavelets grown at a wrong radius model what is wrong with it, and a radius found on few wavelets makes
-        up for those that are missing: it is sought again whenever the network may be twice as large.
+        Wavelets grown at a wrong radius model what is wrong with it, as those of a single force do, and a
+        radius found on few wavelets makes up for those that are missing: growth begins anew, and the radius
+        is sought again whenever the network may be twice as large.
         """
         assert rung.strokes is not None
         strokes, most = rung.strokes, self._options.max_wavelets
         basis = self._grown_before.get(rung.name, rung.solution.basis)
-        complete = False
+        begun, complete = rung.name in self._grown_before, False
         for _ in range(RADIUS_ROUNDS):
             before = strokes
             if self._play and (named or self._evidence.earned(below, rung)[0]):
                 strokes = self._play.nearer(strokes, basis)
+                basis, begun = (basis if begun else Basis.empty(1)), True
             if complete and strokes is before:
                 break
             rows = self._evidence.rows(strokes)
