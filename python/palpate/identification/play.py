@@ -27,6 +27,9 @@ NEAR = 1e-3
 WITHIN = 2.0
 """Ratio to the radius that helped most so far within which a better one is sought."""
 
+MOST_ROWS = 100_000
+"""Rows that are enough to tell one radius from another; more are thinned out evenly."""
+
 
 class PlaySearch:
     """Looks for the play operator that a recording's motions went through.
@@ -51,7 +54,7 @@ class PlaySearch:
         """
         if not self._judged:
             return None
-        known = self._judged[-1].known
+        known = _thinned(self._judged[-1].known)
         return min(self._judged, key=lambda strokes: self._left_by(strokes, basis, known))
 
     def nearer(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
@@ -66,14 +69,14 @@ class PlaySearch:
         lower, upper = max(radius / WITHIN, least), min(radius * WITHIN, most)
         if lower >= upper:
             return strokes
-        known = self._of(upper).known
+        known = _thinned(self._of(upper).known)
         found = minimize_scalar(
             lambda log_radius: self._left_by(self._of(math.exp(log_radius)), basis, known),
             bounds=(math.log(lower), math.log(upper)),
             method="bounded",
             options={"xatol": NEAR},
         )
-        falls = math.log(self._left_by(strokes, basis, known) / found.fun) * len(strokes.known)
+        falls = math.log(self._left_by(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._options.rung_evidence else strokes
 
     def with_first_states(self, rung: Rung) -> Rung:
@@ -103,3 +106,10 @@ class PlaySearch:
         strokes = replace(strokes, known=known)
         problem = self._evidence.problem(self._evidence.rows(strokes), strokes)
         return problem.total(problem.solve(basis).rss)
+
+
+def _thinned(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Of these rows (n,) no more than MOST_ROWS, evenly spread."""
+    thin = np.zeros_like(rows)
+    thin[:: max(1, -(-len(rows) // MOST_ROWS))] = True
+    return np.asarray(rows & thin)
