@@ -100,7 +100,8 @@ def test_the_domain_reaches_beyond_rows_drawn_from_a_range_as_far_as_they_fall_s
     for _ in range(200):
         X = random.uniform(size=(30, 2))
         model = WaveletNetworkRegressor(max_wavelets=0).fit(X, X[:, 0]).network_
-        assert np.all(model.lower < X.min(axis=0)) and np.all(model.upper > X.max(axis=0))
+        assert np.all(model.lower < X.min(axis=0))
+        assert np.all(model.upper > X.max(axis=0))
         edges.extend([*model.lower, *(1.0 - model.upper)])
     assert abs(np.mean(edges)) < 0.2 / 31.0
 

@@ -109,7 +109,7 @@ def _margin(box: Float2D) -> float:
     """How far the range that rows were drawn from reaches beyond them, on each side [box].
 
     The extremes of m values drawn evenly from a range fall short of it by 1/(m + 1) of it on average, which
-    is 1/(m - 1) of what they span. A wavelet's core holds several such spacings, so that it does not end there.
+    is 1/(m - 1) of what they span: no more than a few rows of a wavelet's core.
     """
     return 1.0 / max(len(np.unique(box, axis=0)) - 1, 1)
 
