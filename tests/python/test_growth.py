@@ -14,7 +14,7 @@ from palpate.identification.frame import resolved_frame
 from palpate.identification.growth import SMOOTH, WITHOUT_NOISE, WORTH_FINER, Grown, grow
 from palpate.identification.refinement import COARSEST
 from palpate.identification.selection import Library
-from palpate.identification.separable import Basis, SeparableProblem, problem_of
+from palpate.identification.separable import CORE, RESOLVED, Basis, SeparableProblem, problem_of
 
 OPTIONS = IdentifyOptions()
 
@@ -78,9 +78,9 @@ def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: py
     """They err between rows that are far apart less than half as much as whatever fits these best."""
     problem = over_two_inputs(smooth, 200)
     found = grown(problem)
-    assert problem.rmse(found.solution) <= WORTH_FINER * problem.resolution
+    assert problem.rmse(found.solution) <= WORTH_FINER * RESOLVED * problem.force_range
     assert problem.resolved_by == OPTIONS.resolved_by
-    problem.resolved_by = problem.holding(SMOOTH)
+    problem.resolved_by = int(SMOOTH * 200)
     widest = problem.finest(found.solution.basis.beta)
     assert np.all(found.solution.basis.alpha <= np.maximum(widest, COARSEST) * (1.0 + 1e-9))
     monkeypatch.setattr(growth, "_smooth", lambda *_: None)
@@ -107,3 +107,27 @@ def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(growth, "_smooth", tried)
     assert len(grown(over_two_inputs(smooth, 200, noise=0.02)).solution.basis) > 0
+
+
+def detents(noise: float, seed: int = 0) -> SeparableProblem:
+    """A knob with 20 detents of either sign, each five samples wide."""
+    random, x = np.random.default_rng(seed), np.linspace(0.0, 1.0, 300)
+    alpha, beta = np.full((20, 1), 2.0 * CORE / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
+    y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)
+    y = y + random.normal(0.0, noise, len(x))
+    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+
+
+def test_where_neighbours_agree_about_what_is_left_wavelets_become_finer() -> None:
+    problem = detents(0.1)
+    found = grown(problem)
+    assert problem.resolved_by == WITHOUT_NOISE
+    assert len(found.solution.basis) == 20
+    assert problem.rmse(found.solution) < 0.11
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_neighbours_do_not_agree_about_noise(seed: int) -> None:
+    problem = kinked(0.03, seed)
+    assert problem.likeness(grown(problem).solution) < 3.0
+    assert problem.likeness(problem.solve(Basis.empty(1))) > 10.0

@@ -18,7 +18,7 @@ from .options import IdentifyOptions
 from .quasi_newton import refine_all
 from .refinement import refine
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
-from .separable import TINY, Basis, SeparableProblem, Solution
+from .separable import RESOLVED, TINY, Basis, SeparableProblem, Solution
 from .stopping import CRITERIA, ON_FRESH_ROWS, choice, deviance, enough
 
 PRUNE_CANDIDATES = 3
@@ -36,6 +36,9 @@ EVEN = 0.5
 
 WORTH_FINER = 4.0
 """How many times smaller the error must become by wavelets finer than noise would allow."""
+
+ALIKE = 3.0
+"""Standard errors of the correlation of what is left at neighbouring positions from which it is no noise."""
 
 SMOOTH = 0.25
 """Share of the positions that a core holds at least while a force over several inputs is tried as smooth."""
@@ -104,20 +107,26 @@ def grow(
 ) -> Grown:
     """Grow from the wavelets of start; where what is left is no noise, then finer than noise would allow.
 
-    A smooth force over several inputs is left to wide wavelets alone. Both is for a force that is known to be
-    a single one, not for wavelets that stay on the frame, nor where fresh rows judge.
+    Noise is as large everywhere, and differs from each position to the next. Finer wavelets are taken where
+    they leave a fraction of the error, or where neighbours agree about what is left and the criterion falls
+    as for a rung of the ladder. A smooth force over several inputs is left to wide wavelets. All that is for
+    a force known to be a single one, not for wavelets that stay on the frame, nor where fresh rows judge.
     """
     coarse = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
     free = single and not coarse and problem.n_channels == 1
-    found = _grown(problem, library, start, rung, options, wide=free and problem.dimension > 1)
-    if not free or len(found.solution.basis) == 0:
+    wide = free and problem.dimension > 1
+    found = _grown(problem, library, start, rung, options, wide=wide)
+    settled = wide and _little(problem, problem.rmse(found.solution))
+    if not free or settled or len(found.solution.basis) == 0:
         return found
-    if problem.resolved_by <= WITHOUT_NOISE or problem.evenness(found.solution) >= EVEN:
+    alike = problem.likeness(found.solution) > ALIKE
+    if problem.resolved_by <= WITHOUT_NOISE or not (alike or problem.evenness(found.solution) < EVEN):
         return found
     before, problem.resolved_by = problem.resolved_by, WITHOUT_NOISE
     fine = Library(problem, resolved_frame(problem, options))
     finer = _grown(problem, fine, found.solution.basis, rung, options)
-    if problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
+    earned = alike and finer.criterion + options.rung_evidence < found.criterion
+    if earned or problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
         return replace(finer, path=(*found.path[:-1], finer.path[-1]))
     problem.resolved_by = before
     problem.set_prior(found.solution.rss)
@@ -151,7 +160,7 @@ def _grown(
         if enough(options.criterion, path[-1].criterion) or options.selection == "backward":
             stop_reason = options.criterion
             break
-        if wide and problem.rmse(current) ** 2 <= problem.resolution * problem.force_range:
+        if wide and problem.rmse(current) <= np.sqrt(RESOLVED) * problem.force_range:
             wide = False
             if (smooth := _smooth(problem, start, rung, options)) is not None:
                 return smooth
@@ -180,23 +189,28 @@ def _grown(
 
 
 def _smooth(problem: SeparableProblem, start: Basis, rung: str, options: IdentifyOptions) -> Grown | None:
-    """A network of wide wavelets, if it leaves too little for finer ones to be worth trying.
+    """A network of wide wavelets, if it leaves little.
 
     The best candidates are mostly narrow: they mend a few rows each, and rows are far apart over several
     inputs, so that a network of them reads the rows well and errs between and beside them. Wide ones cannot.
-    Where rows of one cell differ by more than that error there is no need to try.
+    Where rows of one cell differ by more there is no need to try.
     """
-    least = WORTH_FINER * problem.resolution
-    if np.sqrt(problem.within / problem.samples) > least:
+    if not _little(problem, np.sqrt(problem.within / problem.samples)):
         return None
-    before, problem.resolved_by, prior = problem.resolved_by, problem.holding(SMOOTH), problem.prior
+    before, prior = problem.resolved_by, problem.prior
+    problem.resolved_by = max(before, int(SMOOTH * len(problem.blocks[0].positions)))
     library = Library(problem, resolved_frame(problem, options))
     found = _grown(problem, library, start, rung, options, starts=1)
     problem.resolved_by = before
-    if problem.rmse(found.solution) <= least:
+    if _little(problem, problem.rmse(found.solution)):
         return found
     problem.prior = prior
     return None
+
+
+def _little(problem: SeparableProblem, error: float) -> bool:
+    """Whether an error is so near to what a sensor resolves that finer wavelets are not worth trying."""
+    return bool(error <= WORTH_FINER * RESOLVED * problem.force_range)
 
 
 def _eliminated(problem: SeparableProblem, library: Library, start: Basis, options: IdentifyOptions) -> Basis:

@@ -146,14 +146,9 @@ class SeparableProblem:
         """Fitted numbers: d dilations, d translations and a weight a channel; a slope and bias a channel."""
         return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
 
-    @property
-    def resolution(self) -> float:
-        """Error that does not count: what a sensor resolves [force]."""
-        return RESOLVED * self.force_range
-
     def total(self, rss: float) -> float:
         """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
-        return max(rss + self.within, self.resolution**2 * self.samples, TINY)
+        return max(rss + self.within, (RESOLVED * self.force_range) ** 2 * self.samples, TINY)
 
     def rmse(self, solution: Solution) -> float:
         """Root mean square error over all samples [force]."""
@@ -168,6 +163,14 @@ class SeparableProblem:
         residual = np.abs(np.concatenate(solution.residuals))
         return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
 
+    def likeness(self, solution: Solution) -> float:
+        """Correlation of what is left at neighbouring positions, in standard errors; one channel, d = 1."""
+        if self.dimension > 1 or self.n_channels > 1:
+            return 0.0
+        (residual,) = solution.residuals
+        alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
+        return alike * float(np.sqrt(len(residual)))
+
     def fresh_errors(self, solution: Solution, fresh: FreshRows) -> Float1D:
         """Force less the solution's at rows that the problem was not made of."""
         return fresh.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
@@ -178,10 +181,6 @@ class SeparableProblem:
         Without it, a stroke that has no data where the other one does could give a wavelet there any weight.
         """
         self.prior = self.total(rss) / self.samples / self.force_range**2
-
-    def holding(self, share: float) -> int:
-        """This share of the positions of every block, or what a wavelet's core must hold if that is more."""
-        return max(self.resolved_by, int(share * min(map(len, self._resolutions))))
 
     def finest(self, beta: Float2D) -> Float2D:
         """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
