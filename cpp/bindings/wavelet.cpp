@@ -145,6 +145,27 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
     return {std::move(value), std::move(by_alpha), std::move(by_beta)};
 }
 
+Columns wavelet_steps(const Array& x, const Array& alpha, const Array& beta) {
+    const Frame frame(x, alpha, beta);
+    auto result = columns(frame.samples, 2 * frame.dimension * frame.wavelets);
+    double* out = result.mutable_data();
+    const py::gil_scoped_release unlocked;
+    const std::size_t input = frame.wavelets * frame.samples;
+    double* by_shift = out + frame.dimension * input;
+    for (std::size_t i = 0; i < frame.wavelets; ++i) {
+        frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
+            std::size_t at = i * frame.samples + k;
+            for (std::size_t j = 0; j < frame.dimension; ++j, at += input) {
+                const double u = frame.clamped(i, k, j);
+                const double by_u = psi.gradient_over_u * u;
+                out[at] = by_u * u;
+                by_shift[at] = -by_u;
+            }
+        });
+    }
+    return result;
+}
+
 std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alpha, const Array& beta) {
     const Frame frame(x, alpha, beta);
     std::vector<Columns> result;
@@ -207,6 +228,9 @@ void bind_wavelet(py::module_& module) {
     module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
                "The wavelet columns and their derivatives by the dilations and the translations:\n"
                "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
+    module.def("wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
+               "Derivatives of the wavelet columns by steps without a unit, d log(alpha) and alpha d(beta):\n"
+               "(n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.");
     module.def("wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
                "Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
     module.def("wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,

@@ -6,6 +6,7 @@ are constant, linear and network, judged on n = sum of the weights samples, and 
 parameters as there are samples.
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -172,8 +173,7 @@ def _climbed(
     best = _better(best, line, options)
     if options.max_wavelets == 0 or problem.n_parameters(1) >= problem.samples:
         return best, path
-    # growth sets a prior of its own in its problem
-    apart = data.problem(rows, options)
+    apart = copy(problem)  # growth sets a prior of its own in its problem
     library = Library(apart, resolved_frame(apart, options))
     grown = grow(apart, library, start, "network", options)
     path.extend(grown.path)

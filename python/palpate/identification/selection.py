@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import _core
 from .._typing import Float1D, Float2D
-from .gram import solve_gram
+from .gram import half_solved
 from .refinement import COARSEST
 from .separable import Basis, SeparableProblem, Solution
 from .stopping import deviance
@@ -41,7 +41,8 @@ class Library:
         self.grams: list[Float2D] = []
         for block in problem.blocks:
             wavelets = _core.wavelet_columns(block.positions, self.basis.alpha, self.basis.beta)
-            columns = [channel[:, None] * wavelets for channel in block.channels.T]
+            columns = [wavelets, *(channel[:, None] * wavelets for channel in block.channels.T[1:])]
+            wavelets *= block.channels[:, :1]  # in place: a library is most of the memory that is used
             self.columns.append(columns)
             self.grams.append(np.array([[np.einsum("nm,nm->n", a.T, b.T) for b in columns] for a in columns]))
 
@@ -151,11 +152,11 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
     for columns, gram, design, own, residual in zip(
         library.columns, library.grams, current.designs, current.grams, current.residuals, strict=True
     ):
-        shadows = [design.T @ column for column in columns]
-        solved = [solve_gram(own, shadow) for shadow in shadows]
-        spanned = np.array([[np.einsum("pn,pn->n", a, b) for b in solved] for a in shadows])
-        along = np.array([residual @ column for column in columns])
-        total += _falls(gram, gram - spanned, along)
+        seen_from = np.vstack([design.T, residual])  # one way through the library, not two
+        products = [seen_from @ column for column in columns]
+        shadows = [half_solved(own, product[:-1]) for product in products]
+        along = np.array([product[-1] for product in products])
+        total += _falls(gram, gram - _projected_gram(shadows), along)
     return total
 
 
