@@ -29,14 +29,17 @@ IDLE_STEPS = 2
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Lower the objective from start by at most `steps` accepted or tried steps.
 
-    It ends early after IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
+    It ends early after IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance. A
+    step that failed counts too where the linearised problem had hoped for no more.
     """
-    best = start
+    best, linearised = start, None
     if len(start.basis) == 0:
         return best
     damping, idle, finest = 1e-2, 0, problem.finest(best.basis.beta)
-    matrix, gradient = problem.normal_equations(best)
     for _ in range(steps):
+        if linearised is not best:
+            matrix, gradient = problem.normal_equations(best)
+            linearised = best
         step = _bounded_step(best.basis, finest, matrix, gradient, damping)
         basis, finest_there = _moved(problem, best.basis, step)
         trial = problem.solve(basis)
@@ -44,13 +47,12 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
             gain = problem.samples * (best.objective - trial.objective) / problem.total(trial.rss)
             best, finest, damping = trial, finest_there, max(damping / 5.0, 1e-9)
             idle = idle + 1 if gain < tolerance else 0
-            if idle >= IDLE_STEPS:
-                break
-            matrix, gradient = problem.normal_equations(best)
         else:
             damping *= 6.0
-            if damping > 1e8:
-                break
+            hoped = problem.samples * float(step @ (2.0 * gradient - matrix @ step)) / problem.total(best.rss)
+            idle += 0.0 <= hoped < tolerance
+        if idle >= IDLE_STEPS:
+            break
     return best
 
 
