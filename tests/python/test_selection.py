@@ -51,7 +51,7 @@ def test_gains_are_what_a_new_least_squares_would_gain(kind: str) -> None:
     for index in np.argsort(gains)[-5:]:
         added = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
         direct = start.rss - problem.solve(start.basis.joined(added)).rss
-        assert gains[index] == pytest.approx(direct, rel=1e-5)
+        assert gains[index] == pytest.approx(direct, rel=1e-4)  # a library has seven digits
 
 
 @pytest.mark.parametrize("kind", SIDES)
