@@ -107,7 +107,7 @@ def test_stretched_members_differ_from_a_member_in_one_dilation() -> None:
 def test_wavelets_that_are_tried_beside_each_other_are_unlike() -> None:
     rows = rows_of("one force")
     library = library_of(problem_of(rows, resolved_by=5), rows)
-    chosen = library.unlike(range(len(library)), 8)
+    chosen = library.unlike(np.arange(len(library)), 8)
     assert len(chosen) == 8
     for first, second in itertools.combinations(chosen, 2):
         alpha, beta = library.basis.alpha[[first, second], 0], library.basis.beta[[first, second], 0]

@@ -73,7 +73,8 @@ def _bounded_step(
     diagonal = np.diag(system)
     floor = 1e-6 * diagonal.max() + np.finfo(float).tiny
     while True:
-        damped = system + np.diag(damping * np.maximum(diagonal, floor))
+        damped = system.copy()
+        np.einsum("ii->i", damped)[:] += damping * np.maximum(diagonal, floor)
         factor, failed = dpotrf(damped, lower=1)
         if not failed:
             break

@@ -63,12 +63,12 @@ class Library:
     def __len__(self) -> int:
         return len(self.basis)
 
-    def members(self, order: Sequence[int]) -> Basis:
+    def members(self, order: Sequence[int] | NDArray[np.intp]) -> Basis:
         """The candidates of these numbers."""
-        chosen = list(order)
+        chosen = np.asarray(order, dtype=np.intp)
         return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
 
-    def stretched(self, problem: SeparableProblem, order: Sequence[int]) -> "Library":
+    def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
         """The candidates of these numbers, and each with its dilation along one input changed."""
         chosen, d = self.members(order), problem.dimension
         combinations = [(factor, k) for k in range(d) for factor in STRETCHES]
@@ -78,18 +78,15 @@ class Library:
         alpha = np.maximum(chosen.alpha * factors, COARSEST).reshape(-1, d)
         return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
 
-    def unlike(self, order: Sequence[int], count: int) -> list[int]:
+    def unlike(self, order: NDArray[np.intp], count: int) -> list[int]:
         """The first of these numbers, so many at most, that stand apart or differ in a dilation."""
         chosen: list[int] = []
-        for index in order:
-            alpha, beta = self.basis.alpha[index], self.basis.beta[index]
-            others = self.members(chosen)
-            shift = np.abs(beta - others.beta) * np.sqrt(alpha * others.alpha)
-            stretch = np.abs(np.log(alpha / others.alpha))
-            if np.maximum(shift, stretch).max(axis=1).min(initial=np.inf) > UNLIKE:
-                chosen.append(int(index))
-                if len(chosen) == count:
-                    break
+        while len(order) and len(chosen) < count:
+            chosen.append(int(order[0]))
+            one, others = self.members(order[:1]), self.members(order)
+            shift = np.abs(one.beta - others.beta) * np.sqrt(one.alpha * others.alpha)
+            stretch = np.abs(np.log(one.alpha / others.alpha))
+            order = order[np.maximum(shift, stretch).max(axis=1) > UNLIKE]
         return chosen
 
 

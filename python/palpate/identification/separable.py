@@ -20,7 +20,7 @@ from .. import _core
 from .._typing import Float1D, Float2D
 from .compression import Compressed
 from .fresh import FreshRows
-from .gram import solve_gram
+from .gram import half_solved, solve_gram
 from .resolution import Resolution
 
 RESOLVED = 2.0**-16
@@ -239,7 +239,8 @@ class SeparableProblem:
             by_step = jacobian.T.reshape(2 * self.dimension, *slope.shape[1:])
             np.multiply(by_step, slope, out=by_step)
             cross = design.T @ jacobian
-            matrix += jacobian.T @ jacobian - cross.T @ solve_gram(gram, cross)
+            spanned = half_solved(gram, cross)
+            matrix += jacobian.T @ jacobian - spanned.T @ spanned
             gradient += jacobian.T @ residual
         return matrix, gradient
 
