@@ -20,17 +20,17 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from crossing import Crossing
 from run import SCALE, count, leave
 
 import palpate
-from palpate.baselines import Compared, PerStroke, SmoothingSpline, compare
+from palpate.baselines import PASSIVE, Compared, comparable, compare
+from palpate.cli.chart_identification import LIMIT
 from palpate.recording.motion import velocity
+from palpate.verification.metrics import normalised, root_mean_square
 
 EVERY = 5
 """Rows i with i mod 5 = 4 are held out."""
-
-LIMIT = 1.3
-"""No file may be worse than this many times its own two-spline error."""
 
 MOST_FILES = 16
 """Of a set."""
@@ -43,11 +43,19 @@ class Set:
     pattern: str = "*.csv"
     reading: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
+    folder: str = ""
+    """Where it is not the set's name"""
+    beside: bool = True
+    """Whether baselines are told beside it; not where they are those of another set"""
 
 
 SETS = {
     "keyswitches": Set(),
     "rubber_domes": Set(),
+    "rubber_domes_h_of_any_sign": Set(
+        options={"hysteresis_nonnegative": False}, folder="rubber_domes", beside=False
+    ),
+    "rubber_domes_force_25_ms_earlier": Set(reading={"force_late_s": 0.025}, folder="rubber_domes"),
     "switch_springs": Set(),
     "motor_cogging": Set("map_*.csv"),
     "organ_probing": Set(
@@ -67,42 +75,39 @@ SETS = {
 }
 
 
-def ours(train: palpate.Recording, test: palpate.Recording, options: Mapping[str, Any]) -> dict[str, Any]:
-    """palpate on the kept rows, judged on the held-out ones."""
+def ours(
+    recording: palpate.Recording, train: palpate.Recording, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """palpate on the kept rows, judged on the held-out ones that the baselines are judged on.
+
+    It is led along the whole motion, since a velocity and a play need the rows between; of the rows that are
+    held out only the force is unknown.
+    """
     start = time.perf_counter()
     model = palpate.identify(train, **options)
     seconds = time.perf_counter() - start
-    check = palpate.verify(model, test)
+    check = palpate.verify(model, recording)
+    held_out = np.arange(len(recording)) % EVERY == EVERY - 1
+    judged = held_out & comparable(recording) & check.rows
+    error = check.residual[judged[check.rows]]
+    nrmse = normalised(root_mean_square(error), recording.force[judged])
+    crossed: dict[str, float] = {}
+    if (crossing := Crossing.of(recording, judged)) is not None:
+        late = error[crossing.at_turn[judged]]
+        crossed = {
+            "floor": crossing.floor,
+            "release_above_press": crossing.above,
+            "share_at_turn": float(late @ late / (error @ error)),
+        }
     return {
-        "nrmse": check.nrmse,
+        "nrmse": nrmse,
         "n_parameters": model.n_parameters,
         "n_wavelets": model.n_wavelets,
         "rung": model.fit.rung,
         "seconds": seconds,
-        "finite": bool(np.isfinite(check.nrmse) and check.nrmse < 1.5),
+        "finite": bool(np.isfinite(nrmse) and nrmse < 1.5),
+        **crossed,
     }
-
-
-PASSIVE = "smoothing spline, two strokes, h >= 0"
-"""What no passive model can be expected to beat."""
-
-
-def passive_splines(train: palpate.Recording, test: palpate.Recording) -> dict[str, Any] | None:
-    """Two splines that meet in their mean where release would lie above press; None without strokes."""
-    if train.direction is None or test.direction is None or not {-1, 1} <= set(train.direction.tolist()):
-        return None
-    start = time.perf_counter()
-    used = train.direction != 0
-    pair = PerStroke(SmoothingSpline()).fit(
-        np.column_stack([train.position, train.direction])[used].astype(float), train.force[used]
-    )
-    seconds = time.perf_counter() - start
-    rows = test.direction != 0
-    x, side, force = test.position[rows][:, None], test.direction[rows], test.force[rows]
-    press, release = pair.press_.predict(x), pair.release_.predict(x)
-    modelled = 0.5 * (press + release) + side * 0.5 * np.maximum(press - release, 0.0)
-    nrmse = float(np.sqrt(np.mean((modelled - force) ** 2)) / np.std(force))
-    return {"nrmse": nrmse, "n_parameters": pair.n_parameters_, "seconds": seconds}
 
 
 def row_of(path: Path, kind: Set) -> dict[str, Any]:
@@ -121,70 +126,67 @@ def row_of(path: Path, kind: Set) -> dict[str, Any]:
         # derived before rows are held out: a derivative needs its neighbours in time
         speed, _ = velocity(recording)
         recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
-    train, test = recording.split(EVERY)
+    train, _ = recording.split(EVERY)
     try:
-        found = ours(train, test, kind.options)
+        found = ours(recording, train, kind.options)
     except palpate.InputError as error:
         found = {"refused": str(error)}
     others = {each.name: each for each in compare([recording], EVERY)}
     splines = others["smoothing spline" if "smoothing spline" in others else "smoothing spline, two strokes"]
-    baselines = {name: _numbers(each) for name, each in others.items()}
-    if (passive := passive_splines(train, test)) is not None:
-        baselines[PASSIVE] = passive
     return {
         "file": path.stem,
         **found,
-        "splines": {"nrmse": splines.nrmse, "n_parameters": splines.n_parameters},
-        "baselines": baselines,
+        "splines": _numbers(splines),
+        "passive_splines": _numbers(others[PASSIVE]) if PASSIVE in others else None,
+        "baselines": {name: _numbers(each) for name, each in others.items()} if kind.beside else {},
     }
 
 
 def _numbers(each: Compared) -> dict[str, Any]:
-    return {"nrmse": each.nrmse, "n_parameters": each.n_parameters, "seconds": each.seconds}
+    told = {"nrmse": each.nrmse, "n_parameters": each.n_parameters, "seconds": each.seconds}
+    return told if each.refused is None else {**told, "refused": each.refused}
 
 
 def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
     """The medians of one set, and whatever is not as it should be."""
     good = [row for row in rows if "nrmse" in row]
     for row in rows:
-        if "refused" in row:
-            print(f"  {row['file']} is refused: {row['refused']}")
+        for who, told in (
+            ("", row),
+            *((f"{name}: ", each) for name, each in row.get("baselines", {}).items()),
+        ):
+            if "refused" in told:
+                print(f"  {row['file']} is refused, {who}{told['refused']}")
     if not good:
         return
-    told = [
-        ("palpate", [(row["nrmse"], row["n_parameters"], row["seconds"]) for row in good]),
-        *(
-            (
-                baseline,
-                [
-                    (each["nrmse"], each["n_parameters"], each["seconds"])
-                    for each in (row["baselines"][baseline] for row in good if baseline in row["baselines"])
-                    if np.isfinite(each["nrmse"])
-                ],
-            )
-            for baseline in dict.fromkeys(key for row in good for key in row["baselines"])
-        ),
-    ]
     title = f"median of {len(good)} files"
-    print(f"  {title:40}{'nrmse':>9}{'worst':>9}{'parameters':>12}{'seconds':>9}")
-    for method, numbers in told:
-        if numbers:
-            nrmse, parameters, seconds = zip(*numbers, strict=True)
-            print(
-                f"  {method:40}{median(nrmse):9.4f}{max(nrmse):9.4f}"
-                f"{median(parameters):12.0f}{median(seconds):9.2f}"
-            )
-    _report_ratios("the splines'", {row["file"]: row["nrmse"] / row["splines"]["nrmse"] for row in good})
-    passive = {row["file"]: row["baselines"].get(PASSIVE) for row in good}
-    ratios = {row["file"]: row["nrmse"] / each["nrmse"] for row in good if (each := passive[row["file"]])}
-    if ratios:
-        _report_ratios("that of the splines with h >= 0", ratios)
+    print(f"  {title:52}{'nrmse':>9}{'worst':>9}{'parameters':>12}{'seconds':>9}")
+    _report_line("palpate", good, len(good))
+    for method in dict.fromkeys(key for row in good for key in row["baselines"]):
+        theirs = [row["baselines"][method] for row in good if method in row["baselines"]]
+        _report_line(method, [each for each in theirs if np.isfinite(each["nrmse"])], len(good))
+    _report_ratios("the splines'", {row["file"]: (row, row["splines"]) for row in good})
+    passive = {row["file"]: (row, row["passive_splines"]) for row in good if row["passive_splines"]}
+    _report_ratios("that of the splines with h >= 0", passive)
     diverged = [row["file"] for row in good if not row["finite"]]
     print(f"  diverged: {', '.join(diverged) if diverged else 'none'}")
 
 
-def _report_ratios(than: str, ratios: Mapping[str, float]) -> None:
+def _report_line(method: str, each: Sequence[Mapping[str, Any]], of: int) -> None:
+    """Medians; how many files they are of is told where it is not all of them."""
+    if each:
+        told = method if len(each) == of else f"{method} ({len(each)} files)"
+        nrmse, size, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
+        print(f"  {told:52}{median(nrmse):9.4f}{max(nrmse):9.4f}{median(size):12.0f}{median(seconds):9.2f}")
+
+
+def _report_ratios(than: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
     """How palpate's error compares, file by file."""
+    ratios = {
+        file: own["nrmse"] / other["nrmse"] for file, (own, other) in pairs.items() if other["nrmse"] > 0.0
+    }
+    if not ratios:
+        return
     worst = max(ratios, key=lambda file: ratios[file])
     over = sum(ratio > LIMIT for ratio in ratios.values())
     print(
@@ -209,7 +211,7 @@ def main() -> None:
         return
     results: dict[str, list[dict[str, Any]]] = {}
     for name in options.sets:
-        files = sorted((Path(folder) / name).glob(SETS[name].pattern))
+        files = sorted((Path(folder) / (SETS[name].folder or name)).glob(SETS[name].pattern))
         files = files[:: max(1, -(-len(files) // options.files))]
         print(f"\n{name}", flush=True)
         results[name] = []
@@ -217,10 +219,14 @@ def main() -> None:
             row = row_of(path, SETS[name])
             results[name].append(row)
             if options.each and "nrmse" in row:
+                passive = row["passive_splines"]
                 print(
                     f"  {row['file'][:48]:50}{row['nrmse']:9.4f}{row['n_parameters']:6d} {row['rung']:12}"
                     f"{row['seconds']:7.2f} s   splines {row['splines']['nrmse']:.4f} "
-                    f"{row['splines']['n_parameters']:5d}",
+                    f"{row['splines']['n_parameters']:5d}"
+                    + (f", with h >= 0 {passive['nrmse']:.4f}" if passive else "")
+                    + (f"; floor {row['floor']:.4f}" if "floor" in row else "")
+                    + (f", at the turn {100 * row['share_at_turn']:.0f} %" if "floor" in row else ""),
                     flush=True,
                 )
         report(name, results[name])

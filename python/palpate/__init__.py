@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
     from .planning import DeviceProfile, Plan, simulate
-    from .planning.plan import plan
+    from .planning.ladder import plan
     from .recording import Recording, read_recording
     from .verification import Verification, verify
 
@@ -38,7 +38,7 @@ _HOME = {
     "Model": "model",
     "load_model": "model",
     "Plan": "planning",
-    "plan": "planning.plan",
+    "plan": "planning.ladder",
     "simulate": "planning",
     "Recording": "recording",
     "read_recording": "recording",

@@ -14,6 +14,7 @@ from palpate.baselines import (
     PerStroke,
     SmoothingSpline,
     TissueParameters,
+    comparable,
     compare,
 )
 from palpate.cli.main import main
@@ -111,11 +112,29 @@ def test_two_strokes_are_two_estimators() -> None:
     assert fitted.n_parameters_ == 4
 
 
+def test_passive_strokes_meet_in_their_mean_where_they_would_cross() -> None:
+    x = np.tile(np.linspace(0.0, 1.0, 100), 2)
+    side = np.repeat([1.0, -1.0], 100)
+    X, y = np.column_stack([x, side]), x + side * (0.5 - x)
+    free = PerStroke(TissueParameters(order=1)).fit(X, y)
+    passive = PerStroke(TissueParameters(order=1), passive=True).fit(X, y)
+    assert passive.n_parameters_ == free.n_parameters_
+    assert passive.predict(X) == pytest.approx(x + side * np.maximum(0.5 - x, 0.0))
+
+
+def test_rows_that_hardly_move_are_no_stroke() -> None:
+    x = np.concatenate([np.linspace(0.0, 0.01, 20), np.linspace(1.0, 0.0, 3000)])
+    direction = np.repeat([1, -1], [20, 3000]).astype(np.int8)
+    recording = Recording.from_arrays(x, 2.0 * x, direction=direction)
+    assert not any("two strokes" in each.name for each in compare([recording], 5))
+    assert comparable(recording).all()
+
+
 def test_baselines_are_fitted_to_the_kept_rows_and_judged_on_the_others() -> None:
     recording = press_and_release()
     table = {each.name: each for each in compare([recording], 5)}
-    assert len(table) == 5
-    assert all(name.endswith("two strokes") for name in table)
+    assert len(table) == 6
+    assert all("two strokes" in name for name in table)
     assert table["smoothing spline, two strokes"].nrmse < 0.03
     broken = recording.force.copy()
     broken[4::5] += 100.0

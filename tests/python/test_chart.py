@@ -209,6 +209,27 @@ def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: P
     assert text.count("| matched |") == 1
 
 
+def _measured(nrmse: float, **more: Any) -> dict[str, Any]:
+    splines = {"nrmse": 0.01, "n_parameters": 200, "seconds": 0.1}
+    row = {"file": "dome", "nrmse": nrmse, "n_parameters": 100, "seconds": 1.0, "finite": True}
+    both = {"splines": splines, "passive_splines": {**splines, "nrmse": 0.02}}
+    return {**row, **both, "baselines": {"splines": splines}, **more}
+
+
+def test_measured_objects_stand_beside_their_splines_and_where_strokes_cross(identified: Path) -> None:
+    domes = [_measured(0.015, floor=0.009, share_at_turn=0.8), _measured(0.03)]
+    variants = {"domes_h_of_any_sign": [_measured(0.011)], "domes_force_25_ms_earlier": [_measured(0.006)]}
+    _left(identified, "real_data", {"domes": domes, **variants, "springs": [_measured(0.009)]})
+    page = identified / "identification.md"
+    names = ("identification", "filters", "parsimony", "real_data", "crossing")
+    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
+    assert main(["chart", "identification", str(identified), "--to", str(identified)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "| domes (2 files), palpate | 0.0225 | 100 | 1 | 3.00 (2 above 1.3) | 1.50 (1 above 1.3) |" in text
+    assert "| springs (1 files), palpate | 0.0090 | 100 | 1 | 0.90 | 0.45 |" in text
+    assert "| dome | 0.0150 | 0.0110 | 0.0100 | 0.0200 | 0.0090 | 80 % | 0.0060 | 0.0100 |" in text
+
+
 def test_identification_without_its_benchmark_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

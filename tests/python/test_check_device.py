@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -313,3 +315,16 @@ def test_pushing_asks_first() -> None:
     answer = checked("--push", device=["--no-hand"])
     assert answer.returncode == 2
     assert "--push moves the handle; at no terminal it needs --yes" in answer.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_check_that_is_asked_to_end_tells_what_it_has_seen(number: signal.Signals) -> None:
+    command = [sys.executable, "-m", "palpate", "check-device", "--duration-s", "60", "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith("checking simulated for 60 s")
+    time.sleep(1.0)
+    process.send_signal(number)
+    told, talk = process.communicate(timeout=30)
+    assert told, talk
+    assert "samples" in {finding["name"] for finding in json.loads(told)["findings"]}

@@ -130,7 +130,10 @@ def test_what_is_said_during_a_run_has_a_line_of_its_own() -> None:
     with terminal(80, MODEL, "--duration-s", 3, "--fault", "gone@0.5") as screen:
         screen.watch()
         assert screen.process.wait() == 1
-        assert f"{AGAIN}error: stopped by a fault of the device: Fault" in screen.shown
+        said = screen.shown.partition("error: stopped by a fault of the device: Fault")
+        assert said[1]
+        # on a busy machine a warning may stand between the live line and this
+        assert said[0].endswith((AGAIN, "\n"))
 
 
 def test_without_a_terminal_there_is_no_live_line() -> None:

@@ -4,12 +4,13 @@
 import numpy as np
 import pytest
 
+from palpate._core import wavelet_columns
 from palpate.identification import IdentifyOptions
 from palpate.identification.compression import Compressor
 from palpate.identification.frame import resolved_frame
 from palpate.identification.growth import WITHOUT_NOISE, Grown, grow
 from palpate.identification.selection import Library
-from palpate.identification.separable import Basis, SeparableProblem, problem_of
+from palpate.identification.separable import CORE, Basis, SeparableProblem, problem_of
 
 OPTIONS = IdentifyOptions()
 
@@ -42,3 +43,27 @@ def test_noise_is_not_taken_for_structure(noise: float) -> None:
     found = grown(problem)
     assert problem.resolved_by == OPTIONS.resolved_by
     assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
+
+
+def detents(noise: float, seed: int = 0) -> SeparableProblem:
+    """A knob with 20 detents of either sign, each five samples wide."""
+    random, x = np.random.default_rng(seed), np.linspace(0.0, 1.0, 300)
+    alpha, beta = np.full((20, 1), 2.0 * CORE / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
+    y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)
+    y = y + random.normal(0.0, noise, len(x))
+    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+
+
+def test_where_neighbours_agree_about_what_is_left_wavelets_become_finer() -> None:
+    problem = detents(0.1)
+    found = grown(problem)
+    assert problem.resolved_by == WITHOUT_NOISE
+    assert len(found.solution.basis) == 20
+    assert problem.rmse(found.solution) < 0.11
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_neighbours_do_not_agree_about_noise(seed: int) -> None:
+    problem = kinked(0.03, seed)
+    assert problem.likeness(grown(problem).solution) < 3.0
+    assert problem.likeness(problem.solve(Basis.empty(1))) > 10.0

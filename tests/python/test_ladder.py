@@ -260,3 +260,16 @@ def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() ->
         fit_environment(
             x[:, None], force, starts=starts, options=IdentifyOptions(inputs=("position", "hysteresis"))
         )
+
+
+def test_a_motion_that_never_turns_back_leaves_hysteresis_untried_and_says_so() -> None:
+    """Two magnets pulled apart: where the play is known there is one stroke, and h could be anything."""
+    x = np.linspace(0.0, 1.0, 3000)
+    force = 1e-4 / (x + 0.08) ** 4 + np.random.default_rng(7).normal(0.0, 0.005, len(x))
+    network = fit_environment(x[:, None], force, starts=[0])
+    assert network.rung == "position"
+    assert any("never turn back" in note for note in network.notes)
+    with pytest.raises(InputError, match=r"inputs names hysteresis, but .*never turn back"):
+        fit_environment(
+            x[:, None], force, starts=[0], options=IdentifyOptions(inputs=("position", "hysteresis"))
+        )

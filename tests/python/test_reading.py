@@ -185,3 +185,14 @@ def test_the_force_of_rows_that_touch_nothing_is_taken_off(csv_file: Write) -> N
     assert "0.25 N, the mean force of rows 0 to 9, is taken off" in recording.notes
     with pytest.raises(InputError, match="--zero 0:2 holds none of the rows that are used"):
         read_recording(path, zero=(0, 2), rows=(2, None))
+
+
+def test_a_force_recorded_late_is_brought_back_while_reading(tmp_path: Path) -> None:
+    file = tmp_path / "late.csv"
+    rows = [f"{k / 100:g},{k / 10:g},{k}" for k in range(40)]
+    file.write_text("\n".join(["time_s,position_m,force_N", *rows]) + "\n", encoding="utf-8")
+    recording = read_recording(file, force_late_s=0.025)
+    assert len(recording) == recording.source.rows == 37
+    assert recording.position == pytest.approx(np.arange(3, 40) / 10 - 0.25)
+    assert np.array_equal(recording.force, np.arange(3.0, 40.0))
+    assert any("0.025 s before" in note for note in recording.notes)

@@ -206,3 +206,26 @@ def test_merged_sources_keep_every_fingerprint() -> None:
     )
     merged = Source.merged([a, b])
     assert (merged.files, merged.sha256, merged.rows) == (("a.csv", "b.csv"), "aa bb", 30)
+
+
+def test_a_late_force_comes_back_to_the_position_it_belongs_to() -> None:
+    t = np.linspace(0.0, 2.0, 2001)
+    x, late = np.sin(np.pi * t) ** 2, 0.025
+    measured = np.sin(np.pi * (t - late)) ** 2
+    recording = Recording.from_arrays(x, 5.0 * measured, t, np.sign(np.cos(np.pi * t) * np.sin(np.pi * t)))
+    back = recording.with_force_earlier(late)
+    assert len(back) == 2001 - 25
+    assert np.abs(back.force - 5.0 * back.position).max() < 1e-4
+    assert np.abs(recording.force - 5.0 * recording.position).max() > 0.3
+    assert back.time is not None
+    assert back.time[0] == pytest.approx(late)
+    assert "0.025 s before" in back.notes[-1]
+
+
+@pytest.mark.parametrize("late", [-0.1, 3.0, float("nan")])
+def test_a_force_cannot_be_later_than_the_recording_is_long(late: float) -> None:
+    recording = Recording.from_arrays([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], time=[0.0, 1.0, 2.0])
+    with pytest.raises(InputError, match=r"the force is late by .* it must be a number from 0 to 2 s"):
+        recording.with_force_earlier(late)
+    with pytest.raises(InputError, match="column of time"):
+        replace(recording, time=None).with_force_earlier(0.5)

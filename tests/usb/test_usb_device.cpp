@@ -83,7 +83,7 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     EXPECT_GE(health.stream.round_trip.count(), static_cast<std::uint64_t>(samples));
     // A busy machine misses a frame now and then: that command comes late, or is left out.
     EXPECT_LE(health.skipped_commands - before.skipped_commands, static_cast<std::uint64_t>(samples / 2));
-    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1.0);  // the emulated one: one sample
+    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);  // one sample, as exact as a histogram is
 }
 
 TEST(UsbDevice, AForceThatPushesOutMovesTheHandleBack) {

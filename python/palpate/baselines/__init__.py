@@ -5,7 +5,7 @@ All have one face: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force
 every fitted real number. X (n, 1 to 3) holds position and, where they are known, velocity and acceleration.
 """
 
-from .comparison import Compared, baselines, compare
+from .comparison import PASSIVE, Compared, baselines, comparable, compare
 from .hunt_crossley import HuntCrossley
 from .lookup_table import LookupTable
 from .per_stroke import PerStroke
@@ -14,6 +14,7 @@ from .tissue import TissueParameters
 from .zones import LinearZones
 
 __all__ = [
+    "PASSIVE",
     "Compared",
     "HuntCrossley",
     "LinearZones",
@@ -22,5 +23,6 @@ __all__ = [
     "SmoothingSpline",
     "TissueParameters",
     "baselines",
+    "comparable",
     "compare",
 ]

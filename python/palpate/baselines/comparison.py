@@ -38,6 +38,13 @@ class Compared:
     """Why it could not be fitted"""
 
 
+PASSIVE = "smoothing spline, two strokes, h >= 0"
+"""The same two splines, but press is never below release: what a passive model is fairly compared with."""
+
+LEAST_STROKE = 0.1
+"""Share of the travel that a stroke covers; what covers less is none."""
+
+
 def baselines(strokes: bool) -> dict[str, Estimator]:
     """Every baseline under its name; with strokes, one for press and one for release."""
     single: dict[str, Estimator] = {
@@ -47,7 +54,15 @@ def baselines(strokes: bool) -> dict[str, Estimator]:
         "lookup table": LookupTable(),
         "smoothing spline": SmoothingSpline(),
     }
-    return {f"{name}, two strokes": PerStroke(each) for name, each in single.items()} if strokes else single
+    if not strokes:
+        return single
+    pairs: dict[str, Estimator] = {f"{name}, two strokes": PerStroke(each) for name, each in single.items()}
+    return {**pairs, PASSIVE: PerStroke(SmoothingSpline(), passive=True)}
+
+
+def comparable(recording: Recording) -> NDArray[np.bool_]:
+    """Rows (n,) of a recording that baselines are fitted to and judged on."""
+    return _columns(recording, _has_strokes(recording))[1]
 
 
 def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
@@ -56,7 +71,7 @@ def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
     Where the recordings tell strokes each baseline is fitted to press and release apart, which is two models
     where an identified one is one; rows without a direction are left out.
     """
-    strokes = all(part.direction is not None and _both(part.direction) for part in recordings)
+    strokes = all(map(_has_strokes, recordings))
     tables = [_columns(part, strokes) for part in recordings]
     width = min(X.shape[1] for X, _ in tables)
     # the stroke stands last, velocity and acceleration where every recording has them
@@ -85,8 +100,13 @@ def _compared(
     return Compared(name, nrmse, fitted.n_parameters_, seconds)
 
 
-def _both(direction: NDArray[np.int8]) -> bool:
-    return bool((direction > 0).any() and (direction < 0).any())
+def _has_strokes(recording: Recording) -> bool:
+    """Whether both strokes cover some of the travel."""
+    if recording.direction is None:
+        return False
+    strokes = [recording.position[recording.direction == side] for side in (1, -1)]
+    least = LEAST_STROKE * float(np.ptp(recording.position))
+    return all(len(stroke) > 0 and float(np.ptp(stroke)) >= least for stroke in strokes)
 
 
 def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:

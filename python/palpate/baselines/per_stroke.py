@@ -22,9 +22,12 @@ class PerStroke:
     ----------
     estimator
         What is fitted to each stroke; it is copied.
+    passive : bool
+        Where release would lie above press, by which a loop gains energy, both are their mean.
     """
 
     estimator: Estimator
+    passive: bool = False
 
     def fit(self, X: Float2D, y: Float1D) -> PerStroke:
         """Fit one copy to the press rows of X (n, d) and one to the release rows."""
@@ -37,6 +40,10 @@ class PerStroke:
     def predict(self, X: Float2D) -> Float1D:
         """Force (n,) at the rows of X."""
         press = X[:, -1] > 0
+        if self.passive:
+            above, below = (each.predict(X[:, :-1]) for each in (self.press_, self.release_))
+            half = 0.5 * np.maximum(above - below, 0.0)
+            return np.asarray(0.5 * (above + below) + np.where(press, half, -half))
         force = np.empty(len(X))
         force[press] = self.press_.predict(X[press, :-1])
         force[~press] = self.release_.predict(X[~press, :-1])

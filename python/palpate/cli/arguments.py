@@ -90,6 +90,7 @@ def reading_options(command: F) -> F:
         torque_constant: float | None,
         rows: tuple[int | None, int | None] | None,
         zero: tuple[int | None, int | None] | None,
+        force_late_s: float,
         invalid: str,
         **others: Any,
     ) -> Any:
@@ -104,6 +105,7 @@ def reading_options(command: F) -> F:
                 "torque_constant": torque_constant,
                 "rows": rows,
                 "zero": zero,
+                "force_late_s": force_late_s,
                 "invalid": invalid,
             }
         )
@@ -152,6 +154,12 @@ def reading_options(command: F) -> F:
                 callback=_row_range,
                 default=None,
                 help="Rows in which the tool touches nothing: their mean force is taken off.",
+            ),
+            click.option(
+                "--force-late-s",
+                type=float,
+                default=0.0,
+                help="How long after its position each force was recorded [s]; needs time.",
             ),
             click.option(
                 "--invalid",

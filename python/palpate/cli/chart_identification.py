@@ -23,6 +23,12 @@ from .verb import Verb
 _PAGE = "identification.md"
 _OURS = "palpate"
 
+_ANY_SIGN, _EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"
+"""Ends of the names of sets that are another one, fitted or read otherwise."""
+
+LIMIT = 1.3
+"""Files whose error is more than this many times that of their splines are counted."""
+
 Row = Mapping[str, Any]
 
 
@@ -73,25 +79,77 @@ def _measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
         good = [row for row in files if "nrmse" in row]
         if not good:
             continue
-        ratios = [row["nrmse"] / row["splines"]["nrmse"] for row in good if row["splines"]["nrmse"] > 0]
-        told.append(_set_row(f"{name} ({len(good)} files), palpate", good, f"{max(ratios):.2f}"))
+        worst = _worst(good, "splines"), _worst(good, "passive_splines")
+        told.append(_set_row(f"{name} ({len(good)} files), palpate", good, worst))
         for baseline in dict.fromkeys(key for row in good for key in row["baselines"]):
             theirs = [row["baselines"][baseline] for row in good if baseline in row["baselines"]]
             finite = [each for each in theirs if each["nrmse"] is not None and math.isfinite(each["nrmse"])]
+            of = "" if len(finite) == len(good) else f" ({len(finite)} files)"
             if finite:
-                told.append(_set_row(f"{name}, {baseline}", finite, ""))
-    return markdown_table(
-        ("recordings, method", "NRMSE", "parameters", "s a file", "worst file over its splines"), told
+                told.append(_set_row(f"{name}, {baseline}{of}", finite, ("", "")))
+    over = "worst file over its splines", "over splines with h >= 0"
+    return markdown_table(("recordings, method", "NRMSE", "parameters", "s a file", *over), told)
+
+
+def _crossings(sets: Mapping[str, Sequence[Row]]) -> str:
+    """One row for each file of the sets that were fitted with h of any sign, or with forces earlier, too."""
+    told = []
+    for name, files in sets.items():
+        variants = [
+            {row["file"]: row for row in sets[other]}
+            for other in (name + _ANY_SIGN, name + _EARLIER)
+            if other in sets
+        ]
+        if len(variants) == 2:
+            told += [_crossing_row(row, *(each.get(row["file"], {}) for each in variants)) for row in files]
+    header = (
+        "file",
+        "palpate",
+        "h of any sign",
+        "splines",
+        "splines, h >= 0",
+        "floor",
+        "at the turn",
+        "25 ms earlier: palpate",
+        "splines",
+    )
+    return markdown_table(header, told)
+
+
+def _crossing_row(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
+    def error(of: Row | None) -> str:
+        return f"{of['nrmse']:.4f}" if of and "nrmse" in of else ""
+
+    return (
+        row["file"],
+        error(row),
+        error(any_sign),
+        error(row.get("splines")),
+        error(row.get("passive_splines")),
+        f"{row['floor']:.4f}" if "floor" in row else "",
+        f"{100 * row['share_at_turn']:.0f} %" if "share_at_turn" in row else "",
+        error(earlier),
+        error(earlier.get("splines")),
     )
 
 
-def _set_row(name: str, each: Sequence[Row], worst: str) -> tuple[str, ...]:
+def _worst(files: Sequence[Row], splines: str) -> str:
+    """The largest ratio of a model's error and its splines', and how many are above the limit, if any."""
+    pairs = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
+    ratios = [own / theirs for own, theirs in pairs if theirs is not None and theirs > 0]
+    if not ratios:
+        return ""
+    over = sum(ratio > LIMIT for ratio in ratios)
+    return f"{max(ratios):.2f}" + (f" ({over} above {LIMIT:g})" if over else "")
+
+
+def _set_row(name: str, each: Sequence[Row], worst: tuple[str, str]) -> tuple[str, ...]:
     return (
         name,
         f"{median(row['nrmse'] for row in each):.4f}",
         f"{median(row['n_parameters'] for row in each):.0f}",
         number(median(row["seconds"] for row in each)),
-        worst,
+        *worst,
     )
 
 
@@ -190,6 +248,8 @@ def chart_identification(folder: Path, to: Path) -> None:
     for name, table in _TABLES.items():
         if (results := found[name]) is not None:
             tables[name] = f"{table(results[0])}\n{results[1]}\n"
+            if name == "real_data":
+                tables["crossing"] = f"{_crossings(results[0])}\n{results[1]}\n"
     if (filters := found["filters"]) is not None:
         _draw_filters(figures / "identification-filters.png", filters[0])
     talk(f"wrote the figures of identification to {figures}")

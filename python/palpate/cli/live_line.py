@@ -13,15 +13,20 @@ import click
 
 from ..devices import DeviceError
 from ..errors import InputError
+from .ending import terminated_as_interrupted
 from .output import number
 
 
 @contextmanager
 def live_line(rate_hz: float, units: tuple[str, str]) -> Iterator[LiveLine]:
-    """A `LiveLine` while a device is at work; what the device refuses is an InputError of one sentence."""
+    """A `LiveLine` while a device is at work, which a request to terminate ends as Ctrl-C does.
+
+    What the device refuses is an InputError of one sentence.
+    """
     line = LiveLine(rate_hz, units)
     try:
-        yield line
+        with terminated_as_interrupted():
+            yield line
     except DeviceError as error:
         raise InputError(str(error)) from None
     finally:

@@ -82,7 +82,7 @@ def plan(
     """
     from ..model import load_model
     from ..planning import DeviceProfile, profile_file
-    from ..planning.plan import plan as choose
+    from ..planning.ladder import plan as choose
 
     profile_path = profile_file(device)
     if plot is not None:

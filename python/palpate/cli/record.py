@@ -11,7 +11,7 @@ import click
 from ..errors import InputError
 from .arguments import PATH, json_option
 from .device_options import device_options
-from .ending import WorkError, terminated_as_interrupted
+from .ending import WorkError
 from .live_line import live_line
 from .output import number, print_json, print_numbers, require_writable, talk
 from .verb import Verb
@@ -76,7 +76,7 @@ def record(
     units = ("rad", "Nm") if mounted is None else (mounted.units["position"], mounted.units["force"])
     who = "the device moves the handle" if probe else "move the handle over the whole object, slowly"
     talk(f"{device}: recording to {recording} for {number(duration_s)} s; {who}; Ctrl-C ends it")
-    with live_line(rate_hz, units) as line, terminated_as_interrupted():
+    with live_line(rate_hz, units) as line:
         summary = record_object(
             recording,
             device=device,

@@ -38,6 +38,9 @@ EVEN = 0.5
 WORTH_FINER = 4.0
 """How many times smaller the error must become by wavelets finer than noise would allow."""
 
+ALIKE = 3.0
+"""Standard errors of the correlation of what is left at neighbouring positions from which it is no noise."""
+
 STRETCHED = 64
 """Members of the frame that are tried stretched along each input, where there are several."""
 
@@ -102,19 +105,23 @@ def grow(
 ) -> Grown:
     """Grow from the wavelets of start; where what is left is no noise, then finer than noise would allow.
 
-    That is for a force that is known to be a single one, not for wavelets that stay on the frame, nor where
-    fresh rows judge.
+    Noise is as large everywhere, and differs from each position to the next. Finer wavelets are taken where
+    they leave a fraction of the error, or where neighbours agree about what is left and the criterion falls
+    as for a rung of the ladder. That is for a force that is known to be a single one, not for wavelets that
+    stay on the frame, nor where fresh rows judge.
     """
     found = _grown(problem, library, start, rung, options)
     coarse = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
     if coarse or not single or problem.n_channels > 1 or len(found.solution.basis) == 0:
         return found
-    if problem.resolved_by <= WITHOUT_NOISE or problem.evenness(found.solution) >= EVEN:
+    alike = problem.likeness(found.solution) > ALIKE
+    if problem.resolved_by <= WITHOUT_NOISE or not (alike or problem.evenness(found.solution) < EVEN):
         return found
     before, problem.resolved_by = problem.resolved_by, WITHOUT_NOISE
     fine = Library(problem, resolved_frame(problem, options))
     finer = _grown(problem, fine, found.solution.basis, rung, options)
-    if problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
+    earned = alike and finer.criterion + options.rung_evidence < found.criterion
+    if earned or problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
         return replace(finer, path=(*found.path[:-1], finer.path[-1]))
     problem.resolved_by = before
     problem.set_prior(found.solution.rss)

@@ -22,6 +22,12 @@ class HysteresisInput:
     play_radius: float | None = None
     """[box]"""
 
+    @property
+    def both_ways(self) -> bool:
+        """Whether the known rows hold strokes into the object and out of it."""
+        side = self.side[self.known]
+        return bool((side > 0.0).any() and (side < 0.0).any())
+
     @classmethod
     def of_strokes(cls, side: Float1D) -> "HysteresisInput":
         """+1, -1: the stroke of each row (n,)."""

@@ -15,6 +15,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
 from .constraints import domain_bounds, impose, moved_to_bounds
+from .crossing import crossing
 from .evidence import Evidence
 from .fresh import kept_back
 from .growth import Grown, PathPoint, judge, prune
@@ -79,7 +80,8 @@ class Ladder:
         self.notes: list[str] = []
         self.path: list[PathPoint] = list(before.path) if before else []
         self._grown_before: dict[str, Basis] = dict(before._grown_before) if before else {}
-        self._options, self._name, self._slope_unit = options, network, reach
+        self._options, self._name = options, network
+        self._lower, self._slope_unit = lower, reach
         self._fixed_force = None
         if options.fixed_force is not None:
             place, fixed = options.fixed_force
@@ -122,10 +124,10 @@ class Ladder:
         strokes = self._play.best_tried(best.solution.basis)
         if strokes is not None:
             return self._play.with_first_states(self._hysteresis(best, strokes))
-        short = "the motions between gaps of time are too short to tell hysteresis"
+        untold = "the motions between gaps of time are too short to tell it, or never turn back"
         if "hysteresis" in self._options.inputs:
-            raise InputError(f"inputs names hysteresis, but {short}")
-        self.notes.append(f"hysteresis was not tried: {short}")
+            raise InputError(f"inputs names hysteresis, but {untold}")
+        self.notes.append(f"hysteresis was not tried: {untold}")
         return best
 
     def _constant(self, rows: Compressed) -> Rung:
@@ -263,7 +265,10 @@ class Ladder:
                 kept = trial
         names = " and ".join(dict.fromkeys(bound.name for bound in bounds))
         price = f"RMS error {problem.rmse(kept):.4g} with, {rung.rmse:.4g} without"
-        self.notes.append(f"{rung.name}: {names} imposed over the domain, {price}")
+        crossed = ""
+        if options.hysteresis_nonnegative:
+            crossed = crossing(problem, rung.solution, self._lower, self._slope_unit)
+        self.notes.append(f"{rung.name}: {names} imposed over the domain, {price}{crossed}")
         more = problem.n_parameters(len(kept.basis)) - problem.n_parameters(len(rung.solution.basis))
         return replace(rung, solution=kept, n_parameters=rung.n_parameters + more)
 

@@ -36,10 +36,11 @@ class PlaySearch:
     def best_tried(self, basis: Basis) -> HysteresisInput | None:
         """The hysteresis input of that radius of the options which helps most on given wavelets.
 
-        None where the motions between gaps of time are too short for any of them.
+        None where the motions between gaps of time are too short for any of them, or never turn back: g + h
+        alone is one force of position, and h could be anything.
         """
         tried = [self._of(radius) for radius in self._options.play_radius]
-        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN]
+        judged = [one for one in tried if one.known.mean() >= LEAST_KNOWN and one.both_ways]
         return min(judged, key=lambda strokes: self._left_by(strokes, basis), default=None)
 
     def with_first_states(self, rung: Rung) -> Rung:

@@ -166,6 +166,14 @@ class SeparableProblem:
         residual = np.abs(np.concatenate(solution.residuals))
         return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
 
+    def likeness(self, solution: Solution) -> float:
+        """Correlation of what is left at neighbouring positions, in standard errors; one channel, d = 1."""
+        if self.dimension > 1 or self.n_channels > 1:
+            return 0.0
+        (residual,) = solution.residuals
+        alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
+        return alike * float(np.sqrt(len(residual)))
+
     def fresh_errors(self, solution: Solution, fresh: FreshRows) -> Float1D:
         """Force less the solution's at rows that the problem was not made of."""
         return fresh.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)

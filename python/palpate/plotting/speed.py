@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -12,6 +13,13 @@ from .._typing import Float1D
 from .look import grid, label
 
 _MARKERS = "os^Dv<>pP*Xhd"
+_THIN_LINE: dict[str, Any] = {
+    "color": "black",
+    "linewidth": 0.5,
+    "markersize": 4.0,
+    "markerfacecolor": "white",
+    "markeredgewidth": 0.7,
+}
 
 
 @dataclass(frozen=True)
@@ -74,17 +82,7 @@ def draw_work_precision(axes: Axes, steps: Sequence[WorkPrecision], position_uni
     """
     ceiling = 3.0 * max(float(step.error.max()) for step in steps)
     for marker, step in zip(_MARKERS, steps, strict=False):
-        (line,) = axes.plot(
-            step.work,
-            step.error,
-            color="black",
-            linewidth=0.5,
-            marker=marker,
-            markersize=4.0,
-            markerfacecolor="white",
-            markeredgewidth=0.7,
-            label=step.name,
-        )
+        (line,) = axes.plot(step.work, step.error, marker=marker, label=step.name, **_THIN_LINE)
         axes.plot(
             step.diverges,
             [ceiling] * len(step.diverges),
@@ -216,17 +214,7 @@ def draw_over_wavelets(axes: Axes, curves: Sequence[OverWavelets], quantity: str
         Label of the vertical axis.
     """
     for marker, curve in zip(_MARKERS, curves, strict=False):
-        axes.plot(
-            curve.wavelets,
-            curve.quantity,
-            color="black",
-            linewidth=0.5,
-            marker=marker,
-            markersize=4.0,
-            markerfacecolor="white",
-            markeredgewidth=0.7,
-            label=curve.name,
-        )
+        axes.plot(curve.wavelets, curve.quantity, marker=marker, label=curve.name, **_THIN_LINE)
     axes.set_xscale("log", base=2)
     axes.set_yscale("log")
     axes.xaxis.set_major_formatter("{x:g}")

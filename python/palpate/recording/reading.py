@@ -44,6 +44,7 @@ def read_recording(
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
     zero: tuple[int | None, int | None] | None = None,
+    force_late_s: float = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
     """Read a recording from CSV or Parquet.
@@ -77,6 +78,9 @@ def read_recording(
     zero : (start, stop), optional
         Half-open range of data rows, counted as `rows`, in which the tool touches nothing: their mean force
         is taken off all forces.
+    force_late_s : float
+        How long after its position each force was recorded [s], as where a load cell's converter averages:
+        every force is brought back to the position it belongs to. Needs time.
     invalid : {"refuse", "drop"}
         What to do with a row that has no number where one is needed, an infinite one, or a time that repeats
         or runs backward: refuse the file, naming the row, or drop the row and count it.
@@ -178,7 +182,7 @@ def read_recording(
         rows=len(x),
         columns=_source_columns(choice, stroke),
     )
-    return Recording(
+    recording = Recording(
         position=x,
         force=f,
         time=None if choice.time is None else _in_si(choice.time, cells),
@@ -194,6 +198,7 @@ def read_recording(
         source=source,
         notes=(chosen(choice, stroke, torque_constant), *notes, *noticed(x, f, words)),
     )
+    return recording.with_force_earlier(force_late_s) if force_late_s else recording
 
 
 def _row_range(file: Path, rows: tuple[int | None, int | None] | None, total: int) -> tuple[int, int]:

@@ -217,6 +217,10 @@ class Recording:
         return self._part(~held_out, every, False), self._part(held_out, every, True)
 
     def _part(self, rows: npt.NDArray[np.bool_], every: int, held_out: bool) -> Recording:
+        part = self._rows(rows)
+        return replace(part, source=replace(part.source, held_out_every=every, held_out=held_out))
+
+    def _rows(self, rows: npt.NDArray[np.bool_]) -> Recording:
         return replace(
             self,
             position=self.position[rows],
@@ -225,10 +229,40 @@ class Recording:
             direction=None if self.direction is None else self.direction[rows],
             inputs=self.inputs[rows],
             columns={name: cells[rows] for name, cells in self.columns.items()},
-            source=replace(
-                self.source, rows=int(np.count_nonzero(rows)), held_out_every=every, held_out=held_out
-            ),
+            source=replace(self.source, rows=int(np.count_nonzero(rows))),
         )
+
+    def with_force_earlier(self, late_s: float) -> Recording:
+        """The same motion where the force was recorded late_s [s] after the position it belongs to.
+
+        Where a stroke turns on a steep force, a late one lies higher on the way back than on the way in,
+        which no passive object does. Positions and further inputs become those of late_s before; the first
+        rows, whose position then was not recorded, are left out.
+
+        Raises
+        ------
+        InputError
+            The recording has no time, or late_s is negative or leaves nothing.
+        """
+        if self.time is None:
+            raise InputError("a force that was recorded late can be brought back only with a column of time")
+        time = self.time
+        then = time - late_s
+        rows = then >= time[0]
+        if not (late_s >= 0.0 and rows.any()):
+            last = float(time[-1] - time[0])
+            raise InputError(f"the force is late by {late_s} s; it must be a number from 0 to {last:g} s")
+
+        def before(values: Float1D) -> Float1D:
+            return np.interp(then, time, values)
+
+        moved = replace(
+            self,
+            position=before(self.position),
+            inputs=np.column_stack([*map(before, self.inputs.T), np.empty((len(self), 0))]),
+            notes=(*self.notes, f"each force belongs to the position {late_s:g} s before"),
+        )
+        return moved._rows(rows)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the recording as CSV that :func:`palpate.read_recording` reads back exactly, with no option.

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where measured strokes cross: release above press, by which a loop would gain energy."""
+
+import numpy as np
+
+from .. import _core
+from .separable import SeparableProblem, Solution
+
+GRID = 2048
+"""Places that are looked at."""
+
+WORTH_TELLING = 3.0
+"""RMS errors that release has to lie above press."""
+
+
+def crossing(problem: SeparableProblem, free: Solution, lower: float, reach: float) -> str:
+    """How far release lies above press at most, and where, as the end of a sentence; empty where hardly.
+
+    free is a solution g + s h that h >= 0 was not imposed on, over one input from lower to lower + reach.
+    Only places where both strokes were measured count.
+    """
+    first = max(float(block.positions.min()) for block in problem.blocks)
+    last = min(float(block.positions.max()) for block in problem.blocks)
+    if len(problem.readout) < 2 or last <= first:
+        return ""
+    places = np.linspace(first, last, GRID)
+    columns = _core.wavelet_columns(places, free.basis.alpha, free.basis.beta)
+    bias, slope, *weights = problem.readout[1] @ free.coefficients
+    above = -2.0 * (bias + slope * places + columns @ np.asarray(weights))
+    deepest = int(np.argmax(above))
+    if above[deepest] < WORTH_TELLING * problem.resolved_rmse(free):
+        return ""
+    within = np.flatnonzero(above <= 0.0)
+    start = within[within < deepest].max(initial=-1) + 1
+    end = within[within > deepest].min(initial=GRID) - 1
+    near, far = lower + reach * places[start], lower + reach * places[end]
+    return (
+        f"; release lies above press by up to {above[deepest]:.3g} between {near:.4g} and {far:.4g}, "
+        "which no passive object does, but a force that is recorded late (--force-late-s)"
+    )
