@@ -88,8 +88,30 @@ def test_nothing_is_learned_from_a_row_of_no_weight() -> None:
     far = np.vstack([X, [[50.0]]])
     weight = np.append(np.ones(len(y)), 0.0)
     network = WaveletNetworkRegressor().fit(far, np.append(y, 1e6), sample_weight=weight)
-    assert network.network_.upper[0] < 1.0
-    assert np.array_equal(network.predict(X), WaveletNetworkRegressor().fit(X, y).predict(X))
+    without = WaveletNetworkRegressor().fit(X, y)
+    assert network.network_.upper[0] == without.network_.upper[0]
+    assert np.array_equal(network.predict(X), without.predict(X))
+
+
+def test_the_domain_reaches_beyond_rows_drawn_from_a_range_as_far_as_they_fall_short_of_it() -> None:
+    """The least of m values from 0 to 1 stands at 1/(m + 1) on average, and the domain's edge at 0."""
+    random = np.random.default_rng(0)
+    edges = []
+    for _ in range(200):
+        X = random.uniform(size=(30, 2))
+        model = WaveletNetworkRegressor(max_wavelets=0).fit(X, X[:, 0]).network_
+        assert np.all(model.lower < X.min(axis=0))
+        assert np.all(model.upper > X.max(axis=0))
+        edges.extend([*model.lower, *(1.0 - model.upper)])
+    assert abs(np.mean(edges)) < 0.2 / 31.0
+
+
+def test_repeated_rows_say_no_more_about_the_domain() -> None:
+    X, y = bump(40)
+    once, often = (
+        WaveletNetworkRegressor(max_wavelets=0).fit(np.repeat(X, k, axis=0), np.repeat(y, k)) for k in (1, 5)
+    )
+    assert np.array_equal(once.network_.upper, often.network_.upper)
 
 
 @pytest.mark.parametrize("weight", [[1.0] * 299, [-1.0] + [1.0] * 299, [np.nan] + [1.0] * 299, [0.0] * 300])

@@ -19,7 +19,7 @@ from .options import IdentifyOptions
 from .quasi_newton import refine_all
 from .refinement import refine
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
-from .separable import TINY, Basis, SeparableProblem, Solution
+from .separable import RESOLVED, TINY, Basis, SeparableProblem, Solution
 from .stopping import CRITERIA, ON_FRESH_ROWS, choice, deviance, enough
 
 PRUNE_CANDIDATES = 3
@@ -40,6 +40,9 @@ WORTH_FINER = 4.0
 
 ALIKE = 3.0
 """Standard errors of the correlation of what is left at neighbouring positions from which it is no noise."""
+
+SMOOTH = 0.25
+"""Share of the positions that a core holds at least while a force over several inputs is tried as smooth."""
 
 STRETCHED = 64
 """Members of the frame that are tried stretched along each input, where there are several."""
@@ -107,12 +110,15 @@ def grow(
 
     Noise is as large everywhere, and differs from each position to the next. Finer wavelets are taken where
     they leave a fraction of the error, or where neighbours agree about what is left and the criterion falls
-    as for a rung of the ladder. That is for a force that is known to be a single one, not for wavelets that
-    stay on the frame, nor where fresh rows judge.
+    as for a rung of the ladder. A smooth force over several inputs is left to wide wavelets. All that is for
+    a force known to be a single one, not for wavelets that stay on the frame, nor where fresh rows judge.
     """
-    found = _grown(problem, library, start, rung, options)
     coarse = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
-    if coarse or not single or problem.n_channels > 1 or len(found.solution.basis) == 0:
+    free = single and not coarse and problem.n_channels == 1
+    wide = free and problem.dimension > 1
+    found = _grown(problem, library, start, rung, options, wide=wide)
+    settled = wide and _little(problem, problem.rmse(found.solution))
+    if not free or settled or len(found.solution.basis) == 0:
         return found
     alike = problem.likeness(found.solution) > ALIKE
     if problem.resolved_by <= WITHOUT_NOISE or not (alike or problem.evenness(found.solution) < EVEN):
@@ -129,13 +135,21 @@ def grow(
 
 
 def _grown(
-    problem: SeparableProblem, library: Library, start: Basis, rung: str, options: IdentifyOptions
+    problem: SeparableProblem,
+    library: Library,
+    start: Basis,
+    rung: str,
+    options: IdentifyOptions,
+    *,
+    starts: int = STARTS,
+    wide: bool = False,
 ) -> Grown:
     """Grow from the wavelets of start until the criterion stops it, prune, refine to the end.
 
     Growth goes on for `patience` wavelets past the best size, and pruning starts from there: a few wavelets
     too many let refinement find a better arrangement of those that stay. Where fresh rows judge, the size is
-    theirs to choose and nothing is pruned.
+    theirs to choose and nothing is pruned. With wide, wide wavelets alone have one try, once the error has
+    come half the way, in digits, from the force's range to what a sensor resolves.
     """
     problem.set_prior(problem.solve(start).rss)
     if options.selection == "backward":
@@ -147,7 +161,11 @@ def _grown(
         if enough(options.criterion, path[-1].criterion) or options.selection == "backward":
             stop_reason = options.criterion
             break
-        added = _with_candidate(problem, library, current, options)
+        if wide and problem.rmse(current) <= np.sqrt(RESOLVED) * problem.force_range:
+            wide = False
+            if (smooth := _smooth(problem, start, rung, options)) is not None:
+                return smooth
+        added = _with_candidate(problem, library, current, options, starts)
         if added is None:
             stop_reason = "data"
             break
@@ -169,6 +187,31 @@ def _grown(
     if len(final.basis) < options.max_wavelets and stop_reason == "max_wavelets":
         stop_reason = options.criterion
     return Grown(final, path[-1].criterion, stop_reason, tuple(path))
+
+
+def _smooth(problem: SeparableProblem, start: Basis, rung: str, options: IdentifyOptions) -> Grown | None:
+    """A network of wide wavelets, if it leaves little.
+
+    The best candidates are mostly narrow: they mend a few rows each, and rows are far apart over several
+    inputs, so that a network of them reads the rows well and errs between and beside them. Wide ones cannot.
+    Where rows of one cell differ by more there is no need to try.
+    """
+    if not _little(problem, np.sqrt(problem.within / problem.samples)):
+        return None
+    before, prior = problem.resolved_by, problem.prior
+    problem.resolved_by = max(before, int(SMOOTH * len(problem.blocks[0].positions)))
+    library = Library(problem, resolved_frame(problem, options))
+    found = _grown(problem, library, start, rung, options, starts=1)
+    problem.resolved_by = before
+    if _little(problem, problem.rmse(found.solution)):
+        return found
+    problem.prior = prior
+    return None
+
+
+def _little(problem: SeparableProblem, error: float) -> bool:
+    """Whether an error is so near to what a sensor resolves that finer wavelets are not worth trying."""
+    return bool(error <= WORTH_FINER * RESOLVED * problem.force_range)
 
 
 def _eliminated(problem: SeparableProblem, library: Library, start: Basis, options: IdentifyOptions) -> Basis:
@@ -206,7 +249,7 @@ def _price(problem: SeparableProblem, solution: Solution, options: IdentifyOptio
 
 
 def _with_candidate(
-    problem: SeparableProblem, library: Library, current: Solution, options: IdentifyOptions
+    problem: SeparableProblem, library: Library, current: Solution, options: IdentifyOptions, starts: int
 ) -> Solution | None:
     """The network with the frame member that helps most, or None where data allow no further wavelet.
 
@@ -218,11 +261,11 @@ def _with_candidate(
         return None
     measured = residual_gains if options.selection == "residual" else orthogonal_gains
     gains = measured(library, current)
-    starts = 1
-    if problem.dimension > 1 and options.refine:
+    several = problem.dimension > 1 and options.refine
+    if several:
         library = library.stretched(problem, _falling(gains)[:STRETCHED])
-        gains, starts = measured(library, current), STARTS
-    chosen = library.unlike(_falling(gains), starts)
+        gains = measured(library, current)
+    chosen = library.unlike(_falling(gains), starts if several else 1)
     tried = [problem.solve(current.basis.joined(library.members([index]))) for index in chosen]
     if len(tried) > 1:
         tried = [_refined(problem, start, FIRST_STEPS, options, GROWING_TOLERANCE) for start in tried]

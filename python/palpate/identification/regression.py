@@ -39,9 +39,9 @@ class Regression:
     columns: NDArray[np.int64]
     """(d,) which columns of X the network has as inputs: the constant ones are left out"""
     lower: Float1D
-    """(d,) least value of each"""
+    """(d,) least value of each, less the margin of a sample"""
     upper: Float1D
-    """(d,) largest value of each"""
+    """(d,) largest value of each, plus that margin"""
     readings: Readings
     """Wavelets, weights, slopes and bias in the units of X and y"""
     rung: str
@@ -92,10 +92,11 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
     with threadpool_limits(limits=1, user_api="blas"):
         found, path = _fitted(_Rows(box, y, fresh), weight, options)
         readings = Readings.of(found.solution, found.problem.readout, lower, upper - lower)
+    margin = _margin(box) * (upper - lower)
     return Regression(
         columns=columns,
-        lower=lower,
-        upper=upper,
+        lower=lower - margin,
+        upper=upper + margin,
         readings=readings,
         rung=found.name,
         stop_reason=found.stop_reason,
@@ -103,6 +104,15 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
         rmse=found.rmse,
         path=tuple(path),
     )
+
+
+def _margin(box: Float2D) -> float:
+    """How far the range that rows were drawn from reaches beyond them, on each side [box].
+
+    The extremes of m values drawn evenly from a range fall short of it by 1/(m + 1) of it on average, which
+    is 1/(m - 1) of what they span: no more than a few rows of a wavelet's core.
+    """
+    return 1.0 / max(len(np.unique(box, axis=0)) - 1, 1)
 
 
 def _unit(value: Float1D) -> Float1D:

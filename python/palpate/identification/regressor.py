@@ -80,8 +80,10 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
 
     Notes
     -----
-    Outside the box of the data the network goes on from the nearest point of the box by the gradient there,
-    falling ones cut to 0: as a force does that must not push a hand further away. Q. Zhang, *Using wavelet
+    The network's domain is the box of the data and, on each side, 1/(m - 1) of its width, m distinct rows: by
+    so much the extremes of a sample fall short of the range that it was drawn from. Outside the network goes
+    on from the nearest point of the domain by the gradient there, falling ones cut to 0: as a force does that
+    must not push a hand further away. Q. Zhang, *Using wavelet
     network in nonparametric estimation*, IEEE Transactions on Neural Networks 8 (2), 1997.
 
     Examples
