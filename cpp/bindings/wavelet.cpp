@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -20,10 +22,24 @@ using namespace py::literals;
 
 namespace {
 
+/// One radial hat at a block of samples, from the squares of u.
+struct Hats {
+    static constexpr std::size_t block = 64;
+
+    double inputs;
+    std::size_t first = 0, size = 0;
+    std::array<double, block> square{}, gaussian{};
+
+    [[nodiscard]] RadialMexicanHat at(std::size_t k) const noexcept {
+        return {(square[k] - inputs) * gaussian[k], (inputs + 2.0 - square[k]) * gaussian[k]};
+    }
+};
+
 /// Samples and wavelets of one call: X (n, d), alpha and beta (N, d). One-dimensional arrays mean d = 1.
 struct Frame {
     std::size_t samples, wavelets, dimension;
-    const double *x, *alpha, *beta;
+    std::vector<double> inputs;  ///< X input by input
+    const double *alpha, *beta;
 
     Frame(const Array& x_array, const Array& alpha_array, const Array& beta_array) {
         const auto columns = [](const Array& array, const char* name) {
@@ -42,14 +58,19 @@ struct Frame {
         }
         samples = static_cast<std::size_t>(x_array.shape(0));
         wavelets = static_cast<std::size_t>(alpha_array.shape(0));
-        x = x_array.data();
+        inputs.resize(samples * dimension);
+        for (std::size_t j = 0; j < dimension; ++j) {
+            for (std::size_t k = 0; k < samples; ++k) {
+                inputs[j * samples + k] = x_array.data()[k * dimension + j];
+            }
+        }
         alpha = alpha_array.data();
         beta = beta_array.data();
     }
 
     /// u_j of wavelet i at sample k.
     [[nodiscard]] double scaled(std::size_t i, std::size_t k, std::size_t j) const noexcept {
-        return alpha[i * dimension + j] * (x[k * dimension + j] - beta[i * dimension + j]);
+        return alpha[i * dimension + j] * (inputs[j * samples + k] - beta[i * dimension + j]);
     }
 
     /// The same for what a hat is multiplied by: far away it is zero whatever u is, even if it is infinite.
@@ -57,37 +78,42 @@ struct Frame {
         return std::clamp(scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
     }
 
-    /// Calls visit(k, psi) for every sample k with the radial hat of wavelet i there, a block at a time: the
-    /// exponentials of a block are vectorised, and none is taken where the wavelet reaches no sample of it.
+    /// Calls visit(hats) for every block of samples with the radial hats of wavelet i there. Each line of the
+    /// work is a loop over a block that the compiler vectorises, and no exponential is taken where the wavelet
+    /// reaches no sample of it.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        constexpr std::size_t block = 64;
         // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
         // algebra takes ten times as long.
         constexpr double nothing_is_left = 160.0;
-        const auto d = static_cast<double>(dimension);
-        std::array<double, block> square{};
-        std::array<double, block> gaussian{};
-        for (std::size_t first = 0; first < samples; first += block) {
-            const std::size_t size = std::min(block, samples - first);
-            double nearest = nothing_is_left;
-            for (std::size_t k = 0; k < size; ++k) {
-                double sum = 0.0;
-                for (std::size_t j = 0; j < dimension; ++j) {
-                    const double u = scaled(i, first + k, j);
-                    sum += u * u;
+        constexpr double most = detail::hat_reach * detail::hat_reach;
+        Hats hats{static_cast<double>(dimension)};
+        for (; hats.first < samples; hats.first += Hats::block) {
+            hats.size = std::min(Hats::block, samples - hats.first);
+            std::fill_n(hats.square.begin(), hats.size, 0.0);
+            for (std::size_t j = 0; j < dimension; ++j) {
+                const double dilation = alpha[i * dimension + j];
+                const double centre = beta[i * dimension + j];
+                const double* input = inputs.data() + j * samples + hats.first;
+                for (std::size_t k = 0; k < hats.size; ++k) {
+                    const double u = dilation * (input[k] - centre);
+                    hats.square[k] += u * u;
                 }
-                square[k] = std::min(sum, detail::hat_reach * detail::hat_reach);
-                nearest = std::min(nearest, square[k]);
             }
-            if (nearest < nothing_is_left) {
-                detail::hat_kernel().gaussians(square.data(), size, gaussian.data());
+            std::int64_t near = 0;
+            for (std::size_t k = 0; k < hats.size; ++k) {
+                const double square = hats.square[k];
+                hats.square[k] = square > most ? most : square;
+                near |= static_cast<std::int64_t>(square < nothing_is_left);
             }
-            for (std::size_t k = 0; k < size; ++k) {
-                gaussian[k] = square[k] < nothing_is_left ? gaussian[k] : 0.0;
-                visit(first + k,
-                      RadialMexicanHat{(square[k] - d) * gaussian[k], (d + 2.0 - square[k]) * gaussian[k]});
+            if (near != 0) {
+                detail::hat_kernel().gaussians(hats.square.data(), hats.size, hats.gaussian.data());
             }
+            for (std::size_t k = 0; k < hats.size; ++k) {
+                const double gaussian = hats.gaussian[k];
+                hats.gaussian[k] = hats.square[k] < nothing_is_left ? gaussian : 0.0;
+            }
+            visit(std::as_const(hats));
         }
     }
 };
@@ -105,7 +131,12 @@ Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
     for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        frame.radial(i, [&](std::size_t /*k*/, const RadialMexicanHat& psi) { *out++ = psi.value; });
+        frame.radial(i, [&](const Hats& hats) {
+            double* column = out + i * frame.samples + hats.first;
+            for (std::size_t k = 0; k < hats.size; ++k) {
+                column[k] = hats.at(k).value;
+            }
+        });
     }
     return result;
 }
@@ -129,20 +160,47 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
     {
         const py::gil_scoped_release unlocked;
         for (std::size_t i = 0; i < frame.wavelets; ++i) {
-            frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
-                const std::size_t at = i * frame.samples + k;
-                value_out[at] = psi.value;
+            frame.radial(i, [&](const Hats& hats) {
+                const std::size_t at = i * frame.samples + hats.first;
+                for (std::size_t k = 0; k < hats.size; ++k) {
+                    value_out[at + k] = hats.at(k).value;
+                }
                 for (std::size_t j = 0; j < frame.dimension; ++j) {
                     const double dilation = frame.alpha[i * frame.dimension + j];
-                    const double u = frame.clamped(i, k, j);
-                    const double by_u = psi.gradient_over_u * u;
-                    alpha_out[j][at] = by_u * (u / dilation);
-                    beta_out[j][at] = -dilation * by_u;
+                    for (std::size_t k = 0; k < hats.size; ++k) {
+                        const double u = frame.clamped(i, hats.first + k, j);
+                        const double by_u = hats.at(k).gradient_over_u * u;
+                        alpha_out[j][at + k] = by_u * (u / dilation);
+                        beta_out[j][at + k] = -dilation * by_u;
+                    }
                 }
             });
         }
     }
     return {std::move(value), std::move(by_alpha), std::move(by_beta)};
+}
+
+Columns wavelet_steps(const Array& x, const Array& alpha, const Array& beta) {
+    const Frame frame(x, alpha, beta);
+    auto result = columns(frame.samples, 2 * frame.dimension * frame.wavelets);
+    double* out = result.mutable_data();
+    const py::gil_scoped_release unlocked;
+    const std::size_t input = frame.wavelets * frame.samples;
+    double* by_shift = out + frame.dimension * input;
+    for (std::size_t i = 0; i < frame.wavelets; ++i) {
+        frame.radial(i, [&](const Hats& hats) {
+            std::size_t at = i * frame.samples + hats.first;
+            for (std::size_t j = 0; j < frame.dimension; ++j, at += input) {
+                for (std::size_t k = 0; k < hats.size; ++k) {
+                    const double u = frame.clamped(i, hats.first + k, j);
+                    const double by_u = hats.at(k).gradient_over_u * u;
+                    out[at + k] = by_u * u;
+                    by_shift[at + k] = -by_u;
+                }
+            }
+        });
+    }
+    return result;
 }
 
 std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alpha, const Array& beta) {
@@ -155,11 +213,14 @@ std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alph
     }
     const py::gil_scoped_release unlocked;
     for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
+        frame.radial(i, [&](const Hats& hats) {
             for (std::size_t j = 0; j < frame.dimension; ++j) {
                 const double dilation = frame.alpha[i * frame.dimension + j];
-                const double u = frame.clamped(i, k, j);
-                *out[j]++ = dilation * dilation * psi.curvature(u);
+                double* column = out[j] + i * frame.samples + hats.first;
+                for (std::size_t k = 0; k < hats.size; ++k) {
+                    column[k] =
+                        dilation * dilation * hats.at(k).curvature(frame.clamped(i, hats.first + k, j));
+                }
             }
         });
     }
@@ -175,8 +236,12 @@ Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& b
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
     for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        frame.radial(i, [&](std::size_t k, const RadialMexicanHat& psi) {
-            *out++ = frame.alpha[i] * (psi.gradient_over_u * frame.clamped(i, k, 0));
+        frame.radial(i, [&](const Hats& hats) {
+            double* column = out + i * frame.samples + hats.first;
+            for (std::size_t k = 0; k < hats.size; ++k) {
+                column[k] =
+                    frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
+            }
         });
     }
     return result;
@@ -207,6 +272,9 @@ void bind_wavelet(py::module_& module) {
     module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
                "The wavelet columns and their derivatives by the dilations and the translations:\n"
                "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
+    module.def("wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
+               "Derivatives of the wavelet columns by steps without a unit, d log(alpha) and alpha d(beta):\n"
+               "(n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.");
     module.def("wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
                "Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
     module.def("wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,

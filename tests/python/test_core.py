@@ -66,6 +66,9 @@ def test_columns_and_jacobian_agree_with_differences(dimension: int) -> None:
         ):
             difference = (_core.wavelet_columns(x, *up) - _core.wavelet_columns(x, *down)) / (2 * h)
             assert derivative == pytest.approx(difference, abs=1e-8)
+    inputs = range(dimension)
+    steps = [alpha[:, j] * by_alpha[j] for j in inputs] + [by_beta[j] / alpha[:, j] for j in inputs]
+    assert _core.wavelet_steps(x, alpha, beta) == pytest.approx(np.concatenate(steps, axis=1), abs=1e-13)
 
 
 def test_columns_are_safe_for_every_number_and_any_length() -> None:

@@ -51,7 +51,7 @@ def test_gains_are_what_a_new_least_squares_would_gain(kind: str) -> None:
     for index in np.argsort(gains)[-5:]:
         added = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
         direct = start.rss - problem.solve(start.basis.joined(added)).rss
-        assert gains[index] == pytest.approx(direct, rel=1e-5)
+        assert gains[index] == pytest.approx(direct, rel=1e-4)  # a library has seven digits
 
 
 @pytest.mark.parametrize("kind", SIDES)
@@ -107,7 +107,7 @@ def test_stretched_members_differ_from_a_member_in_one_dilation() -> None:
 def test_wavelets_that_are_tried_beside_each_other_are_unlike() -> None:
     rows = rows_of("one force")
     library = library_of(problem_of(rows, resolved_by=5), rows)
-    chosen = library.unlike(range(len(library)), 8)
+    chosen = library.unlike(np.arange(len(library)), 8)
     assert len(chosen) == 8
     for first, second in itertools.combinations(chosen, 2):
         alpha, beta = library.basis.alpha[[first, second], 0], library.basis.beta[[first, second], 0]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float1D, Float2D
+from .distinct import distinct_rows
 
 SIDE_LEVELS = 16
 """Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
@@ -181,10 +182,10 @@ def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.in
         distinct = np.unique(positions[:, 0])
         if len(distinct) <= max_positions:
             return np.searchsorted(distinct, positions[:, 0]), 0
-    else:
-        rows, key = np.unique(positions, axis=0, return_inverse=True)
-        if len(rows) <= max_positions:
-            return key.reshape(-1), 0
+    elif all(len(np.unique(column)) <= max_positions for column in positions.T):
+        chosen, key, _ = distinct_rows(positions)
+        if len(chosen) <= max_positions:
+            return key, 0
     per_axis = max(2, round(max_positions ** (1.0 / d)))
     low, reach = positions.min(axis=0), np.ptp(positions, axis=0)
     scale = np.divide(per_axis, reach, out=np.zeros_like(reach), where=reach > 0)

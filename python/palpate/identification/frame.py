@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .._typing import Float2D
 from ..errors import InputError
+from .distinct import distinct_rows
 from .options import IdentifyOptions
 from .separable import Basis, SeparableProblem
 
@@ -126,14 +127,17 @@ def truncated_frame(
     left, dilation = max_candidates, coarsest
     while dilation <= finest and left > 0:
         step = frame_step / dilation
-        nearest, count = np.unique(np.rint(positions / step).astype(np.int64), axis=0, return_counts=True)
+        nearest = np.rint(positions / step).astype(np.int64)
+        chosen, _, count = distinct_rows(nearest)
+        nearest = nearest[chosen]
         if len(nearest) <= left:
-            lattice = np.unique((nearest[:, None, :] + offsets).reshape(-1, d), axis=0)
+            lattice = (nearest[:, None, :] + offsets).reshape(-1, d)
+            lattice = lattice[distinct_rows(lattice)[0]]
             if len(lattice) > left:
                 lattice = nearest
         else:
             lattice = nearest[np.argsort(-count, kind="stable")[:left]]
-        beta.append(lattice * step)
+        beta.append(np.asarray(lattice * step))
         alpha.append(np.full((len(lattice), d), dilation))
         left -= len(lattice)
         dilation *= frame_scale

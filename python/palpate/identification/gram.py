@@ -3,7 +3,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
 
 from .._typing import Float1D, Float2D
 
@@ -17,6 +17,13 @@ def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]
     columns = right.reshape(len(gram), -1) / norm[:, None]
     solved, _ = dpotrs(factor, columns, lower=1)
     return np.asarray(solved / norm[:, None]).reshape(right.shape)
+
+
+def half_solved(gram: Float2D, right: Float2D) -> Float2D:
+    """M right with M' M the inverse of the system: products of what it returns are those of projections."""
+    factor, norm = factored(gram)
+    solved, _ = dtrtrs(factor, right / norm[:, None], lower=1)
+    return np.asarray(solved)
 
 
 def factored(gram: Float2D) -> tuple[Float2D, Float1D]:

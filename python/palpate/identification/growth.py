@@ -9,6 +9,7 @@ all, since of two that coincide one costs nothing to remove. N is thus decided a
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..errors import InputError
@@ -285,10 +286,9 @@ def _improved(
     return problem.solve(solution.basis)
 
 
-def _falling(gains: Float1D) -> list[int]:
+def _falling(gains: Float1D) -> NDArray[np.intp]:
     """The numbers of the candidates that gain anything, the best first."""
-    order = np.argsort(-gains, kind="stable")
-    return [int(index) for index in order[: np.count_nonzero(gains > 0.0)]]
+    return np.argsort(-gains, kind="stable")[: np.count_nonzero(gains > 0.0)]
 
 
 def _refined(

@@ -31,12 +31,14 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
 
     It ends early after IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
     """
-    best = start
+    best, linearised = start, None
     if len(start.basis) == 0:
         return best
     damping, idle, finest = 1e-2, 0, problem.finest(best.basis.beta)
-    matrix, gradient = problem.normal_equations(best)
     for _ in range(steps):
+        if linearised is not best:
+            matrix, gradient = problem.normal_equations(best)
+            linearised = best
         step = _bounded_step(best.basis, finest, matrix, gradient, damping)
         basis, finest_there = _moved(problem, best.basis, step)
         trial = problem.solve(basis)
@@ -44,13 +46,10 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
             gain = problem.samples * (best.objective - trial.objective) / problem.total(trial.rss)
             best, finest, damping = trial, finest_there, max(damping / 5.0, 1e-9)
             idle = idle + 1 if gain < tolerance else 0
-            if idle >= IDLE_STEPS:
-                break
-            matrix, gradient = problem.normal_equations(best)
         else:
             damping *= 6.0
-            if damping > 1e8:
-                break
+        if idle >= IDLE_STEPS or damping > 1e8:
+            break
     return best
 
 
@@ -71,7 +70,8 @@ def _bounded_step(
     diagonal = np.diag(system)
     floor = 1e-6 * diagonal.max() + np.finfo(float).tiny
     while True:
-        damped = system + np.diag(damping * np.maximum(diagonal, floor))
+        damped = system.copy()
+        np.einsum("ii->i", damped)[:] += damping * np.maximum(diagonal, floor)
         factor, failed = dpotrf(damped, lower=1)
         if not failed:
             break

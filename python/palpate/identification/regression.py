@@ -6,6 +6,7 @@ are constant, linear and network, judged on n = sum of the weights samples, and 
 parameters as there are samples.
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from .compression import Compressed, Compressor
+from .distinct import distinct_rows
 from .environment import MOST_HALVINGS
 from .frame import resolved_frame
 from .fresh import FreshRows, kept_back
@@ -111,7 +113,8 @@ def _margin(box: Float2D) -> float:
     The extremes of m values drawn evenly from a range fall short of it by 1/(m + 1) of it on average, which
     is 1/(m - 1) of what they span: no more than a few rows of a wavelet's core.
     """
-    return 1.0 / max(len(np.unique(box, axis=0)) - 1, 1)
+    distinct = np.unique(box) if box.shape[1] == 1 else distinct_rows(box)[0]
+    return 1.0 / max(len(distinct) - 1, 1)
 
 
 def _unit(value: Float1D) -> Float1D:
@@ -182,8 +185,7 @@ def _climbed(
     best = _better(best, line, options)
     if options.max_wavelets == 0 or problem.n_parameters(1) >= problem.samples:
         return best, path
-    # growth sets a prior of its own in its problem
-    apart = data.problem(rows, options)
+    apart = copy(problem)  # growth sets a prior of its own in its problem
     library = Library(apart, resolved_frame(apart, options))
     grown = grow(apart, library, start, "network", options)
     path.extend(grown.path)

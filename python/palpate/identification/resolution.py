@@ -5,13 +5,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .._typing import Float1D, Float2D
+from .distinct import distinct_rows
 
 
 class Resolution:
     """Distances from any place to the distinct ones of some positions (m, d)."""
 
     def __init__(self, positions: Float2D) -> None:
-        distinct = np.unique(positions, axis=0)
+        distinct = positions[distinct_rows(positions)[0]]
         self._sorted = distinct[:, 0] if distinct.shape[1] == 1 else None
         self._tree = cKDTree(distinct) if self._sorted is None else None
         self._size = len(distinct)

@@ -12,17 +12,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import _core
 from .._typing import Float1D, Float2D
-from .gram import solve_gram
+from .gram import half_solved
 from .refinement import COARSEST
 from .separable import Basis, SeparableProblem, Solution
 from .stopping import deviance
 
-DEPENDENT = 1e-7
-"""Share of a candidate's squared norm that must stand outside the design for it to be a new direction."""
+DEPENDENT = 1e-5
+"""Share of a candidate's squared norm that must stand outside the design for it to be a new direction: more
+than the rounding of seven digits."""
 
+AT_ONCE = 64
+"""Candidates whose columns are computed at a time: as many as a processor's cache holds."""
 
 UNLIKE = 1.0
 """Distance in units of a wavelet, or difference of log(alpha), from which two may end in different minima."""
@@ -32,28 +36,39 @@ STRETCHES = (0.25, 0.5, 2.0, 4.0)
 
 
 class Library:
-    """Candidate wavelets with their weighted columns on every block, computed once."""
+    """Candidate wavelets with their weighted columns on every block, computed once.
+
+    Seven digits are enough to rank candidates and take half the memory, which is what a library costs.
+    """
 
     def __init__(self, problem: SeparableProblem, candidates: Basis) -> None:
         resolved = np.all(candidates.alpha <= problem.finest(candidates.beta), axis=1)
         self.basis = Basis(candidates.alpha[resolved], candidates.beta[resolved])
-        self.columns: list[list[Float2D]] = []
+        self.columns: list[NDArray[np.float32]] = []
+        """(channels, candidates, m) of every block"""
         self.grams: list[Float2D] = []
+        """(channels, channels, candidates) products of a candidate's columns"""
         for block in problem.blocks:
-            wavelets = _core.wavelet_columns(block.positions, self.basis.alpha, self.basis.beta)
-            columns = [channel[:, None] * wavelets for channel in block.channels.T]
-            self.columns.append(columns)
-            self.grams.append(np.array([[np.einsum("nm,nm->n", a.T, b.T) for b in columns] for a in columns]))
+            self.columns.append(np.empty((block.n_channels, len(self), len(block.target)), np.float32))
+            self.grams.append(np.empty((block.n_channels, block.n_channels, len(self))))
+            for first in range(0, len(self), AT_ONCE):
+                part = slice(first, first + AT_ONCE)
+                wavelets = _core.wavelet_columns(
+                    block.positions, self.basis.alpha[part], self.basis.beta[part]
+                )
+                weighted = wavelets.T * block.channels.T[:, None]
+                self.columns[-1][:, part] = weighted
+                self.grams[-1][:, :, part] = np.einsum("knm,lnm->kln", weighted, weighted)
 
     def __len__(self) -> int:
         return len(self.basis)
 
-    def members(self, order: Sequence[int]) -> Basis:
+    def members(self, order: Sequence[int] | NDArray[np.intp]) -> Basis:
         """The candidates of these numbers."""
-        chosen = list(order)
+        chosen = np.asarray(order, dtype=np.intp)
         return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
 
-    def stretched(self, problem: SeparableProblem, order: Sequence[int]) -> "Library":
+    def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
         """The candidates of these numbers, and each with its dilation along one input changed."""
         chosen, d = self.members(order), problem.dimension
         combinations = [(factor, k) for k in range(d) for factor in STRETCHES]
@@ -63,18 +78,15 @@ class Library:
         alpha = np.maximum(chosen.alpha * factors, COARSEST).reshape(-1, d)
         return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
 
-    def unlike(self, order: Sequence[int], count: int) -> list[int]:
+    def unlike(self, order: NDArray[np.intp], count: int) -> list[int]:
         """The first of these numbers, so many at most, that stand apart or differ in a dilation."""
         chosen: list[int] = []
-        for index in order:
-            alpha, beta = self.basis.alpha[index], self.basis.beta[index]
-            others = self.members(chosen)
-            shift = np.abs(beta - others.beta) * np.sqrt(alpha * others.alpha)
-            stretch = np.abs(np.log(alpha / others.alpha))
-            if np.maximum(shift, stretch).max(axis=1).min(initial=np.inf) > UNLIKE:
-                chosen.append(int(index))
-                if len(chosen) == count:
-                    break
+        while len(order) and len(chosen) < count:
+            chosen.append(int(order[0]))
+            one, others = self.members(order[:1]), self.members(order)
+            shift = np.abs(one.beta - others.beta) * np.sqrt(one.alpha * others.alpha)
+            stretch = np.abs(np.log(one.alpha / others.alpha))
+            order = order[np.maximum(shift, stretch).max(axis=1) > UNLIKE]
         return chosen
 
 
@@ -93,8 +105,9 @@ class OrthogonalSelection:
         for columns, gram, factor, residual in zip(
             library.columns, library.grams, self._factors, self._residuals, strict=True
         ):
-            self._grams.append(gram - _projected_gram([factor.T @ column for column in columns]))
-            self._products.append(np.array([residual @ column for column in columns]))
+            products = _products(np.vstack([factor.T, residual]), columns)
+            self._grams.append(gram - _projected_gram(products[:, :-1]))
+            self._products.append(products[:, -1])
 
     def gains(self) -> Float1D:
         """(candidates,) fall of the residual sum of squares if that candidate were taken next."""
@@ -108,7 +121,7 @@ class OrthogonalSelection:
         rss = 0.0
         for b, columns in enumerate(self._library.columns):
             factor = self._factors[b]
-            fresh = np.column_stack([column[:, index] for column in columns])
+            fresh = columns[:, index].T.astype(np.float64)
             norm = np.linalg.norm(fresh, axis=0)
             for _ in range(2):  # twice is enough (Kahan): orthogonal to rounding
                 fresh = fresh - factor @ (factor.T @ fresh)
@@ -116,10 +129,10 @@ class OrthogonalSelection:
             basis = basis[
                 :, np.abs(np.diag(triangle)) > np.sqrt(DEPENDENT) * np.maximum(norm, np.finfo(float).tiny)
             ]
-            shadows = [basis.T @ column for column in columns]
+            shadows = _products(basis.T, columns)
             along = basis.T @ self._residuals[b]
             self._grams[b] = self._grams[b] - _projected_gram(shadows)
-            self._products[b] = self._products[b] - np.array([along @ shadow for shadow in shadows])
+            self._products[b] = self._products[b] - along @ shadows
             self._residuals[b] = self._residuals[b] - basis @ along
             self._factors[b] = np.concatenate([factor, basis], axis=1)
             rss += float(self._residuals[b] @ self._residuals[b])
@@ -151,11 +164,8 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
     for columns, gram, design, own, residual in zip(
         library.columns, library.grams, current.designs, current.grams, current.residuals, strict=True
     ):
-        shadows = [design.T @ column for column in columns]
-        solved = [solve_gram(own, shadow) for shadow in shadows]
-        spanned = np.array([[np.einsum("pn,pn->n", a, b) for b in solved] for a in shadows])
-        along = np.array([residual @ column for column in columns])
-        total += _falls(gram, gram - spanned, along)
+        products = _products(np.vstack([half_solved(own, design.T), residual]), columns)
+        total += _falls(gram, gram - _projected_gram(products[:, :-1]), products[:, -1])
     return total
 
 
@@ -166,7 +176,7 @@ def residual_gains(library: Library, current: Solution) -> Float1D:
     """
     total = np.zeros(len(library))
     for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
-        along = np.array([residual @ column for column in columns])
+        along = _products(residual[None], columns)[:, 0]
         inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=DEPENDENT, hermitian=True)
         total += np.einsum("kn,nkj,jn->n", along, inverse, along)
     return total
@@ -248,6 +258,12 @@ def select_backward(
     return SelectionPath.judged(problem, order[::-1], errors[::-1], criterion)
 
 
-def _projected_gram(shadows: list[Float2D]) -> Float2D:
-    """(channels, channels, candidates) products of the candidates' shadows on an orthonormal basis."""
-    return np.array([[np.einsum("kn,kn->n", a, b) for b in shadows] for a in shadows])
+def _products(rows: Float2D, columns: NDArray[np.float32]) -> Float2D:
+    """(channels, k, candidates) products of rows (k, m) with columns (channels, candidates, m)."""
+    products = columns @ np.ascontiguousarray(rows.T, dtype=np.float32)
+    return products.transpose(0, 2, 1).astype(np.float64, order="C")
+
+
+def _projected_gram(shadows: Float2D) -> Float2D:
+    """(channels, channels, candidates) products of the candidates' shadows (channels, k, candidates)."""
+    return np.asarray(np.einsum("kpn,lpn->kln", shadows, shadows))

@@ -12,6 +12,7 @@ Positions stand in the unit box of the data here, so that dilations and translat
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from .. import _core
 from .._typing import Float1D, Float2D
 from .compression import Compressed
 from .fresh import FreshRows
-from .gram import solve_gram
+from .gram import half_solved, solve_gram
 from .resolution import Resolution
 
 RESOLVED = 2.0**-16
@@ -136,7 +137,9 @@ class SeparableProblem:
         self.samples = samples
         self.within = within
         self.dimension = int(blocks[0].positions.shape[1])
-        self.n_channels = sum(block.n_channels for block in blocks)
+        ends = list(accumulate((block.n_channels for block in blocks), initial=0))
+        self.n_channels = ends[-1]
+        self._rows = [slice(first, end) for first, end in pairwise(ends)]
         self.force_range = force_range
         self.prior = 0.0
         self._resolutions = [Resolution(block.positions) for block in blocks]
@@ -223,7 +226,7 @@ class SeparableProblem:
 
     def _tables(self, coefficients: Float2D) -> list[Float2D]:
         """The coefficients of each block."""
-        return np.split(coefficients, np.cumsum([block.n_channels for block in self.blocks])[:-1])
+        return [coefficients[rows] for rows in self._rows]
 
     def normal_equations(self, at: Solution) -> tuple[Float2D, Float1D]:
         """Gauss-Newton matrix and descent direction of variable projection at a solved basis.
@@ -239,15 +242,13 @@ class SeparableProblem:
         for block, design, gram, table, residual in zip(
             self.blocks, at.designs, at.grams, self._tables(at.coefficients), at.residuals, strict=True
         ):
-            _, by_alpha, by_beta = _core.wavelet_jacobian(block.positions, basis.alpha, basis.beta)
-            slope = block.channels @ table[:, 1 + self.dimension :]
-            jacobian = np.concatenate(
-                [slope * change * scale for change, scale in zip(by_alpha, basis.alpha.T, strict=True)]
-                + [slope * change / scale for change, scale in zip(by_beta, basis.alpha.T, strict=True)],
-                axis=1,
-            )
+            jacobian = _core.wavelet_steps(block.positions, basis.alpha, basis.beta)
+            slope = (table[:, 1 + self.dimension :].T @ block.channels.T)[None]
+            by_step = jacobian.T.reshape(2 * self.dimension, *slope.shape[1:])
+            np.multiply(by_step, slope, out=by_step)
             cross = design.T @ jacobian
-            matrix += jacobian.T @ jacobian - cross.T @ solve_gram(gram, cross)
+            spanned = half_solved(gram, cross)
+            matrix += jacobian.T @ jacobian - spanned.T @ spanned
             gradient += jacobian.T @ residual
         return matrix, gradient
 
