@@ -26,7 +26,7 @@ namespace {
 struct Hats {
     static constexpr std::size_t block = 64;
 
-    double inputs;
+    double inputs = 1.0;  ///< how many
     std::size_t first = 0, size = 0;
     std::array<double, block> square{}, gaussian{};
 
@@ -87,7 +87,8 @@ struct Frame {
         // algebra takes ten times as long.
         constexpr double nothing_is_left = 160.0;
         constexpr double most = detail::hat_reach * detail::hat_reach;
-        Hats hats{static_cast<double>(dimension)};
+        Hats hats;
+        hats.inputs = static_cast<double>(dimension);
         for (; hats.first < samples; hats.first += Hats::block) {
             hats.size = std::min(Hats::block, samples - hats.first);
             std::fill_n(hats.square.begin(), hats.size, 0.0);
@@ -100,13 +101,13 @@ struct Frame {
                     hats.square[k] += u * u;
                 }
             }
-            std::int64_t near = 0;
+            double nearest = most;
             for (std::size_t k = 0; k < hats.size; ++k) {
                 const double square = hats.square[k];
                 hats.square[k] = square > most ? most : square;
-                near |= static_cast<std::int64_t>(square < nothing_is_left);
+                nearest = square < nearest ? square : nearest;
             }
-            if (near != 0) {
+            if (nearest < nothing_is_left) {
                 detail::hat_kernel().gaussians(hats.square.data(), hats.size, hats.gaussian.data());
             }
             for (std::size_t k = 0; k < hats.size; ++k) {
