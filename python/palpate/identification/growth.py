@@ -28,7 +28,6 @@ PRUNE_CANDIDATES = 3
 PRUNE_HOPE = 6.0
 """A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
 
-
 WITHOUT_NOISE = 5
 """Positions that a wavelet's core must hold where there is hardly any noise to be taken for structure."""
 
