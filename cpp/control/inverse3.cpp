@@ -2,6 +2,8 @@
 #include "inverse3.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -17,7 +19,11 @@ constexpr double usual_force_limit = 2.0;  ///< the service tells no largest for
 
 /// The part of the device's name after "inverse3".
 Inverse3Settings settings_of(const Options& options) {
-    return inverse3_settings(options.device.substr(std::string("inverse3").size()));
+    Inverse3Settings settings = inverse3_settings(options.device.substr(std::string("inverse3").size()));
+    if (options.wait_ms) {
+        settings.answer_within = std::chrono::milliseconds{std::llround(std::ceil(*options.wait_ms))};
+    }
+    return settings;
 }
 
 /// What is known of it: its name and unit, and how often the host asks. Nobody tells its mechanics; where a

@@ -177,9 +177,9 @@ void add_running(CLI::App& app, Options& options) {
         "--uncertified", options.uncertified,
         "Render without the certificate's limits, on a USB device without any: nothing proves that it "
         "stays stable");
-    app.add_option("--wait-ms", options.wait_ms, "How long to wait for a packet of a USB device")
-        ->check(number_between(0.1, 10'000.0))
-        ->capture_default_str();
+    app.add_option("--wait-ms", options.wait_ms,
+                   "How long to wait for a device [5 for a packet of USB, 20 for an Inverse3's answer]")
+        ->check(number_between(0.1, 10'000.0));
     app.add_option("--priority", options.real_time.priority, "Of SCHED_FIFO, 0 = ordinary scheduling")
         ->check(number_between(0, 99))
         ->capture_default_str();

@@ -37,7 +37,7 @@ struct Options {
     bool no_energy_tank = false;
 
     bool uncertified = false;
-    double wait_ms = 5.0;
+    std::optional<double> wait_ms;  ///< the device's own where not given
 
     RealTimeOptions real_time;
     std::vector<std::string> faults;

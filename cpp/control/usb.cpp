@@ -22,7 +22,9 @@ UsbOptions usb_options(const Options& options) {
     if (const std::size_t colon = options.device.find(':'); colon != std::string::npos) {
         usb.serial = options.device.substr(colon + 1);
     }
-    usb.wait = std::chrono::microseconds{std::llround(1e3 * options.wait_ms)};
+    if (options.wait_ms) {
+        usb.wait = std::chrono::microseconds{std::llround(1e3 * *options.wait_ms)};
+    }
     return usb;
 }
 

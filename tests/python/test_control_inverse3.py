@@ -45,6 +45,7 @@ def rendered(
 ) -> Iterator[tuple[subprocess.CompletedProcess[str], Service]]:
     with serving(service or Service()) as served:
         device = ["--device", f"inverse3{axis}@{served.port}", "--uncertified", *PATIENT, "--priority", 0]
+        device += ["--wait-ms", 200]  # the service shares a busy machine
         yield control(model, *device, *words), served
 
 

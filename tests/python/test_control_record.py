@@ -240,7 +240,7 @@ def test_what_was_rendered_is_identified_as_the_same_model_with_no_hint(tmp_path
     first, again, picture = (tmp_path / name for name in ("first.json", "again.json", "both.png"))
     sample_recording(seed=1).write(sample)
     palpate("identify", sample, "-o", first)
-    assert control(first, "--duration-s", 8, "--record", felt, "--compensated", *PATIENT).returncode == 0
+    assert control(first, "--duration-s", 5, "--record", felt, "--compensated", *PATIENT).returncode == 0
     palpate("identify", felt, "-o", again)
     _, *rows = palpate("show", first, "--beside", again, "--plot", picture).splitlines()
     shares = [float(row.split()[-1]) for row in rows]

@@ -19,7 +19,7 @@ from palpate.recording.motion import (
 )
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
-DRAWS = 100 if SCALE > 1 else 3
+DRAWS = 100 if SCALE > 1 else 2
 ALLOWED_SURPRISES = 5 if SCALE > 1 else 0
 
 ENCODER_STEP = 2.0 * np.pi / 65536

@@ -35,7 +35,7 @@ def test_a_live_rendering_leaves_a_recording_and_its_timing(tmp_path: Path) -> N
 def test_each_force_is_what_the_model_says_of_its_position(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
     model = load_model(MODEL)
-    render(_core.Scheme(structure="direct"), duration_s=0.4, record=str(out))
+    render(_core.Scheme(structure="direct"), duration_s=1.0, record=str(out))
     live = read_recording(out)
     driven = _core.motion_driven(model, _core.Scheme(structure="direct"), live.position, 1e-3)["force"]
     assert live.force == pytest.approx(driven, abs=1e-15)
