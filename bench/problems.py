@@ -43,35 +43,37 @@ class Problem:
 
 
 def problem(name: str, draw: int = 0) -> Problem:
-    """One of NAMES; its noise differs from draw to draw, its positions do not."""
+    """Returns one of NAMES. Positions and noise differ between draws.
+
+    Draw 0 of P4 is the uniform grid; in the other draws each inner position moves by up to half a step. Its
+    ends stay, so that no test row needs extrapolation.
+    """
     noise = np.random.default_rng([int(name[1]), draw])
     if name in ("P1", "P6"):
-        x = _hand(10_000 if name == "P1" else 1_000_000, 0.0, 0.6, seed=11)
+        x = _hand(10_000 if name == "P1" else 1_000_000, 0.0, 0.6, seed=[11, draw])
         return _one_input(name, x, _spring_wall, 0.02, noise, seed=901)
     if name == "P2":
-        return _one_input(name, _hand(10_000, 0.0, 4.0, seed=12), _tactile_switch, 0.005, noise, seed=902)
+        x = _hand(10_000, 0.0, 4.0, seed=[12, draw])
+        return _one_input(name, x, _tactile_switch, 0.005, noise, seed=902)
     if name == "P3":
         low, high = [-0.002, -0.2], [0.01, 0.2]
-        X = np.random.default_rng(103).uniform(low, high, (20_000, 2))
+        X = np.random.default_rng([103, draw]).uniform(low, high, (20_000, 2))
         X_test = np.random.default_rng(903).uniform(low, high, (10_000, 2))
         force = _hunt_crossley(X)
         y = force + noise.normal(0.0, 0.01 * force.std(), len(force))
         return Problem(name, X, y, X_test, _hunt_crossley(X_test))
     if name == "P4":
-        x = np.linspace(-10.0, 10.0, 200)
+        x, step = np.linspace(-10.0, 10.0, 200, retstep=True)
+        if draw:
+            x[1:-1] += step * np.random.default_rng([104, draw]).uniform(-0.5, 0.5, len(x) - 2)
         x_test = np.random.default_rng(904).uniform(-10.0, 10.0, 200)
         return Problem(name, x[:, None], _zhang_1d(x), x_test[:, None], _zhang_1d(x_test))
     if name == "P5":
-        X = np.random.default_rng(105).uniform(-10.0, 10.0, (400, 2))
+        X = np.random.default_rng([105, draw]).uniform(-10.0, 10.0, (400, 2))
         side = np.linspace(-10.0, 10.0, 20)
         X_test = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
         return Problem(name, X, _zhang_2d(X), X_test, _zhang_2d(X_test))
     raise KeyError(name)
-
-
-def draws(name: str, wanted: int) -> int:
-    """Noise draws that differ: one where there is no noise."""
-    return 1 if name in ("P4", "P5") else wanted
 
 
 def _one_input(name: str, x: Array, force, sigma: float, noise: np.random.Generator, seed: int) -> Problem:
@@ -81,7 +83,7 @@ def _one_input(name: str, x: Array, force, sigma: float, noise: np.random.Genera
     )
 
 
-def _hand(n: int, low: float, high: float, seed: int) -> Array:
+def _hand(n: int, low: float, high: float, seed: list[int]) -> Array:
     """A hand at 1 kHz: slow sweeps of wandering frequency and width with jitter, reflected at the ends."""
     random = np.random.default_rng(seed)
     knots = max(8, n // 1500)

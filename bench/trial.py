@@ -180,7 +180,7 @@ def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, floa
     """Share of the travel where the nearest force within the device's slopes is the identified one, and the
     largest departure of what is rendered from it there. A stick's h / r counts as slope."""
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
-    stick = _core.force_bounds(chosen.model, chosen.scheme.play_radius).loss_per_play
+    stick = _core.force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
     low, high = (bound - np.copysign(stick, bound) for bound in renderable_slopes(device))
     forces = strokes(model, x)
     unchanged = np.ones(SAMPLES, dtype=bool)
@@ -190,17 +190,18 @@ def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, floa
     # Kinks are rounded over 0.5 % of the travel: six of these are no part of what was left alone.
     margin = round(0.03 * SAMPLES)
     unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
-    departure = np.abs(strokes(chosen.model, x) - forces).max(axis=0)
+    departure = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)
     return float(unchanged.mean()), float(departure[unchanged].max(initial=0.0))
 
 
 def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid: int) -> Row:
     chosen = plan(model, device)
-    certificate, loss = chosen.certificate, chosen.loss
+    certificate = chosen.certificate
+    loss = None if chosen.limited is None else chosen.force_error
     assert certificate is not None
-    hand = sweep(chosen.model, device)
+    hand = sweep(chosen.rendered, device)
     proved = at_rest = (float("inf"), "none")
-    rendered = {"": model} if loss is None else {"": model, ", slope limited": chosen.model}
+    rendered = {"": model} if loss is None else {"": model, ", slope limited": chosen.rendered}
     for (words, shown), scheme in itertools.product(
         rendered.items(), candidates(model, device, chosen.scheme.play_radius, grid)
     ):
@@ -220,12 +221,12 @@ def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid
         device=device.id,
         plan=chosen.structure + ("" if loss is None else ", slope limited"),
         verdict=certificate.verdict,
-        error=error(model, chosen.model, chosen.scheme, device, hand, seconds),
+        error=error(model, chosen.rendered, chosen.scheme, device, hand, seconds),
         best=proved[1],
         best_error=proved[0],
         best_at_rest=at_rest[1],
         best_at_rest_error=at_rest[0],
-        shakes=shakes(model, chosen.model, chosen.scheme, device),
+        shakes=shakes(model, chosen.rendered, chosen.scheme, device),
         direct_shakes=shakes(model, model, direct, device),
         force_range=float(np.ptp(strokes(model, np.linspace(model.lower[0], model.upper[0], SAMPLES)))),
         loss_rms=None if loss is None else loss.rms,

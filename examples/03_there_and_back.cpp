@@ -28,12 +28,14 @@ namespace {
 using namespace palpate;
 namespace fs = std::filesystem;
 
+/// Writes a recording as a transducer reads it, in steps of 0.1 mN*m.
 void write(const fs::path& recording, const std::vector<double>& position, const std::vector<double>& force,
            double period_s) {
     std::ofstream file{recording};
     file << std::setprecision(17) << "time_s,position_rad,torque_Nm\n";
     for (std::size_t k = 0; k < position.size(); ++k) {
-        file << static_cast<double>(k) * period_s << "," << position[k] << "," << force[k] << "\n";
+        file << static_cast<double>(k) * period_s << "," << position[k] << ","
+             << std::nearbyint(1e4 * force[k]) / 1e4 << "\n";
     }
 }
 

@@ -13,6 +13,7 @@ palpate show real.json --beside again.json
 """
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +33,10 @@ travel, step = switch.upper[0] - switch.lower[0], bench.device.encoder_step
 pressed = switch.lower[0] + travel * (0.5 - 0.5 * np.cos(np.pi * time))
 position = step * np.floor(pressed / step + 0.5)
 exact = palpate.Plan(switch, bench.scheme(switch, structure="direct"))
-palpate.Recording.from_arrays(
-    position, force_at(exact, position), time, units={"position": "rad", "force": "N*m"}
-).write(real_csv)
+force = np.round(force_at(exact, position), 4)  # the transducer reads steps of 0.1 mN*m
+palpate.Recording.from_arrays(position, force, time, units={"position": "rad", "force": "N*m"}).write(
+    real_csv
+)
 
 # 2. Identify.
 real = palpate.identify(palpate.read_recording(real_csv))
@@ -44,7 +46,7 @@ print(f"identified: {real.fit.n_wavelets} wavelets, {strokes}")
 # 3. Implement: rendered by a knob with nothing on it, in a hand that sweeps. The coupling softens the click.
 bench = bench_for(real)
 rendered = palpate.simulate(palpate.Plan(real, bench.scheme(real)), bench.device, bench.hand, 8.0)
-rendered.write(rendered_csv)
+replace(rendered, force=np.round(rendered.force, 4)).write(rendered_csv)
 
 # 4. Once more, from what was felt.
 again = palpate.identify(palpate.read_recording(rendered_csv))

@@ -19,6 +19,9 @@ missing_packages() {
     python_says 'import venv, ensurepip' || echo python3-venv
     python_says 'import os, sysconfig
 assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' || echo python3-dev
+    # The compiled module needs libusb when it is built: a later installation would leave a module without USB.
+    command -v pkg-config >/dev/null || echo pkg-config
+    compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
     if [ "$purpose" = test ]; then
         compiles '#include <gtest/gtest.h>' || echo libgtest-dev
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
@@ -26,9 +29,7 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
         # The WebSocket of a Haply Inverse3.
         compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
-        # The USB device, and what its tests put in the place of one.
-        command -v pkg-config >/dev/null || echo pkg-config
-        compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
+        # The emulated USB device of the tests.
         [ -e /usr/include/umockdev-1.0/umockdev.h ] || echo libumockdev-dev
         command -v umockdev-run >/dev/null || echo umockdev
     fi

@@ -37,6 +37,7 @@ class Fitted:
     fit_seconds: float
     tuning_seconds: float
     setting: str
+    n_wavelets: int | None = None
 
     @property
     def seconds(self) -> float:
@@ -59,8 +60,7 @@ def palpate_regressor(X: Array, y: Array) -> Fitted:
     start = time.perf_counter()
     network = WaveletNetworkRegressor().fit(X, y)
     seconds = time.perf_counter() - start
-    setting = f"{network.n_wavelets_} wavelets"
-    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, setting)
+    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 
 
 def palpate_selection_alone(X: Array, y: Array) -> Fitted:
@@ -68,7 +68,7 @@ def palpate_selection_alone(X: Array, y: Array) -> Fitted:
     start = time.perf_counter()
     network = WaveletNetworkRegressor(refine=False).fit(X, y)
     seconds = time.perf_counter() - start
-    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, f"{network.n_wavelets_} wavelets")
+    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 
 
 def palpate_quasi_newton(X: Array, y: Array) -> Fitted:
@@ -76,7 +76,7 @@ def palpate_quasi_newton(X: Array, y: Array) -> Fitted:
     start = time.perf_counter()
     network = WaveletNetworkRegressor(refinement="quasi-newton").fit(X, y)
     seconds = time.perf_counter() - start
-    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, f"{network.n_wavelets_} wavelets")
+    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 
 
 def _tuned(

@@ -20,6 +20,15 @@ namespace palpate::bindings {
 /// Any array-like of numbers, as contiguous float64.
 using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
 
+inline int any_object(PyObject* /*object*/) {
+    return 1;
+}
+
+/// An argument of any type that numbers() turns into an Array, so that a wrong one can be named.
+class ArrayLike : public pybind11::object {
+    PYBIND11_OBJECT_DEFAULT(ArrayLike, pybind11::object, any_object)
+};
+
 [[nodiscard]] inline std::string shape_of(const pybind11::array& array) {
     std::string text = "(";
     for (pybind11::ssize_t k = 0; k < array.ndim(); ++k) {
@@ -42,6 +51,47 @@ inline void require_vector(const Array& array, const char* name) {
     if (array.ndim() != 1) {
         throw std::invalid_argument(std::string(name) + " has shape " + shape_of(array) + ", must be (n,)");
     }
+}
+
+/// The numbers of an array-like as contiguous float64; std::invalid_argument names the argument if it holds
+/// anything else than real numbers: text, None, complex or masked values.
+[[nodiscard]] inline Array numbers(const pybind11::handle& value, const char* name) {
+    namespace py = pybind11;
+    const auto refuse = [name](const std::string& found) {
+        throw std::invalid_argument(std::string(name) + " " + found +
+                                    ", must be a number or an array of numbers");
+    };
+    if (py::isinstance<Array>(value) && !py::hasattr(value, "mask")) {
+        return py::reinterpret_borrow<Array>(value);
+    }
+    if (value.is_none() || py::isinstance<py::str>(value) || py::isinstance<py::dict>(value)) {
+        refuse("is " + py::repr(value).cast<std::string>().substr(0, 60));
+    }
+    if (py::hasattr(value, "mask") &&
+        py::module_::import("numpy").attr("ma").attr("is_masked")(value).cast<bool>()) {
+        refuse("holds masked values");
+    }
+    const py::array given = py::array::ensure(value);
+    if (!given) {
+        PyErr_Clear();
+        refuse("is no array");
+    }
+    const char kind = given.dtype().kind();
+    if (kind == 'O') {
+        for (const py::handle each : given.attr("ravel")()) {
+            if (each.is_none()) {
+                refuse("holds None");
+            }
+        }
+    } else if (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b') {
+        refuse("holds " + py::str(given.dtype()).cast<std::string>());
+    }
+    const Array array = Array::ensure(given);
+    if (!array) {
+        PyErr_Clear();
+        refuse("holds " + py::str(given.dtype()).cast<std::string>());
+    }
+    return array;
 }
 
 /// Calls work(first, count) for parts that make up 0..size, on as many processors as that pays for: starting a
@@ -79,3 +129,12 @@ template <class T>
 }
 
 }  // namespace palpate::bindings
+
+namespace pybind11::detail {
+
+template <>
+struct handle_type_name<palpate::bindings::ArrayLike> {
+    static constexpr auto name = const_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64]");
+};
+
+}  // namespace pybind11::detail

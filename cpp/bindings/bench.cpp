@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "fields.hpp"
 
 namespace palpate::bindings {
 
@@ -14,9 +15,13 @@ namespace py = pybind11;
 using namespace py::literals;
 
 void bind_bench(py::module_& module) {
-    py::class_<Bench>(
+    py::class_<Bench> type(
         module, "Bench",
-        "A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.")
+        "A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.");
+    type.def(py::init([](const DeviceProfile& device, const Hand& hand, double length, double stiffness) {
+                 return Bench{device, hand, length, stiffness};
+             }),
+             py::kw_only(), "device"_a, "hand"_a, "length"_a = 1.0, "stiffness"_a = 1.0)
         .def_readonly("device", &Bench::device)
         .def_readonly("hand", &Bench::hand)
         .def_readonly("length", &Bench::length, "Positions, over those of the default knob.")
@@ -37,11 +42,8 @@ void bind_bench(py::module_& module) {
             "model"_a, py::kw_only(), "structure"_a = py::none(), "compensated"_a = py::none(),
             "coupling_stiffness"_a = py::none(), "coupling_damping"_a = py::none(), "mass"_a = py::none(),
             "damping"_a = py::none(), "play_radius"_a = py::none(),
-            "What is given, in the model's own units; what is None follows the model in this bench's scale.")
-        .def("__repr__", [](const Bench& bench) {
-            return "Bench(device=" + py::repr(py::cast(bench.device)).cast<std::string>() +
-                   ", hand=" + py::repr(py::cast(bench.hand)).cast<std::string>() + ")";
-        });
+            "What is given, in the model's own units; what is None follows the model in this bench's scale.");
+    define_by_fields(type, {"device", "hand", "length", "stiffness"});
     module.def(
         "bench_for", &bench_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
         "The bench on which a model of one position is tried. An angle is tried on the default knob;\n"

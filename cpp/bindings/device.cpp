@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "fields.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/device/hand.hpp"
 
@@ -13,9 +14,10 @@ using namespace py::literals;
 void bind_device(py::module_& module) {
     module.attr("longest_delay_samples") = longest_delay_samples;
     const DeviceProfile profile;
-    py::class_<DeviceProfile>(
+    py::class_<DeviceProfile> device_profile(
         module, "DeviceProfile",
-        "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.")
+        "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.");
+    device_profile
         .def(py::init([](std::string id, double period_s, double inertia, double viscous_damping,
                          double coulomb_friction, double encoder_step, double force_step, int delay_samples,
                          double force_limit, double jitter_s, std::string position_unit) {
@@ -53,23 +55,16 @@ void bind_device(py::module_& module) {
         .def_readonly("position_unit", &DeviceProfile::position_unit,
                       "rad, and forces are in N*m; or m, and they are in N.")
         .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,
-                               "period_s + jitter_s: what a certificate has to hold for [s].")
-        .def("__repr__", [](const DeviceProfile& p) {
-            return "DeviceProfile(id='" + p.id + "', period_s=" + std::to_string(p.period_s) +
-                   ", inertia=" + std::to_string(p.inertia) +
-                   ", viscous_damping=" + std::to_string(p.viscous_damping) +
-                   ", coulomb_friction=" + std::to_string(p.coulomb_friction) +
-                   ", encoder_step=" + std::to_string(p.encoder_step) +
-                   ", force_step=" + std::to_string(p.force_step) +
-                   ", delay_samples=" + std::to_string(p.delay_samples) +
-                   ", force_limit=" + std::to_string(p.force_limit) +
-                   ", jitter_s=" + std::to_string(p.jitter_s) + ", position_unit='" + p.position_unit + "')";
-        });
+                               "period_s + jitter_s: what a certificate has to hold for [s].");
+    define_by_fields(device_profile,
+                     {"id", "period_s", "inertia", "viscous_damping", "coulomb_friction", "encoder_step",
+                      "force_step", "delay_samples", "force_limit", "jitter_s", "position_unit"});
 
     const Hand hand;
-    py::class_<Hand>(
+    py::class_<Hand> simulated_hand(
         module, "Hand",
-        "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.")
+        "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.");
+    simulated_hand
         .def(py::init<double, double, double, double, double>(), py::kw_only(),
              "stiffness"_a = hand.stiffness, "damping"_a = hand.damping, "lower"_a = hand.lower,
              "upper"_a = hand.upper, "frequency_hz"_a = hand.frequency_hz)
@@ -77,13 +72,8 @@ void bind_device(py::module_& module) {
         .def_readonly("damping", &Hand::damping, "[N*s/m or N*m*s/rad]")
         .def_readonly("lower", &Hand::lower, "[m or rad]")
         .def_readonly("upper", &Hand::upper, "[m or rad]")
-        .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]")
-        .def("__repr__", [](const Hand& h) {
-            return "Hand(stiffness=" + std::to_string(h.stiffness) +
-                   ", damping=" + std::to_string(h.damping) + ", lower=" + std::to_string(h.lower) +
-                   ", upper=" + std::to_string(h.upper) + ", frequency_hz=" + std::to_string(h.frequency_hz) +
-                   ")";
-        });
+        .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]");
+    define_by_fields(simulated_hand, {"stiffness", "damping", "lower", "upper", "frequency_hz"});
 }
 
 }  // namespace palpate::bindings

@@ -50,9 +50,10 @@ struct ProbeWish {
         probe.stiffness = stiffness.value_or(probe.stiffness);
         probe.force_limit = force_limit.value_or(probe.force_limit);
         validate(probe);
-        detail::require(probe.force_limit <= bench.device.force_limit,
+        detail::require(bench.device.makes(probe.force_limit),
                         "force_limit is " + readable(probe.force_limit) + ", the device makes " +
                             readable(bench.device.force_limit));
+        probe.force_limit = std::min(probe.force_limit, bench.device.force_limit);
         return probe;
     }
 };
@@ -85,46 +86,11 @@ struct Measurement {
     std::optional<double> push;
     SessionSettings session;
     std::string record;
+    bool force = false;  ///< replace an existing recording
     bool keep = false;
     std::optional<py::function> progress;
     std::optional<double> wait_s;  ///< for a packet of a device that paces the host
-};
-
-/// Tells Python how far it is; an exception from there ends the measurement and is thrown again afterwards.
-class Watcher {
-  public:
-    Watcher(const std::optional<py::function>& progress, std::atomic<bool>& asked)
-        : progress_{progress}, asked_{asked} {}
-
-    void operator()(const SessionView& view) {
-        ask_python(asked_);
-        if (!progress_ || error_ || views_++ % views_a_call != 0) {
-            return;
-        }
-        const py::gil_scoped_acquire locked;
-        try {
-            (*progress_)(view.progress.ticks.load(std::memory_order_relaxed),
-                         view.progress.position.load(std::memory_order_relaxed),
-                         view.progress.object_force.load(std::memory_order_relaxed),
-                         view.progress.lost.load(std::memory_order_relaxed));
-        } catch (const py::error_already_set&) {
-            error_ = std::current_exception();
-            asked_.store(true, std::memory_order_relaxed);
-        }
-    }
-
-    void rethrow() const {
-        if (error_) {
-            std::rethrow_exception(error_);
-        }
-    }
-
-  private:
-    static constexpr int views_a_call = 5;  ///< ten a second, so that a person sees a number change
-    const std::optional<py::function>& progress_;
-    std::atomic<bool>& asked_;
-    std::exception_ptr error_;
-    int views_ = 0;
+    double friction_share = 0.0;   ///< Coulomb friction of the simulated device, over its force limit
 };
 
 /// A measurement on a device that is described by `bench`. The device is not open yet; `told` is added to the
@@ -142,14 +108,14 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
     const Opened opened = device.open();
     detail::require(static_cast<bool>(opened), opened.reason);
     if (!wanted.record.empty()) {
-        const std::string reason = outlets.file.open(wanted.record, wanted.units, metadata);
+        const std::string reason = outlets.file.open(wanted.record, wanted.units, metadata, wanted.force);
         if (!reason.empty()) {
             device.close();
             throw std::invalid_argument(reason);
         }
     }
     std::atomic<bool> asked{false};
-    Watcher watcher{wanted.progress, asked};
+    Watcher watcher{wanted.progress, &LoopProgress::object_force, asked};
     const auto watch = [&](const SessionView& view) { watcher(view); };
     const auto measured = [&](auto moves) {
         const py::gil_scoped_release unlocked;
@@ -158,10 +124,11 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
     const SessionReport report = probe         ? measured(Probe{*probe, period_s})
                                  : wanted.push ? measured(Pulses{{*wanted.push}, period_s})
                                                : measured(FreeMotion{});
-    const std::vector<std::string> notes =
-        close_record(outlets, report, wanted.session.loop, wanted.units, metadata, wanted.record);
+    SessionExpectation expected{false, guards.encoder_step, {}, wanted.units.position, {}};
+    const std::vector<std::string> notes = close_record(outlets, report, wanted.session.loop, wanted.units,
+                                                        metadata, wanted.record, wanted.force, expected);
     watcher.rethrow();
-    py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes);
+    py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes, expected);
     summary["device"] = bench.device.id;
     summary["encoder_step"] = bench.device.encoder_step;
     summary["force_limit"] = bench.device.force_limit;
@@ -197,6 +164,8 @@ py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measureme
     if (probe || wanted.push) {
         bench.hand.stiffness = bench.hand.damping = 0.0;  // nobody holds a handle that moves by itself
     }
+    bench.device.coulomb_friction = wanted.friction_share * bench.device.force_limit;
+    validate(bench.device);
     SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
     wanted.transducer = object && wanted.transducer;
     if (object) {
@@ -233,7 +202,8 @@ py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
     detail::require(!wanted.probe.wanted || wanted.probe.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     const ProbeSettings standard;
-    wanted.probe.force_limit = wanted.probe.force_limit.value_or(standard.force_limit);
+    wanted.probe.force_limit =
+        wanted.probe.force_limit.value_or(std::min(standard.force_limit, bench.device.force_limit));
     const std::optional<ProbeSettings> probe = wanted.probe.granted(bench, standard.lower, standard.upper);
     UsbOptions options{.serial = serial, .makes_force = probe || wanted.push};
     if (wanted.wait_s) {
@@ -275,20 +245,22 @@ void bind_measure(py::module_& module) {
            const std::string& position_unit, const std::string& force_unit, bool probe,
            std::optional<double> lower, std::optional<double> upper, std::optional<double> speed,
            std::optional<double> stiffness, std::optional<double> force_limit, std::optional<double> push,
-           double rate_hz, double duration_s, const std::string& record, bool keep, int priority, int cpu,
-           double lowest_rate_share, std::optional<double> wait_s,
-           const std::optional<py::function>& progress) {
-            detail::require(!wait_s || (std::isfinite(*wait_s) && *wait_s > 0.0),
-                            "wait_s is " + readable(wait_s.value_or(0.0)) + ", must be > 0");
+           double rate_hz, double duration_s, const std::string& record, bool force, bool keep, int priority,
+           int cpu, double lowest_rate_share, std::optional<double> wait_s,
+           const std::optional<py::function>& progress, double friction_share) {
+            detail::require(!wait_s || (*wait_s > 0.0 && *wait_s <= 10.0),
+                            "wait_s is " + readable(wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
             Measurement wanted{transducer,
                                {position_unit, force_unit == "N*m" ? "Nm" : force_unit},
                                {probe, lower, upper, speed, stiffness, force_limit},
                                push,
                                {},
                                record,
+                               force,
                                keep,
                                progress,
-                               wait_s};
+                               wait_s,
+                               friction_share};
             wanted.session.loop.rate_hz = rate_hz;
             wanted.session.loop.duration_s = duration_s;
             wanted.session.loop.lowest_rate_share = lowest_rate_share;
@@ -304,9 +276,10 @@ void bind_measure(py::module_& module) {
         "position_unit"_a = "rad", "force_unit"_a = "N*m", "probe"_a = false, "lower"_a = py::none(),
         "upper"_a = py::none(), "speed"_a = py::none(), "stiffness"_a = py::none(),
         "force_limit"_a = py::none(), "push"_a = py::none(), "rate_hz"_a = loop.rate_hz,
-        "duration_s"_a = loop.duration_s, "record"_a = "", "keep"_a = false,
+        "duration_s"_a = loop.duration_s, "record"_a = "", "force"_a = false, "keep"_a = false,
         "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
         "lowest_rate_share"_a = loop.lowest_rate_share, "wait_s"_a = py::none(), "progress"_a = py::none(),
+        "friction_share"_a = 0.0,
         "A real object measured in real time; on the simulated device the model `object` is "
         "mounted.\n\n"
         "A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;\n"
@@ -315,9 +288,12 @@ void bind_measure(py::module_& module) {
         "Ctrl-C) without holding the interpreter; `progress(ticks, position, force, lost)` is called ten "
         "times a\n"
         "second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows "
-        "as record.part; with `keep` the summary, "
+        "as\n"
+        "record.part; an existing one is refused, or replaced with `force`. With `keep` the summary, "
         "returned\n"
-        "by name, holds the ticks. ValueError where it is refused before anything moves.");
+        "by name, holds the ticks. `friction_share` is the Coulomb friction of the simulated device, over "
+        "its "
+        "force\nlimit. ValueError where it is refused before anything moves.");
 }
 
 }  // namespace palpate::bindings

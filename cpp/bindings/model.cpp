@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -94,9 +98,15 @@ double scalar(const ForceModel& model, double position, const py::object& /*velo
 }
 
 template <Member member>
-py::array_t<double> batch(const ForceModel& model, const Array& position, const py::object& /*velocity*/,
-                          const py::object& /*acceleration*/, const std::optional<Array>& direction,
-                          const std::optional<Array>& play) {
+py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, const py::object& /*velocity*/,
+                          const py::object& /*acceleration*/, const std::optional<ArrayLike>& given_direction,
+                          const std::optional<ArrayLike>& given_play) {
+    const Array position = numbers(positions, "position");
+    const auto optional_numbers = [](const std::optional<ArrayLike>& given, const char* name) {
+        return given ? std::optional(numbers(*given, name)) : std::nullopt;
+    };
+    const std::optional<Array> direction = optional_numbers(given_direction, "direction");
+    const std::optional<Array> play = optional_numbers(given_play, "play");
     require_inputs(model, direction.has_value(), play.has_value());
     const Broadcast directions(direction, position.size(), "direction");
     const Broadcast plays(play, position.size(), "play");
@@ -172,12 +182,17 @@ Array row(const std::vector<double>& values) {
 
 /// Force at one row of X of a model of several inputs or with hysteresis.
 double row_force(const ForceModel& model, const double* row) {
+    const std::size_t columns = model.parameters().dimension + (model.hysteresis() != nullptr ? 1 : 0);
+    if (!std::all_of(row, row + columns, [](double value) { return std::isfinite(value); })) {
+        return std::numeric_limits<double>::quiet_NaN();
+    }
     const RadialNetwork* radial = model.radial();
     return radial != nullptr ? radial->value({row, radial->dimension()})
                              : model.hysteresis()->sliding(row[0], row[1]).force;
 }
 
-py::array_t<double> predict(const ForceModel& model, const Array& x) {
+py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
+    const Array x = numbers(rows, "X");
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() ? 1 : 0);
     if (x.ndim() != 2 || static_cast<std::size_t>(x.shape(1)) != columns) {
         throw std::invalid_argument("X has shape " + shape_of(x) + ", must be (n, " +
@@ -212,18 +227,19 @@ py::array_t<double> play_states(const Array& position, double radius, std::optio
     return result;
 }
 
-py::array_t<double> model_play_states(const ForceModel& model, const Array& position,
+py::array_t<double> model_play_states(const ForceModel& model, const ArrayLike& position,
                                       std::optional<double> start) {
     detail::require(model.play_radius().has_value(),
                     "the model has no play radius, so a motion has no play state");
-    return play_states(position, *model.play_radius(), start);
+    return play_states(numbers(position, "position"), *model.play_radius(), start);
 }
 
 std::pair<double, double> pair_of(Interval interval) {
     return {interval.lower, interval.upper};
 }
 
-py::object extrapolated(const ForceModel& model, const Array& position) {
+py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
+    const Array position = numbers(positions, "position");
     require_inputs(model, true, true);
     const auto outside = [&](double x) {
         return model.network() ? model.network()->curve().extrapolated(x)
@@ -263,18 +279,22 @@ void bind_model(py::module_& module) {
              "inputs is the "
              "velocity. ValueError names the field that is wrong.");
 
-    bind_quantity<&EnvironmentSample::force>(type, "force",
-                                             "Force of the object against the tool [N or N*m]; a number in, "
-                                             "a number out, an array in, an array out.\n\n"
-                                             "A hysteresis model needs direction (+1 pressing, -1 releasing) "
-                                             "or, where it has a play radius, play, the\n"
-                                             "state of the play operator. Inputs that the model does not use "
-                                             "are ignored; ValueError names one it misses.");
+    bind_quantity<&EnvironmentSample::force>(
+        type, "force",
+        "Force of the object against the tool [N or N*m]; a number in, "
+        "a number out, an array in, an array out.\n\n"
+        "A hysteresis model needs direction (+1 pressing, -1 releasing) "
+        "or, where it has a play radius, play, the\n"
+        "state of the play operator. Inputs that the model does not use "
+        "are ignored; ValueError names one it misses.\n"
+        "A position that is not finite gives NaN, in a number as in an array.");
     bind_quantity<&EnvironmentSample::slope>(type, "slope", "Local stiffness df/dx; arguments as for force.");
     bind_quantity<&EnvironmentSample::energy>(type, "energy",
                                               "Stored energy [J] up to a constant; arguments as for force.");
-    type.def("predict", &predict, "X"_a,
-             "Force at X (n, d), (n,); a hysteresis model takes the direction as one more column.");
+    type.def(
+        "predict", &predict, "X"_a,
+        "Force at X (n, d), (n,); a hysteresis model takes the direction as one more column. A row with a\n"
+        "value that is not finite gives NaN.");
     type.def("extrapolated", &extrapolated, "position"_a,
              "Whether a position lies outside the identified domain.");
     type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),

@@ -8,8 +8,10 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "fields.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/simulation.hpp"
+#include "signals.hpp"
 
 namespace palpate::bindings {
 
@@ -28,16 +30,15 @@ std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
 }
 
 py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
-                            const Hand& hand, double duration_s, int substeps, double start_position) {
-    detail::require(std::isfinite(duration_s) && duration_s > 0.0,
-                    "duration_s is " + std::to_string(duration_s) + ", must be > 0");
+                            const Hand& hand, double duration_s, int substeps, double start_position,
+                            const std::optional<py::function>& progress) {
     detail::require(std::isfinite(start_position), "start_position is not a finite number");
-    detail::require(substeps >= 1, "substeps is " + std::to_string(substeps) + ", must be at least 1");
-    const auto ticks = static_cast<std::size_t>(std::llround(duration_s / device.period_s));
+    const std::size_t ticks = simulated_ticks(duration_s, device.period_s);
     Trace trace;
     {
         const py::gil_scoped_release unlocked;
-        trace = simulate(model, scheme, device, hand, ticks, substeps, start_position);
+        trace = simulate(model, scheme, device, hand, ticks, substeps, start_position,
+                         Interruptible{progress ? &*progress : nullptr});
     }
     return py::dict(
         "time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
@@ -81,8 +82,10 @@ void bind_rendering(py::module_& module) {
         names.append(std::string(name));
     }
     module.attr("structure_names") = py::tuple(names);
-    py::class_<Scheme>(module, "Scheme", "How a model is rendered: the structure and its numbers, SI units.")
-        .def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
+    module.attr("most_simulated_ticks") = most_simulated_ticks;
+    py::class_<Scheme> type(module, "Scheme",
+                            "How a model is rendered: the structure and its numbers, SI units.");
+    type.def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
                          double mass, double damping, bool compensated, double play_radius) {
                  return Scheme{structure_named(name),
                                {coupling_stiffness, coupling_damping},
@@ -118,17 +121,9 @@ void bind_rendering(py::module_& module) {
             [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
             "Largest slope of the model that the structure meets, never below 0; h / r is part of it while "
             "a\n"
-            "hysteresis model sticks.")
-        .def("__repr__", [](const Scheme& s) {
-            return "Scheme(structure='" +
-                   std::string(structure_names[static_cast<std::size_t>(s.structure)]) +
-                   "', coupling_stiffness=" + std::to_string(s.coupling.stiffness) +
-                   ", coupling_damping=" + std::to_string(s.coupling.damping) +
-                   ", mass=" + std::to_string(s.inertia.mass) +
-                   ", damping=" + std::to_string(s.inertia.damping) +
-                   ", compensated=" + (s.compensated ? "True" : "False") +
-                   ", play_radius=" + std::to_string(s.play_radius) + ")";
-        });
+            "hysteresis model sticks.");
+    define_by_fields(type, {"structure", "coupling_stiffness", "coupling_damping", "mass", "damping",
+                            "compensated", "play_radius"});
 
     module.def(
         "explicit_slope_limit",
@@ -155,9 +150,11 @@ void bind_rendering(py::module_& module) {
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-        "substeps"_a = 20, "start_position"_a = 0.0,
+        "substeps"_a = 20, "start_position"_a = 0.0, "progress"_a = py::none(),
         "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
-        "The handle starts at rest at start_position.\n\n"
+        "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
+        "Ctrl-C\n"
+        "ends it as in Python; ValueError for more than most_simulated_ticks.\n\n"
         "Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true\n"
         "handle when sampled and at the end of the tick that holds the force), environment_position, force\n"
         "(commanded), applied, evaluations, status, extrapolated.");
@@ -169,7 +166,7 @@ void bind_rendering(py::module_& module) {
             std::vector<Rendered> rendered;
             {
                 const py::gil_scoped_release unlocked;
-                rendered = motion_driven(model, s, view(position), period_s);
+                rendered = motion_driven(model, s, view(position), period_s, Interruptible{});
             }
             return rendered_arrays(rendered);
         },
@@ -185,7 +182,7 @@ void bind_rendering(py::module_& module) {
             std::vector<Rendered> rendered;
             {
                 const py::gil_scoped_release unlocked;
-                rendered = force_driven(model, s, view(force), period_s, start_position);
+                rendered = force_driven(model, s, view(force), period_s, start_position, Interruptible{});
             }
             return rendered_arrays(rendered);
         },

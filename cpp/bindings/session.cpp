@@ -25,9 +25,9 @@ namespace {
 
 py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const std::string& position_unit,
                           const std::string& force_unit, double rate_hz, double duration_s,
-                          std::string record, const std::string& model_name,
+                          std::string record, bool force, const std::string& model_name,
                           std::optional<std::uint16_t> telemetry_port, double telemetry_hz, int priority,
-                          int cpu, double lowest_rate_share) {
+                          int cpu, double lowest_rate_share, const std::optional<py::function>& progress) {
     SessionSettings settings;
     settings.loop.rate_hz = rate_hz;
     settings.loop.duration_s = duration_s;
@@ -48,7 +48,7 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
         detail::require(reason.empty(), reason);
     }
     if (!record.empty()) {
-        const std::string reason = outlets.file.open(record, units, metadata);
+        const std::string reason = outlets.file.open(record, units, metadata, force);
         detail::require(reason.empty(), reason);
     }
     const Opened opened = device.open();
@@ -56,14 +56,19 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
 
     SessionReport report;
     std::atomic<bool> asked{false};
+    Watcher watcher{progress, &LoopProgress::force, asked};
     {
         const py::gil_scoped_release unlocked;
         report = render_live(model, scheme, device, guards, settings, outlets, asked,
-                             [&](const SessionView& /*view*/) { ask_python(asked); });
+                             [&](const SessionView& view) { watcher(view); });
     }
+    const Domain& domain = model.domain();
+    SessionExpectation expected{
+        false, guards.encoder_step, {domain.lower[0], domain.upper[0]}, units.position};
     const std::vector<std::string> notes =
-        close_record(outlets, report, settings.loop, units, metadata, record);
-    return summary_of(report, settings.loop, outlets, record, notes);
+        close_record(outlets, report, settings.loop, units, metadata, record, force, expected);
+    watcher.rethrow();
+    return summary_of(report, settings.loop, outlets, record, notes, expected);
 }
 
 }  // namespace
@@ -81,13 +86,14 @@ void bind_session(py::module_& module) {
     module.def(
         "render", &render_in_python, "model"_a, "scheme"_a, py::kw_only(), "position_unit"_a = "rad",
         "force_unit"_a = "N*m", "rate_hz"_a = loop.rate_hz, "duration_s"_a = loop.duration_s, "record"_a = "",
-        "model_name"_a = "", "telemetry_port"_a = py::none(), "telemetry_hz"_a = Telemetry::usual_hz,
-        "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
-        "lowest_rate_share"_a = loop.lowest_rate_share,
+        "force"_a = false, "model_name"_a = "", "telemetry_port"_a = py::none(),
+        "telemetry_hz"_a = Telemetry::usual_hz, "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
+        "lowest_rate_share"_a = loop.lowest_rate_share, "progress"_a = py::none(),
         "The model rendered in real time on a simulated device: the loop of palpate-control.\n\n"
         "Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the\n"
-        "recording, which grows as record.part; a `telemetry_port` of this machine gets JSON lines over "
-        "UDP.\n"
+        "recording, which grows as record.part; an existing one is refused, or replaced with `force`. A\n"
+        "`telemetry_port` of this machine gets JSON lines over UDP.\n"
+        "`progress(ticks, position, force, lost)` is called ten times a second.\n"
         "A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.\n"
         "Returns the summary by name; ValueError where it is refused before anything moves.");
 }

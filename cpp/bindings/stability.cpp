@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "fields.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
 
@@ -29,13 +30,13 @@ void bind_bounds(py::module_& module) {
     const auto end = [](auto member, auto side) {
         return [member, side](const ForceBounds& bounds) { return bounds.*member.*side; };
     };
-    py::class_<ForceBounds>(
+    py::class_<ForceBounds> type(
         module, "ForceBounds",
         "Proved bounds of a force over every position that can be reached, continuations "
         "included.\n\n"
         "With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', "
-        "and h / r more while it sticks.")
-        .def(py::init([](double slope_min, double slope_max, double steepest, double sliding, double loss_min,
+        "and h / r more while it sticks.");
+    type.def(py::init([](double slope_min, double slope_max, double steepest, double sliding, double loss_min,
                          double loss_max, double loss_per_play, double mean_force, double drag,
                          bool hysteresis) {
                  return ForceBounds{hysteresis,           {slope_min, slope_max}, steepest,   sliding,
@@ -54,6 +55,8 @@ void bind_bounds(py::module_& module) {
         .def_readonly("loss_per_play", &ForceBounds::loss_per_play, "max h / r")
         .def_readonly("mean_force", &ForceBounds::mean_force, "|mean| over a period of a model that repeats.")
         .def_readonly("drag", &ForceBounds::drag, "B_v = max |f(x, v) - f(x, 0)| / |v|.");
+    define_by_fields(type, {"slope_min", "slope_max", "steepest", "sliding", "loss_min", "loss_max",
+                            "loss_per_play", "mean_force", "drag", "hysteresis"});
     module.def(
         "force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0,
         "Proved bounds of a model of one position, or of position and velocity; play_radius in place of its\n"
@@ -61,9 +64,10 @@ void bind_bounds(py::module_& module) {
 }
 
 void bind_inequality(py::module_& module) {
-    py::class_<Inequality>(module, "Inequality",
-                           "One line of a certificate: left >= right, or left > right where it is strict.")
-        .def(py::init([](std::string name, std::string formula, double left, double right,
+    py::class_<Inequality> type(
+        module, "Inequality",
+        "One line of a certificate: left >= right, or left > right where it is strict.");
+    type.def(py::init([](std::string name, std::string formula, double left, double right,
                          const std::string& rests_on, std::string source, bool strict) {
                  return Inequality{std::move(name),
                                    std::move(formula),
@@ -85,11 +89,12 @@ void bind_inequality(py::module_& module) {
         .def_property_readonly(
             "rests_on", [](const Inequality& line) { return std::string(name_of(line.rests_on)); },
             "proved, linear (the linearised system only) or none (no bound is known beyond).")
-        .def_readonly("source", &Inequality::source)
-        .def("__repr__", [](const Inequality& line) {
-            return "<Inequality " + line.formula + ": " + readable(line.left) + " against " +
-                   readable(line.right) + (line.holds() ? ", holds>" : ", fails>");
-        });
+        .def_readonly("source", &Inequality::source);
+    define_by_fields(type, {"name", "formula", "left", "right", "rests_on", "source", "strict"}, false);
+    type.def("__repr__", [](const Inequality& line) {
+        return "<Inequality " + line.formula + ": " + readable(line.left) + " against " +
+               readable(line.right) + (line.holds() ? ", holds>" : ", fails>");
+    });
 }
 
 }  // namespace
@@ -97,9 +102,9 @@ void bind_inequality(py::module_& module) {
 void bind_stability(py::module_& module) {
     bind_bounds(module);
     bind_inequality(module);
-    py::class_<Certificate>(module, "Certificate",
-                            "What is proved of a model, rendered by a scheme, on a device.")
-        .def(py::init([](const Scheme& scheme, const DeviceProfile& device, std::string model,
+    py::class_<Certificate> type(module, "Certificate",
+                                 "What is proved of a model, rendered by a scheme, on a device.");
+    type.def(py::init([](const Scheme& scheme, const DeviceProfile& device, std::string model,
                          const ForceBounds& bounds, std::vector<Inequality> inequalities,
                          const std::string& verdict, std::string why, double longest_period_s) {
                  return Certificate{scheme,
@@ -136,11 +141,14 @@ void bind_stability(py::module_& module) {
                 detail::require(wrong.empty(), wrong);
             },
             "model"_a,
-            "Computes everything again; ValueError names the first field that is not what the model gives.")
-        .def("__repr__", [](const Certificate& certificate) {
-            return "<Certificate for " + certificate.device.id + ": " +
-                   std::string(name_of(certificate.verdict)) + "; " + certificate.why + ">";
-        });
+            "Computes everything again; ValueError names the first field that is not what the model gives.");
+    define_by_fields(
+        type, {"scheme", "device", "model", "bounds", "inequalities", "verdict", "why", "longest_period_s"},
+        false);
+    type.def("__repr__", [](const Certificate& certificate) {
+        return "<Certificate for " + certificate.device.id + ": " +
+               std::string(name_of(certificate.verdict)) + "; " + certificate.why + ">";
+    });
     module.def(
         "certify",
         [](const ForceModel& model, const Scheme& scheme, const DeviceProfile& device) {

@@ -3,6 +3,8 @@
 
 #include <atomic>
 #include <cstddef>
+#include <exception>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "bindings.hpp"
 #include "palpate/session.hpp"
 #include "palpate/session_text.hpp"
+#include "palpate/session_verdict.hpp"
 
 namespace palpate::bindings {
 
@@ -43,29 +46,84 @@ inline void ask_python(std::atomic<bool>& asked) {
     }
 }
 
-/// Gives the recording, if there is one, its name, which `record` becomes. Returns what is to be told: privileges
-/// that were refused, and everything that is not as it was asked for.
+/// Calls Python with ticks, position, force and lost samples; an exception from there ends the session and is thrown
+/// again afterwards.
+class Watcher {
+  public:
+    Watcher(const std::optional<py::function>& progress, std::atomic<double> LoopProgress::* force,
+            std::atomic<bool>& asked)
+        : progress_{progress}, force_{force}, asked_{asked} {}
+
+    void operator()(const SessionView& view) {
+        ask_python(asked_);
+        if (!progress_ || error_ || views_++ % views_a_call != 0) {
+            return;
+        }
+        const py::gil_scoped_acquire locked;
+        try {
+            (*progress_)(view.progress.ticks.load(std::memory_order_relaxed),
+                         view.progress.position.load(std::memory_order_relaxed),
+                         (view.progress.*force_).load(std::memory_order_relaxed),
+                         view.progress.lost.load(std::memory_order_relaxed));
+        } catch (const py::error_already_set&) {
+            error_ = std::current_exception();
+            asked_.store(true, std::memory_order_relaxed);
+        }
+    }
+
+    void rethrow() const {
+        if (error_) {
+            std::rethrow_exception(error_);
+        }
+    }
+
+  private:
+    static constexpr int views_a_call = 5;  ///< ten a second, so that a person sees a number change
+    const std::optional<py::function>& progress_;
+    std::atomic<double> LoopProgress::* force_;
+    std::atomic<bool>& asked_;
+    std::exception_ptr error_;
+    int views_ = 0;
+};
+
+/// Renames the recording, if there is one; `record` becomes its name. Returns notes for a person: privileges that were
+/// refused, and every other difference from what was asked for. What the verdict needs is added to `expected`.
 inline std::vector<std::string> close_record(Outlets& outlets, const SessionReport& report,
                                              const LoopSettings& settings, const RecordUnits& units,
-                                             const Metadata& metadata, std::string& record) {
+                                             const Metadata& metadata, std::string& record, bool force,
+                                             SessionExpectation& expected) {
     std::vector<std::string> notes = report.refused;
     if (record.empty()) {
         return notes;
     }
-    const std::string asked_for = record;
-    for (std::string& warning : finish_record(outlets.file, report, settings, record)) {
-        notes.push_back(std::move(warning));
+    if (const std::string& aside = outlets.file.file().set_aside_as(); !aside.empty()) {
+        notes.push_back("a recording that was cut off earlier is kept as " + aside);
     }
+    const std::string asked_for = record;
+    expected.recorded = true;
+    expected.warnings = finish_record(outlets.file, report, settings, record);
+    notes.insert(notes.end(), expected.warnings.begin(), expected.warnings.end());
     if (!is_orderly(report.loop.ending)) {
-        notes.push_back(write_last_ticks(asked_for, units, metadata, report, settings));
+        notes.push_back(write_last_ticks(asked_for, force, units, metadata, report, settings));
     }
     return notes;
 }
 
+inline py::list findings_of(const std::vector<SessionFinding>& findings) {
+    py::list records;
+    for (const SessionFinding& finding : findings) {
+        records.append(py::dict("level"_a = finding.level, "sentence"_a = finding.sentence));
+    }
+    return records;
+}
+
 /// What a session did, by name. `record` is the name that its recording has, empty without one.
 inline py::dict summary_of(const SessionReport& report, const LoopSettings& settings, const Outlets& outlets,
-                           const std::string& record, const std::vector<std::string>& notes) {
-    return py::dict("orderly"_a = is_orderly(report.loop.ending),
+                           const std::string& record, const std::vector<std::string>& notes,
+                           const SessionExpectation& expected) {
+    const std::vector<SessionFinding> findings = judge_session(report, settings, outlets, expected);
+    return py::dict("verdict"_a = verdict_text(findings), "findings"_a = findings_of(findings),
+                    "orderly"_a = is_orderly(report.loop.ending),
                     "ended"_a = ending_text(report.loop, settings),
                     "status"_a = text(report.loop.status).word, "ticks"_a = report.loop.timing.ticks(),
                     "rate_hz"_a = report.loop.timing.rate_hz(), "wanted_rate_hz"_a = settings.rate_hz,

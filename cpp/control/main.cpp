@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // palpate-control: a model rendered on a device in real time. The exit codes stand in --help.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <exception>
@@ -8,6 +13,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -58,14 +64,21 @@ void refuse(const std::string& sentence) {
     throw std::invalid_argument(sentence);
 }
 
+bool follows_plan(const Options& options, const ModelFile& file) {
+    return file.plan && !chooses_scheme(options);
+}
+
+const ForceModel& rendered(const Options& options, const ModelFile& file) {
+    return follows_plan(options, file) ? file.planned() : file.model;
+}
+
 Scheme scheme_of(const Options& options, const ModelFile& file, const Bench& bench) {
     SchemeChoices choices = options.scheme;
     if (options.structure) {
         choices.structure = structure_named(*options.structure);
     }
-    const bool planned = file.plan && !chooses_scheme(options);
-    const Scheme scheme = planned ? *file.plan : bench.scheme(file.model, choices);
-    validate(scheme, file.model, bench.device.period_s);
+    const Scheme scheme = follows_plan(options, file) ? *file.plan : bench.scheme(file.model, choices);
+    validate(scheme, rendered(options, file), bench.device.period_s);
     return scheme;
 }
 
@@ -78,10 +91,11 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
     guards.frozen_s = options.frozen_s;
     guards.energy_tank = !options.no_energy_tank;
     validate(guards);
-    if (guards.force_limit > bench.device.force_limit) {
+    if (!bench.device.makes(guards.force_limit)) {
         refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +
                readable(bench.device.force_limit));
     }
+    guards.force_limit = std::min(guards.force_limit, bench.device.force_limit);
     return guards;
 }
 
@@ -108,7 +122,8 @@ void open_outlets(const Options& options, const Metadata& metadata, const Record
         if (std::filesystem::equivalent(options.record, options.model, ignored)) {
             refuse("--record " + options.record + " is the model; writing there would destroy it");
         }
-        if (const std::string reason = outlets.file.open(options.record, units, metadata); !reason.empty()) {
+        if (const std::string reason = outlets.file.open(options.record, units, metadata, options.force);
+            !reason.empty()) {
             refuse("--record " + reason);
         }
         if (const std::string& aside = outlets.file.file().set_aside_as(); !aside.empty()) {
@@ -186,6 +201,27 @@ int run_on_simulated(const Options& given, ModelFile file, RecordUnits units) {
                      [] { return Story{}; });
 }
 
+/// Gives each closed standard stream a descriptor that cannot be used, so that no file opened later gets its number:
+/// the summary would be written into the recording.
+void occupy_closed_streams() {
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+        if (fcntl(stream, F_GETFD) < 0) {
+            (void)!open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+        }
+    }
+}
+
+/// The exit code, once standard output has taken everything: 1 where it has not.
+int told(int code) {
+    errno = 0;
+    if (std::cout.flush()) {
+        return code;
+    }
+    std::cerr << "error: standard output could not be written"
+              << (errno == 0 ? "" : ": " + std::generic_category().message(errno)) << "\n";
+    return 1;
+}
+
 int run(const Options& options) {
     const std::string kind = options.device.substr(0, options.device.find(':'));
     const bool has_more = options.device.size() > kind.size() + 1;
@@ -213,12 +249,11 @@ int run(const Options& options) {
 }  // namespace palpate::control
 
 int main(int count, char** words) {
+    palpate::control::occupy_closed_streams();
     palpate::control::Options options;
     try {
-        if (const auto code = palpate::control::read_options(count, words, options)) {
-            return *code;
-        }
-        return palpate::control::run(options);
+        const auto code = palpate::control::read_options(count, words, options);
+        return palpate::control::told(code ? *code : palpate::control::run(options));
     } catch (const std::exception& error) {
         std::cerr << "error: " << error.what() << "\n";
         return 2;

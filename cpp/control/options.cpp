@@ -22,7 +22,8 @@ namespace {
 
 constexpr const char* epilogue =
     "Ctrl-C ends a run in an orderly way. Exit code: 0 ran its time, or Ctrl-C;\n"
-    "1 stopped by a guard, a fault or a rate too low; 2 refused before anything moved.\n\n"
+    "1 stopped by a guard, a fault or a rate too low;\n"
+    "2 refused before anything moved.\n\n"
     "\"scaled\": the numbers of a knob, in proportion to the model's travel and force.\n\n"
     "Example: palpate-control press.json --duration-s 10 --record felt.csv";
 
@@ -167,6 +168,7 @@ void add_running(CLI::App& app, Options& options) {
         ->capture_default_str();
     app.add_option("--record", options.record, "Write every tick to this CSV file; it grows as OUT.csv.part")
         ->type_name("OUT.csv");
+    app.add_flag("--force", options.force, "Replace an existing recording");
     app.add_option("--telemetry-port", options.telemetry_port,
                    "Send JSON lines over UDP to this port of this machine (PlotJuggler: 9870)")
         ->check(number_between(1, 65535));

@@ -21,6 +21,7 @@ struct Options {
     std::string device = "simulated";
     LoopSettings loop;
     std::string record;
+    bool force = false;  ///< replace an existing recording
     std::optional<std::uint16_t> telemetry_port;
     double telemetry_hz = Telemetry::usual_hz;
 

@@ -12,6 +12,7 @@
 #include "palpate/io/model_file.hpp"
 #include "palpate/session.hpp"
 #include "palpate/session_text.hpp"
+#include "palpate/session_verdict.hpp"
 #include "telling.hpp"
 
 namespace palpate::control {
@@ -27,6 +28,10 @@ struct Job {
     SessionSettings settings;
 };
 
+/// True if the model is rendered as it was planned; false if the options choose another rendering.
+[[nodiscard]] bool follows_plan(const Options& options, const ModelFile& file);
+/// The model that is rendered: that of the plan where the plan is followed, else the identified one.
+[[nodiscard]] const ForceModel& rendered(const Options& options, const ModelFile& file);
 /// The rendering that the options ask for, else the model's plan, else the default one.
 [[nodiscard]] Scheme scheme_of(const Options& options, const ModelFile& file, const Bench& bench);
 /// Throws where the device of the bench cannot make the force that is asked for.
@@ -59,7 +64,8 @@ int render_on(D& device, const std::string& called, const Options& options, cons
         throw;
     }
     const double seconds = job.settings.loop.duration_s;
-    std::cerr << options.model << ": " << job.file.model.parameters().weight.size() << " wavelets, "
+    const ForceModel& model = rendered(options, job.file);
+    std::cerr << options.model << ": " << model.parameters().weight.size() << " wavelets, "
               << describe(job.scheme) << "; " << called << " at " << readable(job.settings.loop.rate_hz)
               << " Hz " << (std::isfinite(seconds) ? "for " + readable(seconds) + " s" : "until Ctrl-C")
               << "\n";
@@ -72,26 +78,33 @@ int render_on(D& device, const std::string& called, const Options& options, cons
     handle_signals();
     LiveView view{job.settings.loop, job.units};
     const SessionReport report =
-        render_live(job.file.model, job.scheme, device, job.guards, job.settings, outlets, asked_to_stop(),
+        render_live(model, job.scheme, device, job.guards, job.settings, outlets, asked_to_stop(),
                     [&](const SessionView& now) { view.show(now); });
     view.end();
 
     std::string record = options.record;
+    const Domain& domain = job.file.model.domain();
+    SessionExpectation expected{
+        !record.empty(), job.guards.encoder_step, {domain.lower[0], domain.upper[0]}, job.units.position};
     if (!record.empty()) {
-        for (const std::string& warning : finish_record(outlets.file, report, job.settings.loop, record)) {
-            std::cerr << "warning: " << warning << "\n";
-        }
+        expected.warnings = finish_record(outlets.file, report, job.settings.loop, record);
+    }
+    for (const std::string& warning : expected.warnings) {
+        std::cerr << "warning: " << warning << "\n";
     }
     if (!is_orderly(report.loop.ending)) {
         std::cerr << "error: " << ending_text(report.loop, job.settings.loop)
                   << "; zero force sent, device closed\n";
         tell_last_ticks(report, job.units);
         if (!options.record.empty()) {
-            std::cerr << write_last_ticks(options.record, job.units, metadata, report, job.settings.loop)
+            std::cerr << write_last_ticks(options.record, options.force, job.units, metadata, report,
+                                          job.settings.loop)
                       << "\n";
         }
     }
-    tell_summary(report, job.settings, outlets, record, story(), options.as_json);
+    const std::vector<SessionFinding> findings = judge_session(report, job.settings.loop, outlets, expected);
+    tell_summary(report, job.settings, outlets, record, findings, story(), options.as_json);
+    // The exit code states how the loop ended; the verdict in the summary judges what was rendered.
     return is_orderly(report.loop.ending) ? 0 : 1;
 }
 

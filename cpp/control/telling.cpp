@@ -22,7 +22,6 @@ namespace {
 
 constexpr std::size_t shown_ticks = 8;
 constexpr int calls_a_line = 5;  ///< the live line changes ten times a second
-constexpr double held_rate_share = 0.99;
 
 nlohmann::json statuses(const LoopReport& loop) {
     nlohmann::json counts = nlohmann::json::object();
@@ -106,12 +105,14 @@ void LiveView::show(const SessionView& view) {
 }
 
 void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
-                  const std::string& record, const Story& device, bool as_json) {
+                  const std::string& record, const std::vector<SessionFinding>& findings, const Story& device,
+                  bool as_json) {
     const LoopReport& loop = report.loop;
     const RecordingFile& file = outlets.file;
     const std::string ending = ending_text(loop, settings.loop);
     if (as_json) {
-        nlohmann::json summary{{"ended", ending},
+        nlohmann::json summary{{"verdict", verdict_text(findings)},
+                               {"ended", ending},
                                {"status", text(loop.status).word},
                                {"ticks", loop.timing.ticks()},
                                {"rate_hz", loop.timing.rate_hz()},
@@ -139,6 +140,10 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
     const nlohmann::json counts = statuses(loop);
     for (const auto& [word, count] : counts.items()) {
         counted += (counted.empty() ? "" : ", ") + std::to_string(count.get<std::uint64_t>()) + " " + word;
+    }
+    std::cout << "verdict: " << level_of(findings) << "\n";
+    for (const SessionFinding& finding : findings) {
+        std::cout << "  " << finding.sentence << "\n";
     }
     std::cout << "ended      " << ending << "\n"
               << "rate       " << readable(loop.timing.rate_hz()) << " Hz of "

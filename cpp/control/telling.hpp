@@ -9,6 +9,7 @@
 
 #include "palpate/io/outlets.hpp"
 #include "palpate/session.hpp"
+#include "palpate/session_verdict.hpp"
 
 namespace palpate::control {
 
@@ -42,9 +43,10 @@ struct Story {
 
 [[nodiscard]] nlohmann::json microseconds(const DurationHistogram& histogram);
 
-/// The summary on standard output, as lines or as one JSON object.
+/// Prints the verdict and the summary on standard output, as lines or as one JSON object.
 void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
-                  const std::string& record, const Story& device, bool as_json);
+                  const std::string& record, const std::vector<SessionFinding>& findings, const Story& device,
+                  bool as_json);
 
 /// The last ticks before a fault, on standard error.
 void tell_last_ticks(const SessionReport& report, const RecordUnits& units);

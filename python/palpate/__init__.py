@@ -1,34 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a recorded force over position to a force that is rendered.
+"""Identifies a model of force over position from recordings, and renders it on a haptic device.
 
-    recording = palpate.read_recording("press.csv")
-    model = palpate.identify(recording)
-    print(palpate.verify(model, palpate.read_recording("fresh.csv")).nrmse)
+    model = palpate.identify("press.csv")  # or a DataFrame, or arrays of position and force
+    print(model)
+    print(palpate.verify(model, "fresh.csv").nrmse)
     model.save("press.json")
 
-Names are loaded when they are first used, so that the command line answers at once.
+Names are loaded when they are first used, so that the command line starts fast.
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._core import Hand, Scheme, __version__
+    from ._core import __version__
     from .errors import InputError
     from .identification import IdentifyOptions, frame_bounds
     from .identification.identify import identify
     from .identification.identify_files import identify_files
     from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
-    from .planning import DeviceProfile, Plan, simulate
+    from .planning import DeviceProfile, Hand, Plan, Scheme, simulate
     from .planning.ladder import plan
     from .recording import Recording, read_recording
+    from .verdict import Finding, Verdict
     from .verification import Verification, verify
 
 _HOME = {
     "DeviceProfile": "planning",
-    "Hand": "_core",
-    "Scheme": "_core",
+    "Hand": "planning",
+    "Scheme": "planning",
     "__version__": "_core",
     "InputError": "errors",
     "IdentifyOptions": "identification",
@@ -42,6 +44,8 @@ _HOME = {
     "simulate": "planning",
     "Recording": "recording",
     "read_recording": "recording",
+    "Finding": "verdict",
+    "Verdict": "verdict",
     "Verification": "verification",
     "verify": "verification",
     "WaveletNetworkRegressor": "identification.regressor",
@@ -50,6 +54,7 @@ _HOME = {
 
 __all__ = [
     "DeviceProfile",
+    "Finding",
     "Hand",
     "IdentifyOptions",
     "InputError",
@@ -57,6 +62,7 @@ __all__ = [
     "Plan",
     "Recording",
     "Scheme",
+    "Verdict",
     "Verification",
     "WaveletNetworkRegressor",
     "__version__",
@@ -85,5 +91,17 @@ def __getattr__(name: str) -> Any:
     return getattr(home, name)
 
 
+def _has_scikit_learn() -> bool:
+    try:
+        return find_spec("sklearn") is not None
+    except (ImportError, ValueError):
+        return False
+
+
+if not _has_scikit_learn():
+    # `from palpate import *`, help() and inspect.getmembers() leave it out; naming it states what to install.
+    __all__.remove("WaveletNetworkRegressor")
+
+
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

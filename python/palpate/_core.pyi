@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_simulated_ticks', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -120,6 +120,7 @@ class ForceModel:
         
         A hysteresis model needs direction (+1 pressing, -1 releasing) or, where it has a play radius, play, the
         state of the play operator. Inputs that the model does not use are ignored; ValueError names one it misses.
+        A position that is not finite gives NaN, in a number as in an array.
         """
     @typing.overload
     def force(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
@@ -136,7 +137,8 @@ class ForceModel:
         """
     def predict(self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Force at X (n, d), (n,); a hysteresis model takes the direction as one more column.
+        Force at X (n, d), (n,); a hysteresis model takes the direction as one more column. A row with a
+        value that is not finite gives NaN.
         """
     @typing.overload
     def slope(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -259,7 +261,13 @@ class DeviceProfile:
     """
     What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
         ...
@@ -325,7 +333,13 @@ class Hand:
     """
     A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex = 15.0, damping: typing.SupportsFloat | typing.SupportsIndex = 0.05, lower: typing.SupportsFloat | typing.SupportsIndex = 0.02, upper: typing.SupportsFloat | typing.SupportsIndex = 0.47, frequency_hz: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
         ...
@@ -358,7 +372,13 @@ class Scheme:
     """
     How a model is rendered: the structure and its numbers, SI units.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
         ...
@@ -399,7 +419,15 @@ class ForceBounds:
     
     With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h / r more while it sticks.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, drag: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
         ...
     @property
     def drag(self) -> float:
@@ -453,7 +481,13 @@ class Inequality:
     """
     One line of a certificate: left >= right, or left > right where it is strict.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, name: str, formula: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, rests_on: str, source: str, strict: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
         ...
@@ -496,10 +530,16 @@ class Certificate:
     """
     What is proved of a model, rendered by a scheme, on a device.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
     def __init__(self, *, scheme: Scheme, device: DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, why: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
         A certificate that stood in a file; nothing of it is to be believed before `check`.
         """
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __repr__(self) -> str:
         ...
     def check(self, model: ForceModel) -> None:
@@ -548,6 +588,14 @@ class Bench:
     """
     A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
     """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, device: DeviceProfile, hand: Hand, length: typing.SupportsFloat | typing.SupportsIndex = 1.0, stiffness: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
     def __repr__(self) -> str:
         ...
     def scheme(self, model: ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Scheme:
@@ -650,15 +698,17 @@ def guard_effects() -> list:
     By row: guard, cost (RMS change of the force over its RMS), wrong (what is wrong, and what of
     it is measured), without and with the guard.
     """
-def measure(device: str = 'simulated', *, object: ForceModel | None = None, transducer: bool = True, position_unit: str = 'rad', force_unit: str = 'N*m', probe: bool = False, lower: typing.SupportsFloat | typing.SupportsIndex | None = None, upper: typing.SupportsFloat | typing.SupportsIndex | None = None, speed: typing.SupportsFloat | typing.SupportsIndex | None = None, stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, force_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, push: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', keep: bool = False, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, wait_s: typing.SupportsFloat | typing.SupportsIndex | None = None, progress: collections.abc.Callable | None = None) -> dict:
+def measure(device: str = 'simulated', *, object: ForceModel | None = None, transducer: bool = True, position_unit: str = 'rad', force_unit: str = 'N*m', probe: bool = False, lower: typing.SupportsFloat | typing.SupportsIndex | None = None, upper: typing.SupportsFloat | typing.SupportsIndex | None = None, speed: typing.SupportsFloat | typing.SupportsIndex | None = None, stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, force_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, push: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', force: bool = False, keep: bool = False, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, wait_s: typing.SupportsFloat | typing.SupportsIndex | None = None, progress: collections.abc.Callable | None = None, friction_share: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     A real object measured in real time; on the simulated device the model `object` is mounted.
     
     A hand moves the handle; with `probe` the device itself does, slowly between `lower` and `upper`;
     with `push` it gives short pushes of that force to either side. Blocks for `duration_s` (inf: until
     Ctrl-C) without holding the interpreter; `progress(ticks, position, force, lost)` is called ten times a
-    second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows as record.part; with `keep` the summary, returned
-    by name, holds the ticks. ValueError where it is refused before anything moves.
+    second. A packet of a USB device is waited for `wait_s`. `record` names the recording, which grows as
+    record.part; an existing one is refused, or replaced with `force`. With `keep` the summary, returned
+    by name, holds the ticks. `friction_share` is the Coulomb friction of the simulated device, over its force
+    limit. ValueError where it is refused before anything moves.
     """
 def mexican_hat(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     """
@@ -690,19 +740,22 @@ def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radi
     State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
     otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).
     """
-def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8) -> dict:
+def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', force_unit: str = 'N*m', rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', force: bool = False, model_name: str = '', telemetry_port: typing.SupportsInt | typing.SupportsIndex | None = None, telemetry_hz: typing.SupportsFloat | typing.SupportsIndex = 50.0, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, progress: collections.abc.Callable | None = None) -> dict:
     """
     The model rendered in real time on a simulated device: the loop of palpate-control.
     
     Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the
-    recording, which grows as record.part; a `telemetry_port` of this machine gets JSON lines over UDP.
+    recording, which grows as record.part; an existing one is refused, or replaced with `force`. A
+    `telemetry_port` of this machine gets JSON lines over UDP.
+    `progress(ticks, position, force, lost)` is called ten times a second.
     A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.
     Returns the summary by name; ValueError where it is refused before anything moves.
     """
-def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
+def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
     """
     The model rendered on a simulated device held by a simulated hand, in virtual time.
-    The handle starts at rest at start_position.
+    The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. Ctrl-C
+    ends it as in Python; ValueError for more than most_simulated_ticks.
     
     Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true
     handle when sampled and at the end of the tick that holds the force), environment_position, force
@@ -750,6 +803,7 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
 __version__: str = '0.1.0'
 failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
 longest_delay_samples: int = 16
+most_simulated_ticks: int = 3600000
 paper_sample_time_s: float = 0.001
 status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}
 structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')

@@ -176,8 +176,13 @@ TEST(CompiledCurve, ContinuesAsTheNetworkDoes) {
             EXPECT_FALSE(curve.extrapolated(edge));
         }
         const double infinity = std::numeric_limits<double>::infinity();
-        EXPECT_TRUE(std::isnan(curve.at(std::nan("")).value));
-        EXPECT_EQ(curve.at(infinity).value, network.curve().at(infinity).value);
+        for (const double none : {std::nan(""), infinity, -infinity}) {
+            for (const Curve& here : {curve.at(none), network.curve().at(none)}) {
+                EXPECT_TRUE(std::isnan(here.value) && std::isnan(here.slope) && std::isnan(here.integral))
+                    << none;
+            }
+            EXPECT_TRUE(curve.extrapolated(none));
+        }
     }
 }
 

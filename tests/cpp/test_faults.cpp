@@ -292,7 +292,7 @@ TEST(Faults, InAnyOrderTheForceStaysSafeAndTheRecordIsComplete) {
         }
         const std::string name = scratch.file("felt" + std::to_string(number % 50) + ".csv");
         RecordingFile file;
-        ASSERT_EQ(file.open(name, {}, {{"model", "spring"}}), "");
+        ASSERT_EQ(file.open(name, {}, {{"model", "spring"}}, true), "");
         const Rendering run = render(faults, 0.5, &file);
         expect_safe(run);
         if (HasFatalFailure()) {
@@ -319,7 +319,7 @@ TEST(Faults, InAnyOrderTheForceStaysSafeAndTheRecordIsComplete) {
         const bool bad_end = !sends_force(run.report->status);
         EXPECT_EQ(is_orderly(run.report->ending), ticks == 500 && !is_final(run.report->status));
         EXPECT_TRUE(is_orderly(run.report->ending) || bad_end);
-        EXPECT_EQ(file.finish(ending_text(*run.report, {}), "virtual"), 0);
+        EXPECT_EQ(file.finish(ending_text(*run.report, {}), "virtual"), "");
         EXPECT_EQ(rows_of(name), ticks);
     }
 }

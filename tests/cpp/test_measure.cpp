@@ -139,6 +139,19 @@ TEST(Pulses, AreShortAlternatingAndEndWhereTheHandleGotTooFar) {
     EXPECT_THROW((Pulses{{.force = 0.0}, period}), std::invalid_argument);
 }
 
+TEST(Pulses, AreSmallerInEverySecondThree) {
+    Pulses pulses{{.force = 0.5, .smaller = 0.6, .push_s = 0.03, .rest_s = 0.17}, period};
+    pulses.reset(0.0);
+    std::vector<double> sizes;
+    for (int k = 0; k < 8 * 200; ++k) {
+        const double force = pulses.step(0.0).force;
+        if (k % 200 == 199) {
+            sizes.push_back(force);
+        }
+    }
+    EXPECT_EQ(sizes, (std::vector<double>{0.5, -0.5, 0.5, -0.3, 0.3, -0.3, 0.5, -0.5}));
+}
+
 TEST(FreeMotion, LeavesTheHandleToTheHand) {
     FreeMotion free;
     free.reset(1.0);

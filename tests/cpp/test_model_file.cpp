@@ -54,6 +54,16 @@ TEST(ModelFile, KeepsEveryNumberToTheLastBit) {
     EXPECT_EQ(file.force_unit, "N*m");
 }
 
+TEST(ModelFile, GivesThePlanItsOwnNetworkAndKeepsTheIdentifiedOne) {
+    const ModelFile file = load_model_file(corpus + "good/plan_network.json");
+    EXPECT_EQ(file.model.parameters().weight, (std::vector<double>{0.8, -0.25}));
+    EXPECT_EQ(file.planned().parameters().weight, (std::vector<double>{0.4}));
+    ASSERT_TRUE(file.certificate);
+    EXPECT_EQ(file.certificate->model, fingerprint(file.planned()));
+    const ModelFile plain = load_model_file(corpus + "good/plan_and_certificate.json");
+    EXPECT_EQ(&plain.planned(), &plain.model);
+}
+
 TEST(ModelFile, SaysThatAFileIsNotThere) {
     EXPECT_THROW((void)load_model_file(corpus + "nothing.json"), std::invalid_argument);
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small recordings to read, and the sentence with which one is refused."""
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,3 +29,21 @@ def refusal(path: Path, **options: object) -> str:
     sentence = str(refused.value)
     assert "\n" not in sentence
     return sentence.replace(f"{path.parent}/", "")
+
+
+def options_in(sentence: str, given: dict[str, object] | None = None) -> dict[str, object]:
+    """The options of reading after applying the cure of a refusal literally."""
+    options = dict(given or {})
+    if "add: " not in sentence:
+        assert "--invalid drop" in sentence, sentence
+        return options | {"invalid": "drop"}
+    words = shlex.split(sentence.split("add: ")[1])
+    for option, value in zip(words[::2], words[1::2], strict=True):
+        if option == "--units":
+            column, _, symbol = value.rpartition("=")
+            known = options.get("units", {})
+            assert isinstance(known, dict)
+            options["units"] = {**known, column: symbol}
+        else:
+            options[option.removeprefix("--")] = value
+    return options

@@ -11,8 +11,9 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python" / "palpate"
 HEADERS = ROOT / "cpp" / "include" / "palpate"
 
-# What everybody may know: the error type, the names of array shapes and the compiled core.
-COMMON = {"errors", "_typing", "_core"}
+# What every folder may import: the error type, the checks of arguments, the verdict, the names of array
+# shapes and the compiled core.
+COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 
 # A room may import the rooms before it.
 ROOMS = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
@@ -48,6 +49,7 @@ INCLUDES = {
     },
     "session": {"loop", "controller", "guard", "rendering", "model", "device", "realtime", "io"},
     "session_text": {"session", "loop", "bench", "guard", "rendering", "io"},
+    "session_verdict": {"session_text", "session", "loop", "io"},
     "closed_loop": {"controller", "guard", "rendering", "solver", "dynamics", "model", "device"},
     "failure": {
         "closed_loop",
@@ -72,6 +74,7 @@ LEAF_HEADERS = {
     "device/inverse3.hpp",
     "device/usb.hpp",
     "io/json_field.hpp",
+    "io/json_text.hpp",
     "io/model_file.hpp",
     "io/plan_file.hpp",
 }
@@ -81,7 +84,7 @@ LEAF_HEADERS = {
 SYSTEM_HEADERS = {
     "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
     | {"linux/futex.h", "sys/syscall.h"},
-    "io": {"fcntl.h", "netinet/in.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
+    "io": {"fcntl.h", "netinet/in.h", "sys/file.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 
 # What prints, locks or opens files has no place where a force is computed.

@@ -170,8 +170,19 @@ def _left(folder: Path, name: str, results: Any) -> None:
 
 
 def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict[str, Any]:
-    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0, "draws": 7}
-    return {"problem": problem, "method": method, "nrmse": nrmse, "n_parameters": n_parameters, **times}
+    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0, "draws": 12}
+    ours = method == "palpate"
+    return {
+        "problem": problem,
+        "method": method,
+        "nrmse": nrmse,
+        "nrmse_range": [nrmse / 2, 2 * nrmse],
+        "n_parameters": n_parameters,
+        "n_parameters_range": [n_parameters - 3, n_parameters + 3],
+        "n_wavelets": 6 if ours else None,
+        "n_wavelets_range": [5, 7] if ours else None,
+        **times,
+    }
 
 
 @pytest.fixture
@@ -199,10 +210,12 @@ def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: P
     for name in ("parameters", "time", "filters"):
         assert (identified / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
     text = page.read_text(encoding="utf-8")
-    assert "| P1, splines | 5.00e-04 | 44 | 0.25 | 0.5 | 3 |" in text
+    assert "| P1, palpate | 3.00e-04 (1.50e-04 to 6.00e-04) | 6 (5 to 7) | 20 (17 to 23) |" in text
+    assert "| P1, splines | 5.00e-04 (2.50e-04 to 1.00e-03) |  | 44 (41 to 47) | 0.25 |" in text
     assert "MARS" not in text
     assert "| no wavelet | 99 | 100 |" in text
-    assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; noise draws: 7" in text
+    assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; median (least" in text
+    assert "of up to 12 draws" in text
     # what was not measured this time stays as it was
     assert "old real_data" in text
     assert "old parsimony" not in text

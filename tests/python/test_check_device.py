@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-from palpate import DeviceProfile, InputError, load_model
+from palpate import DeviceProfile, InputError, load_model, plan
+from palpate.cli.main import main
 from palpate.devices import Check, check, check_device, judge, push_response
 from usb_emulation import emulated, frames, needs_emulation
 
@@ -66,7 +68,7 @@ def finding(found: Check, name: str) -> Any:
 
 def test_a_faultless_device_is_ok_and_all_numbers_are_told() -> None:
     found = judge(heard())
-    assert found.verdict == "OK: knob is fit to render force"
+    assert str(found.verdict) == "good"
     assert found.may_push
     assert {one.name for one in found.findings} >= {
         "rate",
@@ -108,14 +110,15 @@ def test_what_is_wrong_is_named_and_forbids_force_where_it_must(
     found = judge(heard(**changed))
     wrong = finding(found, name)
     assert wrong.right is False
-    assert found.verdict.startswith(f"NOT SUITABLE: knob: {name}: ")
-    assert wrong.advice in found.verdict
+    assert str(found.verdict).startswith("no: ")
+    assert f"{name}: {wrong.told}" in str(found.verdict)
+    assert wrong.advice in str(found.verdict)
     assert found.may_push is not forbids
 
 
 def test_a_device_that_must_not_make_force_has_no_profile() -> None:
     found = judge(heard(velocity=-heard()["kept"]["velocity"]))
-    with pytest.raises(InputError, match="no profile of a device that must not make force; NOT SUITABLE"):
+    with pytest.raises(InputError, match="no profile of a device that must not make force"):
         found.profile()
 
 
@@ -144,16 +147,22 @@ def test_a_flipped_sign_is_caught_before_any_force(what: str, monkeypatch: pytes
 
 
 def pushed(
-    obeys: float = 1.0, says: float = 1.0, moves: Callable[[np.ndarray], np.ndarray] | None = None
+    obeys: float = 1.0,
+    says: float = 1.0,
+    moves: Callable[[np.ndarray], np.ndarray] | None = None,
+    friction: float = 0.0,
+    smaller: float = 0.6,
 ) -> dict[str, np.ndarray]:
     """Ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
     sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
     sent[np.arange(2000) % 200 >= 170] = 0.025
     sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
+    sent *= np.where(np.arange(2000) // 600 % 2, smaller, 1.0)
     x = 0.0
     for k in range(1, 2000):
         for _ in range(20):
-            speed += 5e-5 / 2e-4 * (-obeys * sent[k - 1] - 0.06 * speed)
+            free = speed + 5e-5 / 2e-4 * (-obeys * sent[k - 1] - 0.06 * speed)
+            speed = np.copysign(max(0.0, abs(free) - 5e-5 / 2e-4 * friction), free)
             x += 5e-5 * speed
         position[k] = x
     time = 1e-3 * np.arange(2000)
@@ -168,12 +177,47 @@ def pushed(
 
 
 def test_pushes_show_sign_delay_and_mechanics() -> None:
-    push = push_response(pushed())
+    push = push_response(pushed(), STEP)
     assert push.moved > 10 * push.unsure
     assert push.obeyed
     assert push.delay_samples == 0
-    assert push.inertia == pytest.approx(2e-4, rel=0.02)
-    assert push.damping == pytest.approx(0.06, rel=0.02)
+    assert push.mechanics is not None
+    assert push.mechanics.inertia == pytest.approx(2e-4, rel=0.02)
+    assert push.mechanics.damping == pytest.approx(0.06, rel=0.02)
+    assert push.mechanics.friction_at_least == 0.0
+
+
+@pytest.mark.parametrize("friction", [0.001, 0.003, 0.006, 0.01, 0.012])
+def test_pushes_of_two_sizes_separate_friction_from_damping(friction: float) -> None:
+    mechanics = push_response(pushed(friction=friction), STEP).mechanics
+    assert mechanics is not None
+    assert mechanics.friction == pytest.approx(friction, rel=0.05)
+    assert 0.85 * friction < mechanics.friction_at_least <= friction
+    assert mechanics.damping == pytest.approx(0.06, rel=0.02)
+
+
+def test_friction_that_only_the_larger_pushes_overcome_is_not_measured_but_can_be_stated() -> None:
+    ticks = pushed(friction=0.018)
+    push = push_response(ticks, STEP)
+    assert push.mechanics is None
+    found = check.with_pushes(judge(heard()), push)
+    assert "friction: not measured: no two sizes of push moved the handle" in str(found.verdict)
+    assert "--coulomb-friction" in str(found.verdict)
+    with pytest.raises(InputError, match="a profile needs inertia, damping and friction"):
+        found.profile()
+    stated = push_response(ticks, STEP, 0.018)
+    assert stated.mechanics is not None
+    assert stated.mechanics.damping == pytest.approx(0.06, rel=0.1)
+    stating = check.with_pushes(replace(judge(heard()), coulomb_friction=0.018), stated)
+    assert stating.profile().coulomb_friction == 0.018
+    assert "coulomb_friction: stated, not measured." in stating.profile_notes()
+
+
+def test_a_device_without_friction_is_usable_and_says_what_that_costs() -> None:
+    found = check.with_pushes(judge(heard()), push_response(pushed(), STEP))
+    assert found.verdict.level == "usable"
+    assert "friction: none was found" in str(found.verdict)
+    assert found.profile().coulomb_friction == 0.0
 
 
 @pytest.mark.parametrize(
@@ -201,20 +245,24 @@ def test_the_sign_of_the_force_is_what_moved_the_handle(ticks: dict[str, np.ndar
 @pytest.fixture
 def faultless(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured is a faultless device, at once."""
-    monkeypatch.setattr(check, "measure", lambda device, **settings: heard())
+    push = {"kept": pushed(friction=0.01)}
+    monkeypatch.setattr(check, "measure", lambda device, **settings: push if "push" in settings else heard())
 
 
 @pytest.mark.usefixtures("faultless")
 def test_a_check_without_pushes_says_that_the_sign_of_the_force_was_not_seen() -> None:
     found = check_device()
     assert finding(found, "sign of the force").right is None
-    assert found.verdict == "OK: knob is fit to render force; not seen: sign of the force"
+    assert str(found.verdict) == (
+        "usable: sign of the force: not looked at (let it push a free handle: --push)"
+    )
 
 
 def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
     profile = DeviceProfile()
     found = check_device(duration_s=4.0, push=True, profile=profile)
     assert finding(found, "sign of the force").right
+    assert found.numbers["coulomb_friction"] == pytest.approx(0.002 * profile.force_limit, rel=0.1)
     measured = found.profile()
     assert measured.inertia == pytest.approx(profile.inertia, rel=0.05)
     assert measured.viscous_damping == pytest.approx(profile.viscous_damping, rel=0.3)
@@ -223,19 +271,45 @@ def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
     assert DeviceProfile.load(path).encoder_step == measured.encoder_step
 
 
+def test_the_profile_of_the_simulated_device_is_enough_for_a_certified_direct_plan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "knob.toml"
+    words = ["--push", "--duration-s", "5", "--write-profile", str(path), "--json"]
+    assert main(["check-device", *words]) in (0, 1)  # a busy machine may be too late for its rate
+    told = json.loads(capsys.readouterr().out)
+    assert told["written"] == str(path)
+    assert told["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
+    text = path.read_text(encoding="utf-8")
+    assert "# coulomb_friction: measured, less its uncertainty: a lower bound." in text
+    assert "# encoder_step, force_step, force_limit: said by the device, not measured." in text
+    measured = DeviceProfile.load(path)
+    assert 0.008 < measured.coulomb_friction <= 0.01
+    chosen = plan(load_model(SPRING), measured)
+    assert chosen.structure == "direct"
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+
+
+def test_a_friction_that_cannot_be_is_refused_by_name() -> None:
+    with pytest.raises(InputError, match=r"coulomb_friction is -1, must be a finite number >= 0"):
+        check_device(duration_s=2.0, push=True, coulomb_friction=-1.0)
+
+
 @pytest.mark.parametrize(
     ("changed", "wrong"),
     [
         ({"period_s": 0.5e-3}, "its period gets "),
         ({"encoder_step": 1e-5}, "its encoder step is "),
         ({"force_limit": 9.0}, "its largest force is 5, 9 is counted on"),
+        ({"coulomb_friction": 0.02}, "its friction is 0.00994, 0.02 is counted on"),
     ],
 )
 @pytest.mark.usefixtures("faultless")
 def test_a_profile_that_promises_more_than_the_device_keeps_does_not_hold(
     changed: dict[str, float], wrong: str
 ) -> None:
-    found = check_device(profile=DeviceProfile(**changed))
+    found = check_device(profile=DeviceProfile(**changed), push=True)
     assert finding(found, "profile").right is False
     assert wrong in finding(found, "profile").told
 
@@ -279,6 +353,16 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert max(abs(frame.torque) for frame in felt) <= 1.001 * SHARE_OF_FORCE * 5.0
     assert felt[-1].torque == 0.0
     assert not felt[-1].enabled
+
+
+@needs_emulation
+def test_the_friction_of_a_usb_device_is_measured(tmp_path: Path) -> None:
+    profile = tmp_path / "knob.toml"
+    words = ["--push", "--yes", "--write-profile", profile]
+    result, _ = told_of(checked(*words, device=["--no-hand", "--friction", "0.01"], seconds=5.0))
+    assert result["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
+    assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
+    assert 0.008 < DeviceProfile.load(profile).coulomb_friction <= 0.01
 
 
 @needs_emulation

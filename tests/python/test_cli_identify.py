@@ -18,7 +18,7 @@ from palpate.cli.identify_options import HELP
 from palpate.cli.main import main, palpate
 from palpate.recording.sample import sample_recording
 
-JSON_FIELDS = ["model", "n_wavelets", "n_parameters", "rung", "stop_reason", "nrmse", "seconds"]
+JSON_FIELDS = ["model", "n_wavelets", "n_parameters", "rung", "stop_reason", "nrmse", "verdict", "seconds"]
 
 
 @pytest.fixture
@@ -62,6 +62,38 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert result["seconds"] > 0
 
 
+def test_held_out_rows_of_a_force_over_velocity_are_those_that_have_one(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At 100 Hz every fifth row alone gives no velocity: it is formed before the rows are split."""
+    time = 0.01 * np.arange(2000)
+    position = 0.3 - 0.3 * np.cos(2.0 * np.pi * 0.5 * time)
+    speed = np.gradient(position, time)
+    force = np.sin(4.0 * position) * (1.0 + speed) + np.random.default_rng(0).normal(0.0, 0.01, len(time))
+    recording = Recording.from_arrays(position, force, time, units={"position": "rad", "force": "N*m"})
+    recording.write(here / "a.csv")
+    arguments = ["identify", "a.csv", "-o", "m.json", "--inputs", "position,velocity"]
+    assert main([*arguments, "--hold-out-every", "5", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["nrmse"] < 0.03
+    assert 300 < result["held_out_rows"] < 400
+    assert main([*arguments, "--hold-out-every", "5"]) == 0
+    assert f"{result['held_out_rows']} of 400 rows held out" in capsys.readouterr().out
+
+
+def test_held_out_rows_are_judged_as_verify_judges_them(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All the force is in the held-out rows: the model is a constant, and the verdict says no."""
+    position = np.linspace(0.0, 1.0, 400)
+    force = np.where(np.arange(400) % 5 == 4, 3.0 * position, 0.0)
+    Recording.from_arrays(position, force, units={"position": "rad", "force": "N*m"}).write(here / "a.csv")
+    assert main(["identify", "a.csv", "-o", "m.json", "--hold-out-every", "5", "--json"]) == 1
+    verdict = json.loads(capsys.readouterr().out)["verdict"]
+    assert "the NRMSE on 80 held-out rows is" in verdict
+    assert "a hand feels the error" in verdict
+
+
 def test_the_error_is_that_of_the_rows_held_out(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording = read_recording(spring(here / "a.csv"))
     assert main(["identify", "a.csv", "-o", "m.json", "--hold-out-every", "5", "--json"]) == 0
@@ -69,7 +101,9 @@ def test_the_error_is_that_of_the_rows_held_out(here: Path, capsys: pytest.Captu
     held_out = np.arange(len(recording)) % 5 == 4
     error = model.force(recording.position[held_out]) - recording.force[held_out]
     expected = np.sqrt(np.mean(error**2)) / np.std(recording.force[held_out])
-    assert json.loads(capsys.readouterr().out)["nrmse"] == pytest.approx(expected, rel=1e-9)
+    result = json.loads(capsys.readouterr().out)
+    assert result["nrmse"] == pytest.approx(expected, rel=1e-9)
+    assert result["held_out_rows"] == 80
     assert model.data.held_out_every == 5
 
 

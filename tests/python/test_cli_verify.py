@@ -15,7 +15,8 @@ from palpate.cli.main import main
 from palpate.cli.pictures import close_loops, picture_closed_loops, picture_verification
 from test_planning import keyswitch_by_hand, model_by_hand
 
-JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated", "units"]
+JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated"]
+JSON_FIELDS += ["verdict", "units"]
 UNITS = {"position": "rad", "force": "N*m"}
 
 
@@ -39,7 +40,13 @@ def test_numbers_go_to_standard_output_and_talk_to_standard_error(
     assert main(["verify", "m.json", "a.csv"]) == 0
     shown = capsys.readouterr()
     assert shown.err.startswith("read a.csv: 2000 rows; position is position_rad")
-    assert [line.split()[0] for line in shown.out.splitlines()][:4] == ["nrmse", "rmse", "r2", "worst"]
+    assert [line.split()[0] for line in shown.out.splitlines()][:5] == [
+        "verdict:",
+        "nrmse",
+        "rmse",
+        "r2",
+        "worst",
+    ]
     assert "fresh" in shown.out
 
 
@@ -54,6 +61,17 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert result["fresh"] is True
     assert result["n"] == 2000
     assert result["units"] == UNITS
+
+
+def test_a_verdict_of_no_ends_with_exit_code_1_and_names_the_cure(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", "m.json", "a.csv", "--negate", "force"]) == 1
+    assert capsys.readouterr().out.startswith("verdict: no\n")
+    assert main(["verify", "m.json", "a.csv", "--negate", "force", "--json"]) == 1
+    verdict = json.loads(capsys.readouterr().out)["verdict"]
+    assert verdict.startswith("no: the NRMSE on 2000 rows is ")
+    assert "give --negate force" in verdict
 
 
 def test_both_figures_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,7 +92,7 @@ def test_a_simulated_recording_is_never_called_measured(
     savefig = Figure.savefig
 
     def looked_at(figure: Figure, *arguments: Any, **options: Any) -> None:
-        shown = [axes.get_legend() for axes in figure.axes]
+        shown = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
         legends.extend(text.get_text() for legend in shown if legend for text in legend.get_texts())
         savefig(figure, *arguments, **options)
 
@@ -164,4 +182,4 @@ def test_a_model_that_is_no_json_is_one_sentence(
 
 def test_show_prints_the_model_for_a_person(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", "m.json"]) == 0
-    assert capsys.readouterr().out.rstrip("\n") == str(model_by_hand()).rstrip("\n")
+    assert capsys.readouterr().out == f"{model_by_hand()}\n"

@@ -185,6 +185,11 @@ def test_below_its_wall_the_sample_is_a_spring_to_within_its_noise() -> None:
         (sweep(timed=False), {"stroke_speed": -1.0}, "stroke_speed is -1.0; it must be > 0"),
         (sweep(), {"period_s": 0.0}, "period_s is 0.0; it must be > 0"),
         (sweep(), {"period_s": 9.0}, "less than two samples of 9 s"),
+        (sweep(), {"period_s": np.inf}, "period_s is inf; it must be > 0 and finite"),
+        (sweep(), {"period_s": 1e-12}, "samples of 1e-12 s: choose a larger period"),
+        (sweep(timed=False), {"stroke_speed": np.inf}, "stroke_speed is inf; it must be > 0 and finite"),
+        (sweep(timed=False), {"stroke_speed": 1e-9}, "samples of 0.001 s: choose a higher stroke speed"),
+        (sweep(timed=False), {"stroke_speed": 5e-324}, "more than 20000000 samples"),
         (Recording.from_arrays(np.ones(20), np.ones(20), units=RAD), {}, "the recording does not move"),
         (
             Recording.from_arrays([0.0, 1.0], [0.0, 1.0], units={"position": "m", "force": "N"}),

@@ -7,6 +7,7 @@ import pytest
 
 from palpate import InputError
 from palpate.recording.columns import Choice, choose_columns
+from palpate.recording.units import UNITS
 
 
 def choose(header: str, **named: object) -> Choice:
@@ -67,8 +68,12 @@ def test_the_first_preferred_stem_is_the_force(header: str, force: str) -> None:
 
 
 def test_a_preferred_stem_in_two_equal_units_does_not_choose() -> None:
-    with pytest.raises(InputError, match=r"position_mm, position_um.*--position"):
+    with pytest.raises(InputError, match=r"position_mm, position_um.*--position position_mm$"):
         choose("position_mm,position_um,force_N")
+
+
+M = "m, mm, um, nm, cm, in, rad, deg, count, counts"
+N = "N, mN, uN, nN, kN, gf, kgf, lbf, ozf, Nm, mNm, uNm, kNm, N*mm, N*cm, A, mA"
 
 
 @pytest.mark.parametrize(
@@ -77,34 +82,57 @@ def test_a_preferred_stem_in_two_equal_units_does_not_choose() -> None:
         (
             "back_angle_rad,front_angle_rad,torque_Nm",
             "press.csv: two columns could be the position (back_angle_rad, front_angle_rad); "
-            "choose with --position NAME",
+            "for example add: --position back_angle_rad",
         ),
         (
             "depth_mm,force_x_N,force_y_N,force_z_N",
             "press.csv: three columns could be the force (force_x_N, force_y_N, force_z_N); "
-            "choose with --force NAME",
+            "for example add: --force force_x_N",
         ),
         (
             "start_s,stop_s,depth_mm,force_N",
-            "press.csv: two columns could be the time (start_s, stop_s); choose with --time NAME",
+            "press.csv: two columns could be the time (start_s, stop_s); for example add: --time start_s",
         ),
         (
             "x,y",
-            "press.csv: no column name ends in a unit of position "
-            "(m, mm, um, nm, cm, rad, deg, count, counts) among x, y; "
-            "name one with --position NAME and state its unit with --units NAME=UNIT",
+            f"press.csv: no column name has a unit of position ({M}); "
+            f"no column name has a unit of force ({N}); its columns are x, y; "
+            "if x is in mm and y is in N, add: --position x --units x=mm --force y --units y=N",
         ),
         (
             "depth_mm,y",
-            "press.csv: no column name ends in a unit of force (N, mN, uN, nN, gf, kgf, Nm, mNm, uNm, A, mA) "
-            "among depth_mm, y; name one with --force NAME and state its unit with --units NAME=UNIT",
+            f"press.csv: no column name has a unit of force ({N}); its columns are depth_mm, y; "
+            "if y is in N, add: --force y --units y=N",
+        ),
+        (
+            "a_mm,b_mm,load cell,start_s,stop_s",
+            "press.csv: two columns could be the position (a_mm, b_mm); "
+            f"no column name has a unit of force ({N}); two columns could be the time (start_s, stop_s); "
+            "its columns are a_mm, b_mm, load cell, start_s, stop_s; if load cell is in N, add: "
+            "--position a_mm --force 'load cell' --units 'load cell=N' --time start_s",
         ),
     ],
-    ids=["two positions", "three forces", "two times", "no unit", "no force unit"],
+    ids=["two positions", "three forces", "two times", "no unit", "no force unit", "three problems"],
 )
-def test_what_no_rule_decides_is_refused_with_the_option(header: str, sentence: str) -> None:
+def test_a_refusal_names_all_problems_and_one_command(header: str, sentence: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(sentence)}$"):
         choose(header)
+
+
+def test_a_cure_takes_the_likely_columns() -> None:
+    def cure(header: str, **named: object) -> str:
+        with pytest.raises(InputError) as refused:
+            choose(header, **named)
+        return str(refused.value).split("add: ")[1]
+
+    assert cure("reaction torque,sample,acceleration") == (
+        "--position acceleration --units acceleration=mm "
+        "--force 'reaction torque' --units 'reaction torque=Nm'"
+    )
+    assert cure("n,angle,input,speed", steady={"input"}) == (
+        "--position angle --units angle=rad --force n --units n=N"
+    )
+    assert cure("probe,x,y", text={"probe"}).startswith("--position x --units x=mm --force y")
 
 
 def test_a_stated_unit_makes_a_candidate() -> None:
@@ -135,13 +163,21 @@ def test_a_column_in_an_unknown_unit_takes_the_stated_one() -> None:
 @pytest.mark.parametrize(
     ("named", "sentence"),
     [
-        ({"position": "deep_mm"}, "has no column 'deep_mm' for --position; its columns are depth_mm, y"),
+        (
+            {"position": "deep_mm"},
+            "it has no column 'deep_mm' for --position; no column name has a unit of force",
+        ),
+        (
+            {"position": "deep_mm"},
+            "its columns are depth_mm, y; if y is in N, add: --position depth_mm --force y",
+        ),
         ({"direction": "stroke"}, "has no column 'stroke' for --direction"),
         ({"inputs": ("load",)}, "has no column 'load' for inputs"),
         ({"units": {"z": "N"}}, "has no column 'z' for --units"),
-        ({"units": {"force": "N"}}, "--units force=N also needs --force NAME"),
-        ({"units": {"y": "lbf"}}, "--units y=lbf: 'lbf' is no unit; use one of m, mm"),
-        ({"force": "y"}, "column y has no known unit; state it with --units y=UNIT (one of N, mN"),
+        ({"units": {"force": "N"}}, "--units force=N also needs --force NAME, which names its column"),
+        ({"units": {"y": "lb"}}, "--units y=lb: 'lb' is no unit; use one of m, mm"),
+        ({"units": {"y": "lb"}, "force": "y"}, "add: --units y=lbf"),
+        ({"force": "y"}, f"column y has no known unit ({N}); if y is in N, add: --units y=N"),
         ({"force": "depth_mm"}, "column depth_mm is in mm, which is no unit of force"),
         ({"force": "y", "units": {"y": "mm"}}, "column y is in mm, which is no unit of force"),
     ],
@@ -151,9 +187,36 @@ def test_wrong_hints_are_refused_by_name(named: dict[str, object], sentence: str
         choose("depth_mm,y", **named)
 
 
+@pytest.mark.parametrize(
+    "header", ["Depth [mm],Load (N)", "Weg / mm,Kraft / N", "depth, mm;force, N", "depth_mm,force_N"]
+)
+def test_units_stand_in_brackets_after_a_slash_or_a_comma(header: str) -> None:
+    names = header.split(";" if ";" in header else ",")
+    choice = choose_columns("press.csv", names)
+    assert (choice.position.name, choice.force.name) == tuple(names)
+
+
+def test_a_stem_is_compared_without_case_and_spaces() -> None:
+    assert choose("Tip position (um),Height (um),X (um),Force (nN)").position.name == "Tip position (um)"
+
+
+def test_an_input_beside_an_output_is_not_in_inches() -> None:
+    assert choose("pos_in,pos_out,depth_mm,force_N").position.name == "depth_mm"
+    assert choose("depth_in,force_N").position.unit == UNITS["in"]
+
+
 def test_one_column_cannot_play_two_parts() -> None:
     with pytest.raises(InputError, match="column p cannot be both the position and the force"):
         choose("p,q", position="p", force="p", unstated=("p",))
+
+
+def test_a_time_without_a_unit_is_reported_and_added_by_the_cure() -> None:
+    assert choose("Time,depth_mm,force_N").notes == (
+        "column Time has no unit and is not used; if it is in s, add: --time Time --units Time=s",
+    )
+    assert choose("Time,depth_mm,force_N", text={"Time"}).notes == ()
+    with pytest.raises(InputError, match=r"--force y --units y=N --time Time --units Time=s$"):
+        choose("Time,depth_mm,y")
 
 
 @pytest.mark.parametrize("name", ["direction", "segment"])

@@ -87,6 +87,8 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL, "--structure", "direct", "--compensated"], "no coupling to compensate"),
         ([MODEL, "--force-limit", "9"], "--force-limit is 9, the device makes 5"),
         ([MODEL, "--force-limit", "0"], "--force-limit: must be a number above 0, not 0"),
+        ([MODEL, "--ramp-s", "1e300"], "ramp_s is 1e+300, must be 0 to 3600"),
+        ([MODEL, "--frozen-s", "inf"], "frozen_s is inf, must be 0 to 3600"),
         ([MODEL, "--telemetry-port", "70000"], "--telemetry-port"),
         ([MODEL, "--fault", "flu@1"], "fault is 'flu@1', must be KIND@SECONDS"),
         ([MODEL.parent / "two_inputs.json"], "has 2 inputs"),
@@ -130,6 +132,7 @@ def test_asked_to_stop_it_ends_in_an_orderly_way(tmp_path: Path, number: signal.
     out = tmp_path / "felt.csv"
     process = started(MODEL, "--duration-s", "inf", "--record", out, "--json", *PATIENT)
     wait_for_rows(tmp_path / "felt.csv.part", process)
+    time.sleep(0.8)  # longer than the ramp, of which no row is usable
     process.send_signal(number)
     told, talk = process.communicate(timeout=20)
     assert process.returncode == 0, talk

@@ -7,10 +7,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from control_program import control, needs_program
-from palpate import DeviceProfile, Scheme, plan
+from palpate import DeviceProfile, Scheme, load_model, plan, read_recording
 from palpate.planning import Plan
 from test_planning import model_by_hand
 
@@ -47,6 +48,47 @@ def test_the_plan_of_the_file_is_what_is_rendered(tmp_path: Path) -> None:
         assert "no plan" not in answer.stderr
 
 
+@pytest.fixture
+def limited(tmp_path: Path) -> Path:
+    """A plan that renders another network than the identified one; its device is patient."""
+    knob = DeviceProfile(
+        id="weak knob",
+        inertia=0.05,
+        viscous_damping=0.2,
+        coulomb_friction=0.01,
+        period_s=0.01,
+        jitter_s=0.09,
+    )
+    chosen = plan(model_by_hand(linear=[20.0]), knob, accept_force_error=1.0)
+    assert chosen.limited is not None
+    return chosen.stored().save(tmp_path / "limited.json")
+
+
+def test_the_network_of_the_plan_is_rendered_and_the_identified_one_with_a_structure_of_one_s_own(
+    limited: Path, tmp_path: Path
+) -> None:
+    stored = load_model(limited)
+    words = ["--duration-s", 3, "--lowest-rate-share", 0, "--slew-s", 0, "--no-energy-tank"]
+    for others, rendered in (([], stored.planned), (["--structure", "direct", "--rate-hz", 100], stored)):
+        record = tmp_path / f"felt{len(others)}.csv"
+        answer = control(limited, *words, *others, "--record", record)
+        assert answer.returncode == 0, answer.stderr
+        assert f"{rendered.n_wavelets} wavelets" in answer.stderr
+        felt = read_recording(record)
+        assert np.ptp(felt.force) > 0.0
+        np.testing.assert_allclose(felt.force, rendered.force(felt.position), atol=1e-6)
+
+
+def test_a_certificate_that_does_not_fit_the_network_of_the_plan_moves_nothing(limited: Path) -> None:
+    content = json.loads(limited.read_text(encoding="utf-8"))
+    content["plan"]["network"] = None
+    limited.write_text(json.dumps(content), encoding="utf-8")
+    answer = control(limited, "--duration-s", 0.2)
+    assert answer.returncode == 2
+    assert "certificate.model is " in answer.stderr
+    assert "changed after it was certified" in answer.stderr
+
+
 def test_without_a_plan_the_default_coupling_is_told_unless_it_was_chosen(tmp_path: Path) -> None:
     path = model_by_hand().save(tmp_path / "unplanned.json")
     words = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
@@ -58,7 +100,7 @@ def test_a_certified_run_takes_rate_and_device_of_its_certificate_and_says_so(
     planned: Path, tmp_path: Path
 ) -> None:
     record = tmp_path / "felt.csv"
-    answer = control(planned, "--duration-s", 0.2, "--record", record)
+    answer = control(planned, "--duration-s", 0.6, "--record", record)
     assert answer.returncode == 0, answer.stderr
     assert "uncertified" not in answer.stderr
     assert "certified: certified" in metadata(record)
@@ -78,7 +120,7 @@ def test_what_the_certificate_does_not_cover_is_rendered_uncertified(
 ) -> None:
     record = tmp_path / "felt.csv"
     answer = control(
-        planned, *words, "--duration-s", 0.2, "--record", record, "--lowest-rate-share", 0, "--rate-hz", 500
+        planned, *words, "--duration-s", 0.6, "--record", record, "--lowest-rate-share", 0, "--rate-hz", 500
     )
     assert answer.returncode == 0, answer.stderr
     assert "uncertified: the command line asks for a rendering of its own" in answer.stderr

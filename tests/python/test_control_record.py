@@ -9,6 +9,7 @@ import os
 import random
 import resource
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -106,10 +107,166 @@ def test_a_torn_last_line_is_left_out_and_counted(tmp_path: Path) -> None:
 
 def test_a_recording_that_was_cut_off_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "felt.csv.part").write_text("precious", encoding="utf-8")
-    answer = control(MODEL, "--duration-s", 0.1, "--record", tmp_path / "felt.csv", *PATIENT)
+    answer = control(MODEL, "--duration-s", 0.8, "--record", tmp_path / "felt.csv", *PATIENT)
     assert answer.returncode == 0
     assert (tmp_path / "felt.csv.1.part").read_text(encoding="utf-8") == "precious"
     assert "felt.csv.1.part" in answer.stderr
+
+
+def test_an_existing_recording_is_refused_before_anything_runs_and_replaced_with_force(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "felt.csv"
+    out.write_text("precious", encoding="utf-8")
+    words = [MODEL, "--duration-s", 0.8, "--record", out, *PATIENT]
+    answer = control(*words)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith(f"error: --record {out} exists already; choose another name, or ")
+    assert answer.stderr.count("\n") == 1
+    assert out.read_text(encoding="utf-8") == "precious"
+    assert os.listdir(tmp_path) == ["felt.csv"]
+    assert control(*words, "--force").returncode == 0
+    assert len(every_row(out)) > 500
+
+
+def test_the_recording_of_a_failed_run_is_not_replaced_by_the_next_run(tmp_path: Path) -> None:
+    out, fault = tmp_path / "felt.csv", tmp_path / "felt.fault.csv"
+    words = [MODEL, "--duration-s", 2, "--record", out, "--fault", "gone@0.8", *PATIENT]
+    assert control(*words).returncode == 1
+    kept = out.read_bytes(), fault.read_bytes()
+    assert control(*words).returncode == 2
+    assert (out.read_bytes(), fault.read_bytes()) == kept
+    out.rename(tmp_path / "first.csv")
+    answer = control(*words)
+    assert answer.returncode == 1
+    assert fault.read_bytes() == kept[1]
+    assert f"the last 500 ticks are in {tmp_path / 'felt.fault-2.csv'}" in answer.stderr
+    assert len(every_row(tmp_path / "felt.fault-2.csv")) == 500
+
+
+def stopped(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
+    process.send_signal(signal.SIGINT)
+    told, talk = process.communicate(timeout=60)
+    return subprocess.CompletedProcess(process.args, process.returncode, told, talk)
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]], ids=["plain", "force"])
+@pytest.mark.parametrize("second", ["palpate-control", "render", "record"])
+@pytest.mark.parametrize("first", ["palpate-control", "render"])
+def test_the_second_of_two_runs_with_one_recording_is_refused_and_the_first_keeps_its_rows(
+    tmp_path: Path, first: str, second: str, force: list[str]
+) -> None:
+    out = tmp_path / "felt.csv"
+    python = [sys.executable, "-m", "palpate"]
+    commands = {
+        "palpate-control": [PROGRAM, MODEL, "--record", out, *PATIENT],
+        "render": [*python, "render", MODEL, "--record", out, *PATIENT],
+        "record": [*python, "record", out, "--object", MODEL, "--probe", *PATIENT],
+    }
+    running = subprocess.Popen(
+        list(map(str, [*commands[first], "--duration-s", "inf", "--json"])),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        wait_for_rows(tmp_path / "felt.csv.part", running)
+        refused = subprocess.run(
+            list(map(str, [*commands[second], "--duration-s", "0.5", *force])),
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+        assert refused.returncode == 2, refused.stderr
+        assert "felt.csv.part is being written by another run" in refused.stderr.splitlines()[-1]
+        assert os.listdir(tmp_path) == ["felt.csv.part"]
+        time.sleep(0.7)
+    finally:
+        answer = stopped(running)
+    assert answer.returncode == 0, answer.stderr
+    summary = json.loads(answer.stdout)
+    assert len(every_row(out)) == summary["recorded"] == summary["ticks"]
+    assert os.listdir(tmp_path) == ["felt.csv"]
+
+
+def test_a_file_that_appears_while_the_loop_runs_is_not_replaced(tmp_path: Path) -> None:
+    out, part = tmp_path / "felt.csv", tmp_path / "felt.csv.part"
+    process = started(MODEL, "--duration-s", "inf", "--record", out, "--json", *PATIENT)
+    wait_for_rows(part, process)
+    time.sleep(0.7)
+    out.write_text("precious", encoding="utf-8")
+    answer = stopped(process)
+    assert answer.returncode == 0
+    assert out.read_text(encoding="utf-8") == "precious"
+    summary = json.loads(answer.stdout)
+    sentence = f"{out} appeared while this was recorded and is not replaced; the recording is {part}"
+    assert sentence in answer.stderr
+    assert sentence in summary["verdict"]
+    assert summary["record"] == str(part)
+    assert len(every_row(part)) == summary["recorded"]
+
+
+def test_closed_standard_output_does_not_end_up_in_the_recording(tmp_path: Path) -> None:
+    out = tmp_path / "felt.csv"
+    for words in ([], ["--json"]):
+        command = [PROGRAM, MODEL, "--duration-s", "0.8", "--record", out, "--force", *PATIENT, *words]
+        answer = subprocess.run(
+            ["sh", "-c", '"$@" >&-', "sh", *map(str, command)],
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+        assert answer.returncode == 1
+        assert "error: standard output could not be written" in answer.stderr.splitlines()[-1]
+        text = out.read_text(encoding="utf-8")
+        assert "verdict" not in text
+        assert text.startswith("# created_by")
+        assert text.splitlines()[-1].endswith(",Ok")
+
+
+@pytest.mark.parametrize("words", [["--json"], [], ["--help"], ["--version"]], ids=" ".join)
+def test_a_full_standard_output_ends_with_1_and_a_sentence(words: list[str]) -> None:
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        answer = subprocess.run(
+            list(map(str, [PROGRAM, MODEL, "--duration-s", 0.8, *PATIENT, *words])),
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+    assert answer.returncode == 1
+    assert answer.stderr.splitlines()[-1].startswith("error: standard output could not be written")
+
+
+@pytest.mark.parametrize(
+    ("words", "level", "sentence", "code"),
+    [
+        (["--structure", "direct", "--duration-s", 1.2], "good", "", 0),
+        (["--duration-s", 0.1], "usable", "ticks lay within the ramp at the start: run for a longer time", 0),
+        (["--duration-s", 0.1, "--record", "felt.csv"], "no", "the recording has no usable row", 0),
+        (["--force-limit", 0.2, "--duration-s", 1.2], "usable", "clipped the force to its limit", 0),
+        (["--fault", "nan@0.8x30"], "no", "stopped by a guard: NonFinite", 1),
+        (["--fault", "lost@0.5x4", "--fault", "lost@0.7x4"], "usable", "samples of the device were lost", 0),
+    ],
+    ids=["good", "ramp", "nothing recorded", "clipped", "guard", "lost samples"],
+)
+def test_the_verdict_comes_first(
+    tmp_path: Path, words: list[Any], level: str, sentence: str, code: int
+) -> None:
+    """On a busy machine deadlines are missed, which is told as well."""
+    words = [MODEL, *(["--duration-s", 1.2] if "--duration-s" not in words else []), *words, *PATIENT]
+    answer = control(*words, cwd=tmp_path)
+    assert answer.returncode == code, answer.stderr
+    first, *others = answer.stdout.splitlines()
+    busy = level == "good" and first == "verdict: usable" and all("deadlines" in o for o in others[:1])
+    assert first == f"verdict: {level}" or busy
+    assert any(sentence in line for line in others)
+    summary = json.loads(control(*words, "--json", "--force", cwd=tmp_path).stdout)
+    assert summary["verdict"].startswith(level) or busy or "deadlines" in summary["verdict"]
+    assert sentence in summary["verdict"]
 
 
 def expect_cut_recording(answer: subprocess.CompletedProcess[str], out: Path, ticks: int) -> None:
@@ -242,7 +399,9 @@ def test_what_was_rendered_is_identified_as_the_same_model_with_no_hint(tmp_path
     palpate("identify", sample, "-o", first)
     assert control(first, "--duration-s", 5, "--record", felt, "--compensated", *PATIENT).returncode == 0
     palpate("identify", felt, "-o", again)
-    _, *rows = palpate("show", first, "--beside", again, "--plot", picture).splitlines()
+    told = palpate("show", first, "--beside", again, "--plot", picture)
+    assert told.startswith("verdict: good\n")
+    rows = told.partition("largest difference, in just noticeable ones\n")[2].splitlines()
     shares = [float(row.split()[-1]) for row in rows]
     print(f"largest difference in just noticeable ones: {shares}")
     assert shares

@@ -93,7 +93,7 @@ def planned(folder: Path, **device: Any) -> Path:
 
 def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
     record = tmp_path / "felt.csv"
-    words = ["--wait-ms", 500, "--duration-s", 0.1, "--record", record]
+    words = ["--wait-ms", 500, "--duration-s", 0.6, "--record", record]
     answer = control(*words, device=LOCK_STEP, model=planned(tmp_path))
     # On a busy machine the first late packet ends it: nothing else is certified.
     assert answer.returncode == 0 or "zero force sent" in answer.stderr, answer.stderr
@@ -209,13 +209,14 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
         "usb",
         "--uncertified",
     ]
-    words = [*command, *PATIENT, "--duration-s", "inf", "--record", part]
+    words = [*command, *PATIENT, "--ramp-s", 0, "--duration-s", "inf", "--record", part]
     process = subprocess.Popen(
         [sys.executable, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
     assert "emulated knob" in process.stderr.readline()
     wait_for_rows(Path(f"{part}.part"))
+    time.sleep(0.8)  # so that the handle moves
     process.send_signal(ask)  # the emulator passes it on
     out, _ = process.communicate(timeout=60)
     assert process.returncode == 0

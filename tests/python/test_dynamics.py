@@ -2,11 +2,12 @@
 """Velocity, mass, damping and hysteresis are found where they are, and nowhere else."""
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from palpate import Recording, _core, identify, verify
+from palpate import Recording, _core, identify, read_recording, verify
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,
@@ -103,6 +104,87 @@ def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None
     assert (model.fit.rung, model.damping) == ("velocity", None)
     assert verify(model, contact(2)).rmse < 0.004
     assert any(note.startswith("velocity taken as an input") for note in model.notes["identification"])
+
+
+def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
+    """A soft joint with Coulomb and viscous friction, moved for 20 s and sampled at 100 Hz."""
+    random = np.random.default_rng(seed)
+    time = 0.01 * np.arange(2000)
+    phase = 2.0 * np.pi * 0.01 * np.cumsum(0.4 + 0.2 * np.sin(0.7 * time + random.uniform(0.0, 6.0)))
+    x = 0.5 - 0.5 * np.cos(phase)
+    v = np.gradient(x, time)
+    force = 0.2 * x + friction * ((1.0 + 0.5 * x) * np.tanh(v / 0.05) + viscous * v)
+    force = force + random.normal(0.0, 0.005, len(x))
+    return Recording.from_arrays(x, force, time, units={"position": "rad", "force": "N*m"})
+
+
+def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input() -> None:
+    """The torque of a motor that drives the joint: it has the sign of the other side."""
+    kept, held = jointed(1, -0.3).split(5)
+    model = identify(kept)
+    assert (model.fit.rung, model.inputs) == ("velocity", ("position", "velocity"))
+    result = verify(model, held)
+    assert result.nrmse < 0.1
+    assert result.n < len(held)
+    assert any("give --negate force" in reason for reason in model.verdict.reasons)
+    assert any(
+        note.startswith("velocity taken as an input: a network over position and velocity lowers")
+        for note in model.notes["identification"]
+    )
+
+
+def test_friction_that_hysteresis_explains_stays_hysteresis() -> None:
+    model = identify(jointed(1, 0.3, viscous=0.0))
+    assert model.kind == "hysteresis"
+    assert model.fit.nrmse < 0.15
+
+
+def test_noise_that_does_not_depend_on_velocity_earns_no_velocity() -> None:
+    time = 0.01 * np.arange(2000)
+    x = 0.5 - 0.5 * np.cos(2.0 * np.pi * 0.3 * time)
+    force = x + np.random.default_rng(3).normal(0.0, 0.3, len(x))
+    model = identify(Recording.from_arrays(x, force, time))
+    assert model.inputs == ("position",)
+    assert not any("as an input" in note for note in model.notes["identification"])
+
+
+def test_a_measured_relaxation_is_identified_without_velocity(data: Path) -> None:
+    """The position stands still in all rows that have a velocity."""
+    model = identify(read_recording(data / "vhb4910_viscoelastic" / "relax_stretch_6d0.csv"))
+    assert model.kind == "position"
+
+
+def test_velocity_of_split_rows_is_formed_from_all_rows() -> None:
+    whole = jointed(2, 0.3)
+    derived, known = velocity(whole)
+    kept, held = whole.split(5)
+    test_rows = np.arange(len(whole)) % 5 == 4
+    for part, rows in ((kept, ~test_rows), (held, test_rows)):
+        values, here = velocity(part)
+        np.testing.assert_array_equal(here, known[rows])
+        np.testing.assert_allclose(values, derived[rows], atol=1e-12)
+
+
+def test_velocity_of_a_range_of_rows_is_formed_from_the_rows_around_it(tmp_path: Path) -> None:
+    whole = read_recording(jointed(2, 0.3).write(tmp_path / "a.csv"), negate=("position",))
+    derived, known = velocity(whole)
+    part = read_recording(tmp_path / "a.csv", negate=("position",), rows=(800, 900))
+    values, here = velocity(part)
+    assert known[800:900].all()
+    assert here.all()
+    np.testing.assert_allclose(values, derived[800:900], atol=1e-12)
+
+
+def test_measured_joints_are_held_to_their_error(data: Path) -> None:
+    """da Vinci tools: position alone leaves 0.34 to 0.97 of the spread of the held-out rows."""
+    for name in ("tool_4_maryland_l_4__09", "tool_4_maryland_r_5__23", "tool_4_maryland_l_4__45"):
+        path = data / "davinci_grip" / f"{name}.csv"
+        for side in ("back", "front"):
+            recording = read_recording(path, position=f"{side}_angle_rad", force=f"{side}_torque_Nm")
+            kept, held = recording.split(5)
+            model = identify(kept)
+            assert model.kind == "position_velocity", name
+            assert verify(model, held).nrmse < 0.16, name
 
 
 def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float = 2e-3) -> Recording:

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stopping on rows that were kept back, rungs earned on them, and outliers."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from palpate import _core, identify
 from palpate.identification import IdentifyOptions, fit_environment
-from palpate.identification.fresh import BLOCKS, FreshRows, gain, kept_back
+from palpate.identification.evidence import Evidence
+from palpate.identification.fresh import BLOCKS, FreshRows, gain, inside, kept_back
 from palpate.identification.stopping import choice, enough, standard_error
 from palpate.recording import sample_recording
 
@@ -66,6 +69,52 @@ def test_a_gain_has_an_error_of_its_own() -> None:
     share, error = gain(random.normal(size=50_000), noise)
     assert abs(share) < 4.0 * error
     assert gain(np.zeros(100), np.zeros(100)) == (0.0, 0.0)
+
+
+def test_a_trimmed_gain_leaves_out_groups_at_both_ends() -> None:
+    below, above = np.full(1000, 2.0), np.ones(1000)
+    above[:60] = 100.0
+    share, error = gain(below, above)
+    assert share < -100.0
+    assert error > 0.0
+    assert gain(below, above, trim=0.1) == (pytest.approx(0.75), pytest.approx(0.0))
+
+
+def test_rows_inside_lie_within_the_range_of_the_others_in_every_input() -> None:
+    others = np.array([[0.0, 5.0], [1.0, 6.0]])
+    rows = np.array([[0.5, 5.5], [0.0, 6.0], [1.1, 5.5], [0.5, 4.9]])
+    np.testing.assert_array_equal(inside(rows, others), [True, True, False, False])
+    assert not inside(rows, others[:0]).any()
+
+
+def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
+    """One stretch that is held back goes on into a wall, where no fitted row is."""
+    n = 2000
+    x = 0.5 - 0.5 * np.cos(20.0 * np.pi * np.arange(n) / n)
+    fresh = np.flatnonzero(kept_back(n, (0,)))
+    stretches = np.split(fresh, np.flatnonzero(np.diff(fresh) > 1) + 1)
+    into_wall = stretches[len(stretches) // 2]
+    push = np.sin(np.pi * np.arange(len(into_wall)) / len(into_wall)) ** 2
+    x[into_wall] += (1.1 - x[into_wall]) * push
+    force = 0.1 * np.sin(9.0 * x) + 0.3 * x + 20.0 * np.maximum(x - 1.0, 0.0)
+    force += np.random.default_rng(0).normal(0.0, 0.002, n)
+    network = fit_environment(x[:, None], force, None, IdentifyOptions(inputs="position"), starts=[0])
+    assert network.rung == "position"
+    assert network.nrmse < 0.02
+
+
+def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def gains(_: Evidence, below: object, above: Any) -> tuple[float, float]:
+        return (1.0, 0.0) if len(above.solution.basis) <= 3 else (-1.0, 0.1)
+
+    monkeypatch.setattr(Evidence, "_fresh_gain", gains)
+    x, _, y = wall(2000, 3)
+    network = fit_environment(x[:, None], y)
+    assert (network.rung, network.stop_reason) == ("position", "held-back rows")
+    assert 1 <= len(network.weight) <= 3
+    assert sum(note.startswith("position refused: bic falls by") for note in network.notes) >= 1
 
 
 def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:

@@ -92,7 +92,7 @@ def test_recordings_in_different_units_are_refused() -> None:
 
 
 def test_no_recording_and_unknown_options_are_refused() -> None:
-    with pytest.raises(InputError, match="no recording"):
+    with pytest.raises(InputError, match="recording is an empty list"):
         identify([])
     with pytest.raises(InputError, match="no option 'wavelets'; it has inputs, max_wavelets"):
         identify(sample_recording(1, duration_s=1.0), wavelets=3)

@@ -9,6 +9,7 @@ import pytest
 from palpate import InputError, _core
 from palpate.identification import IdentifyOptions, fit_environment
 from palpate.identification.evidence import Evidence
+from palpate.identification.identified import IdentifiedNetwork
 
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) > 1
 DRAWS = 100 if LONG else 40
@@ -299,3 +300,58 @@ def test_a_motion_that_never_turns_back_leaves_hysteresis_untried_and_says_so() 
         fit_environment(
             x[:, None], force, starts=[0], options=IdentifyOptions(inputs=("position", "hysteresis"))
         )
+
+
+def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A press and a release of 2 x with half the loop's height on either side."""
+    n = len(height)
+    x = np.concatenate([np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)])
+    side = np.repeat([1.0, -1.0], n)
+    noise = np.random.default_rng(seed).normal(0.0, 0.004, 2 * n)
+    return x[:, None], 2.0 * x + side * np.concatenate([height, height[::-1]]) + noise, side
+
+
+def sign_findings(network: IdentifiedNetwork) -> list[str]:
+    return [finding.sentence for finding in network.findings if "gains energy" in finding.sentence]
+
+
+def test_a_loop_that_releases_stored_energy_names_the_option_that_helps() -> None:
+    positions, force, side = loop(0.5 * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 300)))
+    network = fit_environment(positions, force, side)
+    assert network.nrmse > 0.3
+    (told,) = sign_findings(network)
+    assert "--no-hysteresis-nonnegative" in told
+    assert "--negate" not in told
+    cured = fit_environment(positions, force, side, IdentifyOptions(hysteresis_nonnegative=False))
+    assert cured.nrmse < 0.01
+    assert sign_findings(cured) == []
+
+
+def test_negate_is_named_only_where_turning_the_sign_helps() -> None:
+    positions, force, side = loop(-0.2 - 0.3 * np.linspace(0.0, 1.0, 300))
+    (told,) = sign_findings(fit_environment(positions, force, side))
+    assert "--negate force" in told
+    assert "--no-hysteresis-nonnegative" not in told
+    assert fit_environment(positions, -force, side).nrmse < 0.01
+
+
+def test_the_limit_of_wavelets_is_told_while_the_error_is_structured() -> None:
+    x = np.linspace(0.0, 1.0, 1200)
+    force = np.sin(40.0 * np.pi * x) + np.random.default_rng(0).normal(0.0, 0.02, len(x))
+
+    def told(max_wavelets: int) -> list[str]:
+        network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=max_wavelets))
+        return [finding.sentence for finding in network.findings if "limit of" in finding.sentence]
+
+    (sentence,) = told(12)
+    assert "limit of 12 wavelets" in sentence
+    assert "give --max-wavelets 48, or --period" in sentence
+    assert told(48) == []
+
+
+def test_the_limit_of_wavelets_is_not_told_where_noise_is_left() -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    force = 0.3 * np.exp(-0.5 * ((x - 0.5) / 0.1) ** 2) + np.random.default_rng(0).normal(0.0, 0.05, 400)
+    network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=1))
+    assert network.stop_reason == "max_wavelets"
+    assert not any("limit of" in finding.sentence for finding in network.findings)

@@ -119,8 +119,9 @@ def test_parts_hold_every_row_once(tmp_path: Path, suffix: str) -> None:
     recording = open_long_recording(file, part_rows=700)
     assert len(recording.parts) > 4
     read = [block for part in recording.parts for block in recording.blocks(part)]
-    assert np.array_equal(np.concatenate([block[0] for block in read]), frame.position_rad)
-    assert np.array_equal(np.concatenate([block[1] for block in read]), frame.torque_Nm)
+    assert np.array_equal(np.concatenate([block.position for block in read]), frame.position_rad)
+    assert np.array_equal(np.concatenate([block.force for block in read]), frame.torque_Nm)
+    assert sum(block.rows for block in read) == recording.rows == len(frame)
 
 
 def test_units_signs_and_several_files(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conftest import ROOT
 from palpate import InputError, Model, _core, load_model
 from palpate.model import Fit
 from palpate.recording import Source
@@ -96,7 +97,8 @@ PLAN = {
     "compensated": False,
     "play_radius": 2e-4,
     "refused": ["none"],
-    "loss": {"largest": 0.1, "rms": 0.01},
+    "network": None,
+    "accepted_force_error": 0.2,
 }
 
 
@@ -246,3 +248,31 @@ def test_a_model_can_be_read_by_a_person() -> None:
     spring = str(Model(**content(wavelets=0, linear=[2.0], bias=0.5)))
     assert spring.endswith("f(x) = +2 x +0.5  [N]")
     assert repr(Model(**content())) == "<palpate.Model: position, 5 wavelets, 17 parameters>"
+
+
+GOOD = sorted((ROOT / "tests" / "models" / "good").glob("*.json"))
+
+
+@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+@pytest.mark.parametrize("position", [np.inf, -np.inf, np.nan])
+def test_a_position_that_is_not_finite_gives_nan_in_a_number_and_in_an_array(
+    path: Path, position: float
+) -> None:
+    model = load_model(path)
+    if model.dimension > 1:
+        rows = np.full((2, model.dimension), 0.1)
+        rows[1, -1] = position
+        force = model.predict(rows)
+        assert np.isfinite(force[0])
+        assert np.isnan(force[1])
+        return
+    one: Any = {"direction": 1.0} if model.hysteretic else {}
+    many: Any = {"direction": np.ones(3)} if model.hysteretic else {}
+    for name in ("force", "slope", "energy"):
+        quantity = getattr(model, name)
+        assert np.isnan(quantity(position, **one)), name
+        array = quantity(np.array([0.1, position, 0.2]), **many)
+        assert np.array_equal(np.isnan(array), [False, True, False]), name
+    assert model.extrapolated(position)
+    columns = [position, 1.0] if model.hysteretic else [position]
+    assert np.isnan(model.predict(np.array([columns]))[0])

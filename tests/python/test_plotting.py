@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures draw what they are given, in its units, so that black and white can tell it apart."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from palpate import Recording
+from palpate import Recording, identify, read_recording, verify
+from palpate.cli.pictures import picture_path, picture_verification
 from palpate.plotting import draw_measured_and_modelled, draw_real_against_rendered, draw_structures
-from palpate.plotting.look import MOST_POINTS, label, strokes, thinned
+from palpate.plotting.look import MOST_POINTS, label, scale_for, strokes, thinned
 
 UNITS = {"position": "rad", "force": "N*m"}
 
@@ -112,3 +116,75 @@ def test_pauses_belong_to_no_stroke() -> None:
 
 def test_a_unit_that_is_not_known_is_not_invented() -> None:
     assert label("force", "") == "force"
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "shown", "factor"),
+    [
+        ("m", 0.0041, "mm", 1e3),
+        ("m", 0.1, "m", 1.0),
+        ("m", 0.0999, "mm", 1e3),
+        ("m", 5e-5, "\u00b5m", 1e6),
+        ("N", 0.5, "N", 1.0),
+        ("N", 0.02, "mN", 1e3),
+        ("N", 1000.0, "kN", 1e-3),
+        ("N*m", 0.005, "mN*m", 1e3),
+        ("rad", 0.47, "rad", 1.0),
+        ("rad", 0.05, "mrad", 1e3),
+        ("rad", 5000.0, "rad", 1.0),
+        ("count", 5000.0, "count", 1.0),
+        ("", 1e-5, "", 1.0),
+        ("N", 0.0, "N", 1.0),
+    ],
+)
+def test_the_prefix_of_a_unit_follows_the_largest_value(
+    unit: str, largest: float, shown: str, factor: float
+) -> None:
+    for values in ([largest, 0.0], [-largest, np.nan]):
+        scale = scale_for(unit, values)
+        assert scale.unit == shown
+        assert scale.factor == pytest.approx(factor)
+
+
+def test_an_object_of_millimetres_is_drawn_in_millimetres() -> None:
+    x = np.linspace(0.0, 0.004, 50)
+    recording = Recording.from_arrays(x, 100.0 * x, units={"position": "m", "force": "N"})
+    force, residual = axes(2)
+    draw_measured_and_modelled(force, residual, recording, 99.0 * x)
+    assert residual.get_xlabel() == "position [mm]"
+    assert force.get_ylabel() == "force [N]"
+    assert residual.get_ylabel() == "residual [mN]"
+    np.testing.assert_allclose(force.lines[0].get_xdata(), 1e3 * x)
+    np.testing.assert_allclose(residual.lines[0].get_ydata(), 1e3 * x)
+
+
+def test_a_legend_hides_nothing_that_is_drawn() -> None:
+    recording = press_and_release()
+    force, residual = axes(2)
+    draw_measured_and_modelled(force, residual, recording, recording.force)
+    legend_box = force.get_legend()
+    assert legend_box is not None
+    force.figure.draw_without_rendering()
+    assert legend_box.get_window_extent().y0 >= force.get_window_extent().y1
+
+
+def test_the_title_of_a_figure_names_source_and_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    titles: list[str] = []
+    savefig = Figure.savefig
+
+    def looked_at(figure: Figure, *arguments: Any, **options: Any) -> None:
+        titles.append(figure.get_suptitle())
+        savefig(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", looked_at)
+    source = press_and_release().write(tmp_path / "press.csv")
+    recording = read_recording(source)
+    model = identify(recording)
+    verification = verify(model, recording)
+    picture_verification(tmp_path / "a.png", model, [(recording, verification)])
+    picture_path(tmp_path / "b.png", model)
+    assert titles[0] == f"press.csv\nNRMSE {verification.nrmse:.4g} on {len(recording)} rows"
+    assert titles[1].startswith("press.csv\n")
+    assert f"NRMSE {model.fit.nrmse:.4g}" in titles[1]

@@ -96,6 +96,7 @@ def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(tol
 def test_devices_lists_what_is_plugged_in() -> None:
     answer = devices(device=["--serial", "A", "--serial", "B", "--no-transducer"])
     assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.startswith("verdict: good\n")
     assert "emulated knob A (USB bus 1 address 2)" in answer.stdout
     assert "--device usb:B" in answer.stdout
     assert "torque up to 5 N*m, 1000 Hz, watchdog 20 ms" in answer.stdout
@@ -103,17 +104,20 @@ def test_devices_lists_what_is_plugged_in() -> None:
 
 
 @pytest.mark.parametrize(
-    ("device", "sentence"),
+    ("device", "level", "sentence"),
     [
-        (["--no-device"], "no haptic USB device is plugged in; --device simulated needs none"),
-        (["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),
-        (["--somebody-elses"], "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
+        (["--no-device"], "usable", "no haptic USB device is plugged in; --device simulated needs none"),
+        (["--info-bytes", "33"], "no", "the answer to GET_INFO has 33 bytes, must have 32"),
+        (["--somebody-elses"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
     ],
 )
-def test_devices_says_what_keeps_it_from_a_device(device: list[str], sentence: str) -> None:
-    answer = devices(device=device)
-    assert answer.returncode == 0, answer.stderr
-    assert sentence in answer.stdout
+def test_devices_says_what_keeps_it_from_a_device(device: list[str], level: str, sentence: str) -> None:
+    for as_json in ([], ["--json"]):
+        answer = devices(*as_json, device=device)
+        assert answer.returncode == (1 if level == "no" else 0), answer.stderr
+        assert sentence in answer.stdout
+        verdict = json.loads(answer.stdout)["verdict"] if as_json else answer.stdout.removeprefix("verdict: ")
+        assert verdict.startswith(level)
 
 
 def nobody_may_run(program: Path) -> bool:

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is refused while reading a recording, in which words, and what is dropped on request."""
 
+import os
 import re
+import socket
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from palpate import read_recording
-from small_files import HEADER, Write, refusal, rows, timed
+from palpate import identify, read_recording
+from palpate.recording import sample_recording
+from small_files import HEADER, Write, options_in, refusal, rows, timed
 
 
 def lines(*parts: str | list[str]) -> str:
@@ -33,35 +37,41 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "positions equal": (
         lines(HEADER, ["1,1,press"] * 12),
         {},
-        "press.csv: column depth_mm holds 1 distinct value; force over position needs at least 3",
+        "press.csv: column depth_mm holds 1 distinct value; force over position needs at least 3; "
+        "choose another column with --position NAME",
     ),
     "2 positions": (
         lines(HEADER, ["1,1,press", "2,1,press"] * 6),
         {},
-        "press.csv: column depth_mm holds 2 distinct values; force over position needs at least 3",
+        "press.csv: column depth_mm holds 2 distinct values; force over position needs at least 3; "
+        "choose another column with --position NAME",
     ),
     "one column": (
         "depth_mm\n1\n2\n",
         {},
         "press.csv, line 1: there is one column (depth_mm); a recording needs a position and a force, "
-        "separated by commas",
+        "separated by commas, semicolons or tabs",
     ),
-    "semicolons": (
-        "depth_mm;force_N\n1;2\n",
+    "spaces": (
+        "depth_mm force_N\n1 2\n",
         {},
-        "press.csv, line 1: there is one column (depth_mm;force_N); a recording needs a position and a "
-        "force, separated by commas",
+        "press.csv, line 1: there is one column (depth_mm force_N); a recording needs a position and a "
+        "force, separated by commas, semicolons or tabs",
     ),
     "no header": (
         "1,2\n3,4\n",
         {},
         "press.csv, line 1: a header with column names must come first, found 1, 2",
     ),
-    "nameless column": ("depth_mm,,force_N\n", {}, "press.csv, line 1: column 2 has no name"),
+    "nameless column": (
+        "depth_mm,,force_N\n",
+        {},
+        "press.csv, line 1: column 2 has no name; name it in the file",
+    ),
     "name twice": (
         "depth_mm,force_N,depth_mm\n",
         {},
-        "press.csv, line 1: column name depth_mm stands 2 times",
+        "press.csv, line 1: column name depth_mm stands 2 times; rename these columns in the file",
     ),
     "too many cells": (
         lines(HEADER, rows(5), "1,2,press,4", rows(5)),
@@ -138,10 +148,102 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     assert refusal(tmp_path / "folder.csv") == "folder.csv is a folder, not a file"
 
 
+FORMATS = "a recording is CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or MCAP"
+
+
 def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "press.csv"
-    path.write_bytes(b"depth_mm,force_N,word\n" + b"1,2,\xff\xfe\n" * 12)
-    assert refusal(path) == "press.csv is not text in UTF-8; a recording is CSV or Parquet"
+    path.write_bytes(b"PK\x03\x04" + bytes(range(256)) * 20)
+    assert refusal(path) == f"press.csv is not text; {FORMATS}"
+
+
+def test_json_is_refused_in_a_short_sentence(tmp_path: Path) -> None:
+    model = tmp_path / "m.json"
+    identify(sample_recording(1, 2.0)).save(model)
+    assert refusal(model) == f"m.json looks like a palpate model; {FORMATS}"
+    (tmp_path / "other.txt").write_text('{"a": [' + "1.5, " * 20_000 + "2]}", encoding="utf-8")
+    assert refusal(tmp_path / "other.txt") == f"other.txt looks like JSON; {FORMATS}"
+
+
+def test_a_message_is_short_whatever_the_header_holds(csv_file: Write) -> None:
+    header = ",".join(f"{'column' * 300}{k}" for k in range(200))
+    assert len(refusal(csv_file(header, [",".join(["1.5"] * 200)] * 12))) < 2000
+
+
+def test_control_characters_of_a_header_are_escaped(csv_file: Write) -> None:
+    header = "depth\x1b[31m_mm,force\x07_N,evil\x1b]0;title\x07_mm"
+    path = csv_file(header, [f"{k},{k},{k}" for k in range(12)])
+    sentence = refusal(path)
+    assert sentence.isprintable()
+    assert r"depth\x1b[31m_mm" in sentence
+    recording = read_recording(path, **options_in(sentence))  # type: ignore[arg-type]
+    assert all(note.isprintable() for note in recording.notes)
+    assert recording.source.columns == {"position": r"depth\x1b[31m_mm", "force": r"force\x07_N"}
+    assert np.array_equal(recording.force, np.arange(12.0))
+
+
+@pytest.mark.parametrize("kind", ["pipe", "socket", "device"])
+def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "press.csv"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with socket.socket(socket.AF_UNIX) as server:
+            os.chdir(tmp_path)
+            server.bind("press.csv")
+    assert refusal(path) == ("press.csv is a pipe, a device or a socket; save its contents to a file first")
+
+
+THOUSANDS = {
+    "points and a decimal comma": (";", "1.234,5"),
+    "commas and a decimal point": ("\t", "1,234.5"),
+    "repeated commas": (";", "1,234,500"),
+    "in quotes": (",", '"1,234.5"'),
+    "an apostrophe": (";", "1'234.5"),
+    "a space": (";", "1 234.5"),
+}
+
+
+@pytest.mark.parametrize("row", [0, 1500], ids=["at the start", "far below"])
+@pytest.mark.parametrize("case", THOUSANDS)
+def test_thousands_separators_are_refused_and_the_command_removes_them(
+    csv_file: Write, case: str, row: int
+) -> None:
+    separator, cell = THOUSANDS[case]
+    decimal = "," if cell.endswith(",5") else "."
+    lines = [f"{k}{decimal}5{separator}{k}{decimal}25" for k in range(1510)]
+    lines[row] = f"2{decimal}5{separator}{cell}"
+    path = csv_file(separator.join(["depth_mm", "force_N"]), lines)
+    assert_sed_cures(path, row, 1234500.0 if case == "repeated commas" else 1234.5)
+
+
+def test_commas_that_may_be_either_are_refused_with_both_cures(csv_file: Write) -> None:
+    path = csv_file("depth_mm;force_N", [f"{k};{k},500" for k in range(1, 13)])
+    sentence = refusal(path)
+    assert "may be a decimal comma or a thousands separator" in sentence
+    assert_sed_cures(path, 1, 2.5, "write points: ")
+    assert_sed_cures(path, 1, 2500.0, "remove it: ")
+
+
+def test_a_decimal_comma_far_below_is_refused_with_the_cure(csv_file: Write) -> None:
+    lines = [f"{k};{k}" for k in range(1500)]
+    path = csv_file("depth_mm;force_N", [*lines, "1500;7,25"])
+    assert refusal(path).startswith(
+        "press.csv: column force_N holds '7,25', and the first rows have no comma"
+    )
+    assert_sed_cures(path, 1500, 7.25, "write points: ")
+
+
+def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> None:
+    """The command in a refusal, with the names of the files filled in, gives a file with this force."""
+    command = refusal(path).split(f"{before}sed -E ")[1].split(" OLD.csv > NEW.csv")[0]
+    new = path.with_name("new.csv")
+    new.write_bytes(
+        subprocess.run(f"sed -E {command} {path}", shell=True, check=True, capture_output=True).stdout
+    )
+    assert read_recording(new).force[row] == force
 
 
 # What a bad row holds: (header, bad row, what it is called).

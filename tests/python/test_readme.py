@@ -8,9 +8,12 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import click
 import pytest
 
+from control_program import PROGRAM, control, needs_program
 from palpate import _core
+from palpate.cli.main import palpate
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -36,26 +39,61 @@ def test_snippet_runs(snippet: str, bench: Path) -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=bench, check=True, timeout=300)
 
 
-def test_palpate_commands_run_in_their_order(bench: Path) -> None:
-    commands = [words for words in shell_commands() if words[0] == "palpate"]
-    assert commands
+PROGRAMS = {
+    "palpate": Path(sysconfig.get_path("scripts")) / "palpate",
+    "build/control/palpate-control": PROGRAM,
+}
+"""Where the commands of the README are, seen from the folder of the test."""
+
+
+@needs_program
+def test_all_commands_but_make_run_in_their_order(bench: Path) -> None:
+    commands = [words for words in shell_commands() if words[0] != "make"]
+    assert {words[0] for words in commands} == set(PROGRAMS)
     for words in commands:
-        executable = Path(sysconfig.get_path("scripts")) / words[0]
         answer = subprocess.run(
-            [executable, *words[1:]], cwd=bench, capture_output=True, text=True, check=False, timeout=300
+            [PROGRAMS[words[0]], *words[1:]],
+            cwd=bench,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
         )
-        assert answer.returncode == 0, f"{shlex.join(words)}: {answer.stderr}"
+        assert answer.returncode == 0, f"{shlex.join(words)}: {answer.stdout}{answer.stderr}"
 
 
-def test_every_other_command_is_one_that_is_known() -> None:
+def test_every_target_of_make_exists() -> None:
     targets = set(
         re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     )
-    for words in shell_commands():
-        if words[0] == "make":
-            assert set(words[1:]) <= targets
-        else:
-            assert words[0] in {"palpate", "pip", "git", "cd", "build/control/palpate-control"}, words
+    made = {target for words in shell_commands() if words[0] == "make" for target in words[1:]}
+    assert made
+    assert made <= targets
+
+
+def shown_commands() -> list[str]:
+    """Commands that need hardware, and those inside a sentence."""
+    blocks_of_text = [line for block in blocks("text") for line in block.splitlines()]
+    return [line for line in blocks_of_text if line.startswith("palpate")] + re.findall(
+        r"`(palpate [a-z-]+ [^`]+)`", README
+    )
+
+
+@pytest.mark.parametrize("line", [line for line in shown_commands() if line.startswith("palpate ")])
+def test_every_option_of_a_command_that_needs_hardware_exists(line: str) -> None:
+    verb, *words = shlex.split(line, comments=True)[1:]
+    command = palpate.get_command(click.Context(palpate), verb)
+    assert command is not None
+    options = {name for parameter in command.params for name in parameter.opts}
+    assert {word for word in words if word.startswith("-")} <= options
+
+
+@needs_program
+@pytest.mark.parametrize("line", [line for line in shown_commands() if line.startswith("palpate-control ")])
+def test_every_option_of_palpate_control_exists(line: str) -> None:
+    told = control("--help").stdout
+    for word in shlex.split(line, comments=True):
+        assert not word.startswith("--") or word in told
 
 
 def test_the_two_commands_stand_on_the_first_screen() -> None:

@@ -72,17 +72,68 @@ def test_what_is_wrong_is_refused(words: dict[str, object], sentence: str) -> No
         render(_core.Scheme(), **words)
 
 
+def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path) -> None:
+    out = tmp_path / "felt.csv"
+    out.write_text("precious", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"felt.csv exists already; choose another name, or .*force=True"):
+        render(_core.Scheme(), duration_s=0.3, record=str(out))
+    words = [*COMMAND, "--duration-s", "0.8", "--record", str(out), *PATIENT]
+    refused = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(f"error: {out} exists already; choose another name, or ")
+    assert out.read_text(encoding="utf-8") == "precious"
+    assert subprocess.run([*words, "--force"], capture_output=True, check=False).returncode == 0
+    assert len(every_row(out)) > 500
+
+
+def test_a_recording_that_was_cut_off_is_set_aside_and_named(tmp_path: Path) -> None:
+    (tmp_path / "felt.csv.part").write_text("precious", encoding="utf-8")
+    summary = render(_core.Scheme(), duration_s=0.3, record=str(tmp_path / "felt.csv"))
+    assert (tmp_path / "felt.csv.1.part").read_text(encoding="utf-8") == "precious"
+    assert any("felt.csv.1.part" in note for note in summary["notes"])
+
+
+def test_progress_is_called_while_it_runs_and_its_exception_ends_the_run() -> None:
+    seen: list[tuple[int, float, float, int]] = []
+
+    def show(ticks: int, position: float, force: float, lost: int) -> None:
+        seen.append((ticks, position, force, lost))
+        if len(seen) == 3:
+            raise KeyError("enough")
+
+    with pytest.raises(KeyError, match="enough"):
+        render(_core.Scheme(), duration_s=20.0, progress=show)
+    assert [ticks for ticks, *_ in seen] == sorted(ticks for ticks, *_ in seen)
+
+
+def test_the_verdict_is_in_the_summary_and_in_the_first_line(tmp_path: Path) -> None:
+    short = render(_core.Scheme(), duration_s=0.1, record=str(tmp_path / "a.csv"))
+    assert short["verdict"].startswith("no: the recording has no usable row")
+    assert next(iter(short)) == "verdict"
+    assert short["findings"][0]["level"] == "no"
+    out = tmp_path / "b.csv"
+    answer = subprocess.run(
+        [*COMMAND, "--duration-s", "0.1", "--record", str(out), *PATIENT],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert answer.returncode == 1
+    assert answer.stdout.splitlines()[0] == "verdict: no"
+    whole = render(_core.Scheme(structure="direct"), duration_s=1.2)
+    assert whole["verdict"] == "good" or all("deadlines" in f["sentence"] for f in whole["findings"])
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_verb_ends_in_an_orderly_way_when_asked(tmp_path: Path, number: signal.Signals) -> None:
     out = tmp_path / "felt.csv"
     command = [*COMMAND, "--duration-s", "inf", "--record", str(out), "--json", *PATIENT]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while process.poll() is None and not Path(f"{out}.part").exists():
-        time.sleep(0.01)
-    time.sleep(0.2)
+    wait_for_rows(Path(f"{out}.part"), process)
+    time.sleep(0.8)  # longer than the ramp, whose rows are no one's force
     process.send_signal(number)
     told, talk = process.communicate(timeout=30)
-    assert process.returncode == 0, talk
+    assert process.returncode == 0, told + talk
     assert json.loads(told)["recorded"] == len(every_row(out))
 
 

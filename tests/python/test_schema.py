@@ -81,8 +81,8 @@ def test_what_is_not_json_is_told_with_its_line() -> None:
     ("content", "sentence"),
     [
         (b"", "is empty"),
-        (b"\xff\xfe{}", "is not JSON: it is not text"),
-        (b"[" * 100_000, "nested too deeply"),
+        (b"\xff\xfe{}", "byte 0 is not UTF-8"),
+        (b"[" * 100_000, "nested more than 100 levels deep"),
     ],
     ids=["empty", "binary", "deep"],
 )

@@ -129,12 +129,116 @@ def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     assert "the play operator follows the positions" in result.notes[0]
 
 
-def test_without_direction_and_play_radius_the_option_is_named() -> None:
-    model = model_of(curve().source, hysteresis=True)
-    with pytest.raises(
-        InputError, match=re.escape("needs a direction (--direction NAME), or the model a play radius")
-    ):
-        verify(model, stroke(direction=False))
+def test_a_motion_without_direction_and_play_radius_takes_one_percent_of_the_travel_and_names_it() -> None:
+    table = stroke(direction=False)
+    time = 1e-3 * np.arange(len(table))
+    motion = Recording.from_arrays(table.position, table.force, time, units=RAD)
+    result = verify(model_of(curve().source, hysteresis=True), motion)
+    assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
+    assert "radius of 0.01 rad, 1 % of the travel" in result.notes[0]
+
+
+def test_a_table_without_direction_and_time_takes_its_strokes_from_the_order_of_rows() -> None:
+    result = verify(model_of(curve().source, hysteresis=True), stroke(direction=False))
+    assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.99
+    assert result.notes[0] == "direction is taken from the order of rows: 1 turn"
+
+
+def test_a_play_radius_that_is_given_is_used_even_with_a_direction() -> None:
+    model = model_of(curve().source, hysteresis=True, play_radius=0.005)
+    result = verify(model, stroke(), play_radius=0.02)
+    assert "radius of 0.02 rad, as given" in result.notes[0]
+    assert result.rmse != verify(model, stroke()).rmse
+    with pytest.raises(InputError, match="play_radius is -1"):
+        verify(model, stroke(), play_radius=-1)
+
+
+def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
+    """Every 60th row of a fast motion: without the rows between, the play is another one."""
+    time = np.arange(6000) * 1e-3
+    x = 0.5 - 0.45 * np.cos(2 * np.pi * 3.0 * time) * np.cos(2 * np.pi * 0.11 * time)
+    model = model_of(curve().source, hysteresis=True, play_radius=0.05)
+    force = model.force(x, play=model.play(x))
+    _, held = Recording.from_arrays(x, force, time, units=RAD).split(60)
+    assert verify(model, held).worst < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("changed", "sentence"),
+    [
+        ({"force": lambda x, f: f * 1e3}, r"its force x (0.001|0.000999\d?), as if it were in mNm"),
+        ({"force": lambda x, f: f / 7.0}, r"its force x (7|6.99\d?|7.00\d), as if the gain were another"),
+        ({"force": lambda x, f: -f}, "with the sign of its force turned; give --negate force"),
+        (
+            {"force": lambda x, f: f + 5.0},
+            r"its force less (5|4.999|5.001) N\*m, as if the sensor had an offset",
+        ),
+        ({"position": lambda x, f: 180 / np.pi * x}, "its position x 0.01745, as if it were in deg"),
+        ({"position": lambda x, f: x - 0.4}, r"its position plus (0.4|0.3999|0.4001)\d? rad"),
+        ({"position": lambda x, f: -x}, "with the sign of its position turned; give --negate position"),
+    ],
+    ids=["unit", "gain", "force-sign", "offset", "degrees", "zero", "position-sign"],
+)
+def test_a_large_error_names_the_change_under_which_the_recording_fits(
+    changed: dict[str, Any], sentence: str
+) -> None:
+    """The force bends, so that an offset of the position is none of the force."""
+    model = model_of(
+        stroke().source,
+        alpha=[[4.0]],
+        beta=[[0.3]],
+        weight=[2.0],
+        linear=[0.5],
+        fit=Fit("position", "bic", 0.1, 1, 5),
+    )
+    x = np.random.default_rng(1).uniform(0.0, 1.0, 500)
+    force = model.force(x) + np.random.default_rng(2).normal(0.0, NOISE, 500)
+    given = {"position": x, "force": force}
+    role = next(iter(changed))
+    given[role] = changed[role](x, force)
+    verdict = verify(model, Recording.from_arrays(**given, units=RAD)).verdict
+    assert verdict.level == "no"
+    causes = [reason for reason in verdict.reasons if reason.startswith("the recording fits with")]
+    assert len(causes) == 1
+    assert re.search(sentence, causes[0])
+
+
+def test_press_and_release_exchanged_are_named() -> None:
+    recording = stroke()
+    assert recording.direction is not None
+    turned = replace(recording, direction=-recording.direction)
+    verdict = verify(model_of(curve().source, hysteresis=True), turned).verdict
+    assert any("press and release exchanged" in reason for reason in verdict.reasons)
+
+
+def test_a_good_fresh_recording_has_a_good_verdict() -> None:
+    assert str(verify(model_of(stroke().source), curve()).verdict) == "good"
+
+
+def test_seen_rows_and_rows_outside_the_domain_are_reservations() -> None:
+    recording = curve()
+    seen = verify(model_of(recording.source), recording).verdict
+    assert seen.level == "usable"
+    assert "identified on this data" in seen.reasons[0]
+    outside = verify(model_of(stroke().source, lower=[0.0], upper=[0.9]), recording).verdict
+    assert outside.level == "usable"
+    assert "100 of 1000 rows (10%) lie outside the model's domain from 0 to 0.9" in str(outside)
+
+
+def test_an_error_that_neighbouring_rows_share_is_structured() -> None:
+    x = np.linspace(0.0, 1.0, 1000)
+    force = 2 * x + 1 + 0.4 * np.sin(20 * x)
+    verdict = verify(model_of(stroke().source), Recording.from_arrays(x, force, units=RAD)).verdict
+    assert verdict.level == "usable"
+    assert any("neighbouring rows err alike (correlation 1)" in reason for reason in verdict.reasons)
+
+
+def test_noise_alone_is_not_called_structured() -> None:
+    x = np.linspace(0.0, 1.0, 1000)
+    force = 2 * x + 1 + np.random.default_rng(0).normal(0.0, 0.3, 1000)
+    verdict = verify(model_of(stroke().source), Recording.from_arrays(x, force, units=RAD)).verdict
+    assert verdict.level == "usable"
+    assert not any("neighbouring" in reason or "fits with" in reason for reason in verdict.reasons)
 
 
 def test_a_recording_of_rests_only_is_refused() -> None:

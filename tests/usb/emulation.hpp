@@ -46,6 +46,8 @@ inline constexpr const char* options_text =
     "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
     "  --from-zero            counters begin at 0, and not close to where they wrap around\n"
     "  --spring STIFFNESS     a real spring on the handle, N*m/rad [0]\n"
+    "  --friction TORQUE      Coulomb friction of the handle, N*m [0]\n"
+    "  --max-torque-uNm TORQUE  what GET_INFO says [5000000]\n"
     "  --no-hand              nobody holds the handle\n"
     "  --fault KIND@FRAME[xCOUNT]   repeatable; frames are counted from the first OUT packet\n"
     "  --trace FILE.csv       what really happened, one row a frame\n"
@@ -101,6 +103,10 @@ inline constexpr const char* options_text =
             common.first_us = 0;
         } else if (word == "--spring") {
             settings.plant.spring = std::stod(value());
+        } else if (word == "--friction") {
+            settings.plant.friction = std::stod(value());
+        } else if (word == "--max-torque-uNm") {
+            common.max_torque_uNm = std::stoi(value());
         } else if (word == "--no-hand") {
             settings.plant.hand_stiffness = 0.0;
         } else if (word == "--fault") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -9,12 +10,13 @@ namespace emulator {
 /// The mechanics behind the emulated encoder: a handle with a motor, a hand that sweeps it, and, where one is
 /// asked for, a real spring on the same shaft.
 ///
-///     J dv/dt = torque - b v - k x + K_h (target(t) - x) - B_h v
+///     J dv/dt = torque - b v - k x + K_h (target(t) - x) - B_h v - f_c sgn v
 ///
 /// Positive torques accelerate towards growing positions, as on the wire.
 struct Plant {
     double inertia = 2e-4;         ///< J, handle and motor [kg*m^2]
     double damping = 0.06;         ///< b [N*m*s/rad]
+    double friction = 0.0;         ///< f_c, Coulomb [N*m]
     double spring = 0.0;           ///< k, of the real object; 0 = none [N*m/rad]
     double hand_stiffness = 15.0;  ///< K_h; 0 = nobody holds the handle [N*m/rad]
     double hand_damping = 0.05;    ///< B_h [N*m*s/rad]
@@ -36,6 +38,8 @@ struct Plant {
             const double hand =
                 hand_stiffness > 0.0 ? hand_stiffness * (target - position) - hand_damping * velocity : 0.0;
             velocity += step / inertia * (torque + object_torque() + hand - damping * velocity);
+            // Coulomb friction stops the handle, but never turns it round.
+            velocity = std::copysign(std::max(0.0, std::abs(velocity) - step / inertia * friction), velocity);
             position += step * velocity;
             time += step;
         }

@@ -32,6 +32,7 @@ struct LoopSettings {
 
 inline constexpr double lowest_rate_hz = 100.0;
 inline constexpr double highest_rate_hz = 10'000.0;
+inline constexpr double held_rate_share = 0.99;  ///< of the rate; a loop below it is reported
 
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const LoopSettings& settings) {

@@ -69,6 +69,7 @@
 #include "palpate/rendering/trapezoidal.hpp"
 #include "palpate/session.hpp"
 #include "palpate/session_text.hpp"
+#include "palpate/session_verdict.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/one_newton_step.hpp"

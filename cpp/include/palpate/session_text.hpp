@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -118,23 +119,25 @@ namespace palpate {
     }
     const std::string timing = timing_text(report.loop.timing, settings.rate_hz) + "; lost records " +
                                std::to_string(report.lost_records);
-    if (const int error = file.finish(ending, timing); error != 0) {
-        name += ".part";
-        warnings.push_back("the recording keeps its name " + name + ": " +
-                           std::generic_category().message(error));
+    if (std::string reason = file.finish(ending, timing); !reason.empty()) {
+        name = file.file().part();
+        warnings.push_back(std::move(reason));
     }
     return warnings;
 }
 
-/// The last ticks before a fault as a recording of their own, beside the whole one: NAME.fault.csv. Returns what
-/// is to be told of it.
-[[nodiscard]] inline std::string write_last_ticks(const std::string& record, const RecordUnits& units,
-                                                  const Metadata& metadata, const SessionReport& report,
-                                                  const LoopSettings& settings) {
-    const std::size_t stem = record.size() - (record.ends_with(".csv") ? 4 : 0);
-    std::string name = record.substr(0, stem) + ".fault.csv";
+/// Writes the last ticks before a fault as a recording of their own, NAME.fault.csv; without `force` a name that is
+/// taken is followed by NAME.fault-2.csv, NAME.fault-3.csv, ... Returns a sentence about it.
+[[nodiscard]] inline std::string write_last_ticks(const std::string& record, bool force,
+                                                  const RecordUnits& units, const Metadata& metadata,
+                                                  const SessionReport& report, const LoopSettings& settings) {
+    const std::string stem = record.substr(0, record.size() - (record.ends_with(".csv") ? 4 : 0)) + ".fault";
+    std::string name = stem + ".csv";
+    for (int k = 2; !force && std::filesystem::exists(name); ++k) {
+        name = stem + "-" + std::to_string(k) + ".csv";
+    }
     RecordingFile file;
-    if (const std::string reason = file.open(name, units, metadata); !reason.empty()) {
+    if (const std::string reason = file.open(name, units, metadata, force); !reason.empty()) {
         return "the last ticks could not be written: " + reason;
     }
     file.take(report.last_ticks);

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "palpate/controller.hpp"
 #include "palpate/device/simulated.hpp"
+#include "palpate/readable.hpp"
 #include "palpate/rendering/scheme.hpp"
 
 namespace palpate {
@@ -28,12 +31,32 @@ struct Trace {
     std::vector<std::uint8_t> extrapolated;  ///< 1 where y lay outside the model's data
 };
 
-/// A model rendered on a simulated device, hand included, in virtual time: the same controller tick as in
-/// real time, as fast as it goes.
-[[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
-                                    const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
-                                    int substeps = 20, double start_position = 0.0) {
+/// Largest trace that `simulate` makes: one hour at 1 kHz, about 270 MB.
+inline constexpr std::size_t most_simulated_ticks = 3'600'000;
+
+/// Ticks of a simulated time. Throws std::invalid_argument where that is not 1 to `most_simulated_ticks`.
+[[nodiscard]] inline std::size_t simulated_ticks(double duration_s, double period_s) {
+    const double ticks = std::round(duration_s / period_s);
+    detail::require(duration_s > 0.0 && ticks >= 1.0, "duration_s is " + readable(duration_s) +
+                                                          ", must be at least one period, " +
+                                                          readable(period_s) + " s");
+    detail::require(ticks <= static_cast<double>(most_simulated_ticks),
+                    "duration_s is " + readable(duration_s) + ", which is " + readable(ticks) +
+                        " periods of " + readable(period_s) + " s: must be at most " +
+                        std::to_string(most_simulated_ticks) + " periods");
+    return static_cast<std::size_t>(ticks);
+}
+
+/// Renders a model on a simulated device, hand included, in virtual time: the same controller tick as in
+/// real time, as fast as it goes. `each(tick)` is called before every tick; an exception from it ends the work.
+template <class Each>
+[[nodiscard]] Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
+                             const Hand& hand, std::size_t ticks, int substeps, double start_position,
+                             Each&& each) {
     validate(scheme, model, profile.period_s);
+    detail::require(
+        ticks <= most_simulated_ticks,
+        "ticks is " + std::to_string(ticks) + ", must be at most " + std::to_string(most_simulated_ticks));
     return with_structure(model, scheme, profile.period_s, [&](auto structure) {
         SimulatedDevice device{profile, hand, substeps, start_position};
         (void)device.open();
@@ -41,6 +64,7 @@ struct Trace {
         (void)controller.start();
         Trace trace;
         for (std::size_t k = 0; k < ticks; ++k) {
+            each(k);
             const double start = device.handle_position();
             const Tick tick = controller.tick();
             trace.time.push_back(static_cast<double>(k) * profile.period_s);
@@ -59,9 +83,18 @@ struct Trace {
     });
 }
 
-/// A recorded motion moves the device: what force would have been rendered?
-[[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
-                                                         std::span<const double> position, double period_s) {
+[[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
+                                    const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
+                                    int substeps = 20, double start_position = 0.0) {
+    return simulate(model, scheme, profile, hand, ticks, substeps, start_position, [](std::size_t) {});
+}
+
+/// A recorded motion moves the device: what force would have been rendered? `each(k)` is called before every sample;
+/// an exception from it ends the work.
+template <class Each>
+[[nodiscard]] std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
+                                                  std::span<const double> position, double period_s,
+                                                  Each&& each) {
     validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, [&](auto&& structure) {
         std::vector<Rendered> rendered;
@@ -70,22 +103,30 @@ struct Trace {
             structure.reset(position.front());
         }
         for (const double x : position) {
+            each(rendered.size());
             rendered.push_back(structure.step(x));
         }
         return rendered;
     });
 }
 
-/// A recorded force drives the environment (paper figures 12 and 14): what motion results?
-[[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
-                                                        std::span<const double> force, double period_s,
-                                                        double start_position) {
+[[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
+                                                         std::span<const double> position, double period_s) {
+    return motion_driven(model, scheme, position, period_s, [](std::size_t) {});
+}
+
+/// A recorded force drives the environment (paper figures 12 and 14): what motion results? `each` as above.
+template <class Each>
+[[nodiscard]] std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
+                                                 std::span<const double> force, double period_s,
+                                                 double start_position, Each&& each) {
     return with_structure(model, scheme, period_s, [&](auto&& structure) -> std::vector<Rendered> {
         if constexpr (requires { structure.drive(0.0); }) {
             std::vector<Rendered> rendered;
             rendered.reserve(force.size());
             structure.reset(start_position);
             for (const double f : force) {
+                each(rendered.size());
                 rendered.push_back(structure.drive(f));
             }
             return rendered;
@@ -95,6 +136,12 @@ struct Trace {
                 ", must be implicit or explicit: only an inertia turns force into motion");
         }
     });
+}
+
+[[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
+                                                        std::span<const double> force, double period_s,
+                                                        double start_position) {
+    return force_driven(model, scheme, force, period_s, start_position, [](std::size_t) {});
 }
 
 }  // namespace palpate

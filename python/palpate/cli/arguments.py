@@ -14,7 +14,6 @@ import click
 from .output import talk
 
 if TYPE_CHECKING:
-    from ..model import Model
     from ..recording import Recording
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -67,12 +66,6 @@ class ReadingOptions:
         for note in others:
             talk(f"  {note}")
         return recording
-
-
-def columns_of(model: Model) -> list[str]:
-    """The columns of a file that a model's inputs beside the position were read from."""
-    known = model.data.columns
-    return [known.get(name, name) for name in model.inputs[1:] if name != "velocity" or name in known]
 
 
 def reading_options(command: F) -> F:

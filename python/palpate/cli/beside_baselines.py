@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .output import number, print_table, talk
+from .printing import print_line
 
 if TYPE_CHECKING:
     from ..baselines import Compared
@@ -45,11 +46,11 @@ def print_beside(nrmse: float, n_parameters: int, seconds: float, others: Sequen
         else (each.name, number(each.nrmse), str(each.n_parameters), f"{each.seconds:.2f}")
         for each in others
     ]
-    click.echo()
+    print_line()
     print_table(("on the same held-out rows", "nrmse", "parameters", "seconds"), rows)
     for each in others:
         if each.refused:
-            click.echo(f"{each.name} is refused: {each.refused}")
+            print_line(f"{each.name} is refused: {each.refused}")
 
 
 def as_records(others: Sequence[Compared]) -> list[dict[str, Any]]:

@@ -54,22 +54,41 @@ def _results(folder: Path, name: str) -> tuple[Any, str] | None:
 
 
 def _problems(rows: Sequence[Row]) -> str:
-    """One row for each problem and method."""
+    """One row for each problem and method: medians, and the range over the draws in parentheses."""
     return markdown_table(
-        ("problem, method", "NRMSE", "parameters", "fit [s]", "tuning [s]", "time over ours"),
+        (
+            "problem, method",
+            "NRMSE",
+            "wavelets",
+            "parameters",
+            "fit [s]",
+            "tuning [s]",
+            "time over ours",
+            "draws",
+        ),
         [
             (
                 f"{row['problem']}, {row['method']}",
-                f"{row['nrmse']:.2e}",
-                str(row["n_parameters"]),
+                _with_range(row, "nrmse", ".2e"),
+                _with_range(row, "n_wavelets", "d"),
+                _with_range(row, "n_parameters", "d"),
                 number(row["fit_s"]),
                 number(row["tuning_s"]),
                 f"{row['over_ours']:.3g}",
+                str(row["draws"]),
             )
             for row in rows
             if "nrmse" in row
         ],
     )
+
+
+def _with_range(row: Row, key: str, form: str) -> str:
+    """Median and range of a value; empty for a method that has none."""
+    if row[key] is None:
+        return ""
+    low, high = row[f"{key}_range"]
+    return f"{row[key]:{form}} ({low:{form}} to {high:{form}})"
 
 
 def _measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
@@ -244,7 +263,8 @@ def chart_identification(folder: Path, to: Path) -> None:
     _draw_reached(figures / "identification-parameters.png", rows, "parameters", "parameters")
     _draw_reached(figures / "identification-time.png", rows, "fit and tuning [s]", "seconds")
     draws = max(row["draws"] for row in rows if "nrmse" in row)
-    tables = {"identification": f"{_problems(rows)}\n{where}; noise draws: {draws}\n"}
+    drawn = f"median (least to largest) of up to {draws} draws"
+    tables = {"identification": f"{_problems(rows)}\n{where}; {drawn}\n"}
     for name, table in _TABLES.items():
         if (results := found[name]) is not None:
             tables[name] = f"{table(results[0])}\n{results[1]}\n"

@@ -12,11 +12,11 @@ import click
 
 from .._core import __version__
 from ..errors import InputError
+from ..verdict import Verdict, no
 from .arguments import PATH
 from .device_options import device_options
-from .ending import FAILED
 from .live_line import live_line
-from .output import number, print_json, print_numbers, require_writable, talk
+from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
 from .verb import Verb
 
 _MARKS = {True: "ok", False: "WRONG", None: "-"}
@@ -41,11 +41,15 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
     metavar="OUT.toml",
     help="Write the device as it was measured; needs --push.",
 )
+@click.option(
+    "--coulomb-friction",
+    type=float,
+    metavar="F",
+    help="Friction of the device in N or N*m, if the pushes cannot show it; at most the true one.",
+)
 @click.option("--yes", is_flag=True, help="Push without asking.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@click.pass_context
 def check_device(
-    ctx: click.Context,
     device: str,
     object_file: Path | None,
     wait_ms: float | None,
@@ -56,6 +60,7 @@ def check_device(
     profile: Path | None,
     model_file: Path | None,
     write_profile: Path | None,
+    coulomb_friction: float | None,
     yes: bool,
     as_json: bool,
 ) -> None:
@@ -72,7 +77,7 @@ def check_device(
 
     if write_profile is not None:
         if not push:
-            raise InputError("--write-profile needs --push: inertia and damping show only in motion")
+            raise InputError("--write-profile needs --push: the mechanics show only in motion")
         require_writable(write_profile)
     mounted = None if object_file is None else load_model(object_file)
     expected = None if profile is None else DeviceProfile.load(profile)
@@ -92,15 +97,24 @@ def check_device(
             push=push,
             profile=expected,
             model=certified,
+            coulomb_friction=coulomb_friction,
             wait_s=None if wait_ms is None else 1e-3 * wait_ms,
             progress=line.show,
         )
+    verdict = found.verdict
+    written: Path | None = None
+    if write_profile is not None:
+        try:
+            written = found.profile().save(write_profile, notes=found.profile_notes())
+        except InputError as error:
+            verdict += Verdict((no(f"{write_profile} is not written: {error}"),))
     if as_json:
         print_json(
             {
                 "device": found.device,
                 "suitable": found.suitable,
-                "verdict": found.verdict,
+                "verdict": str(verdict),
+                "written": None if written is None else str(written),
                 "findings": [
                     {"name": finding.name, "told": finding.told, "right": finding.right}
                     for finding in found.findings
@@ -109,6 +123,7 @@ def check_device(
             }
         )
     else:
+        print_verdict(verdict)
         print_numbers(
             {
                 "palpate": f"{__version__}, Python {platform.python_version()}, {platform.platform()}, "
@@ -121,11 +136,6 @@ def check_device(
                 },
             }
         )
-        click.echo(found.verdict)
-    if write_profile is not None and not found.may_push:
-        talk(f"{write_profile} is not written: this device must not make force")
-    elif write_profile is not None:
-        found.profile().save(write_profile)
-        talk(f"wrote {write_profile}; its friction is 0, the safe side: fill in what you know")
-    if not found.suitable:
-        ctx.exit(FAILED)
+    if written is not None:
+        talk(f"wrote {written}")
+    end_with(verdict)

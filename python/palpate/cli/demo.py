@@ -10,8 +10,19 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import InputError
-from .arguments import PATH
-from .output import finishing, number, print_numbers, print_table, require_writable, talk
+from .arguments import PATH, json_option
+from .ending import interrupted_at_once
+from .output import (
+    end_with,
+    finishing,
+    number,
+    print_json,
+    print_numbers,
+    print_table,
+    print_verdict,
+    require_writable,
+    talk,
+)
 from .pictures import (
     close_loops,
     picture_closed_loops,
@@ -19,6 +30,7 @@ from .pictures import (
     picture_verification,
     print_closed_loops,
 )
+from .printing import print_line
 from .verb import Verb
 
 if TYPE_CHECKING:
@@ -33,7 +45,9 @@ RENDERED_S = 4.0
 
 @click.command(cls=Verb, epilog="Example: palpate demo -o demo")
 @click.option("-o", "--output", type=PATH, metavar="FOLDER", default=Path("demo"), help="Where the files go.")
-def demo(output: Path) -> None:
+@json_option
+@interrupted_at_once()
+def demo(output: Path, as_json: bool) -> None:
     """Identify, verify and render a sample, without any input or device.
 
     Everything is simulated, and nothing was measured: two recordings of a knob with a soft spring and a hard
@@ -41,8 +55,10 @@ def demo(output: Path) -> None:
     simulated device with each structure.
     """
     from ..identification import identify
-    from ..planning import bench_for, compare_structures
+    from ..identification.judgement import error_findings
+    from ..planning import bench_for, compare_structures, describe
     from ..recording.sample import sample_recording
+    from ..verdict import Verdict
     from ..verification import verify
 
     _require_folder(output)
@@ -58,6 +74,7 @@ def demo(output: Path) -> None:
     talk("rendering on a simulated device with each structure ...")
     structures = compare_structures(model, bench_for(model), RENDERED_S)
 
+    verdict = model.verdict + Verdict(tuple(error_findings(verification.nrmse, "the fresh recording")))
     files = {
         "sample-1.csv": "simulated recording that the model was identified from",
         "sample-2.csv": "simulated recording that it was verified on",
@@ -73,7 +90,39 @@ def demo(output: Path) -> None:
         model.save(output / "model.json")
         picture_verification(output / "force-over-position.png", model, [(fresh, verification)])
         picture_closed_loops(output / "closed-loop.png", fresh, loops)
-        picture_structures(output / "structures.png", structures, fresh.units["force"])
+        picture_structures(
+            output / "structures.png",
+            structures,
+            fresh.units["force"],
+            of=f"model of simulated data, rendered for {number(RENDERED_S)} s",
+        )
+        if as_json:
+            print_json(
+                {
+                    "verdict": str(verdict),
+                    "n_wavelets": model.n_wavelets,
+                    "n_parameters": model.n_parameters,
+                    "nrmse": verification.nrmse,
+                    "rmse": verification.rmse,
+                    "seconds": seconds,
+                    "closed_loops": [
+                        {"view": loop.view, "scheme": describe(loop.scheme), "nrmse": loop.nrmse}
+                        for loop in loops
+                    ],
+                    "structures": [
+                        {
+                            "scheme": row.name,
+                            "force_error_end": None if row.error is None else row.error.end,
+                            "force_error_instant": None if row.error is None else row.error.instant,
+                        }
+                        for row in structures
+                    ],
+                    "files": [str(output / name) for name in files],
+                }
+            )
+            end_with(verdict)
+            return
+        print_verdict(verdict)
         print_numbers(
             {
                 "wavelets": str(model.n_wavelets),
@@ -83,13 +132,14 @@ def demo(output: Path) -> None:
                 "identified in": f"{seconds:.2f} s",
             }
         )
-        click.echo()
+        print_line()
         print_closed_loops(loops)
-        click.echo()
+        print_line()
         _print_structures(structures, fresh.units["force"])
-        click.echo()
+        print_line()
         for name, meaning in files.items():
-            click.echo(f"{output / name}: {meaning}")
+            print_line(f"{output / name}: {meaning}")
+        end_with(verdict)
 
 
 def _require_folder(folder: Path) -> None:
@@ -104,7 +154,7 @@ def _require_folder(folder: Path) -> None:
 
 def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
     """Force error of each structure, or why it was refused."""
-    click.echo(f"force error of each structure, RMS in {unit}")
+    print_line(f"force error of each structure, RMS in {unit}")
     print_table(
         ("structure", "end of tick", "sampled"),
         [
@@ -116,4 +166,4 @@ def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
     )
     for row in rows:
         if row.refused is not None:
-            click.echo(f"{row.name} is refused: {row.refused}")
+            print_line(f"{row.name} is refused: {row.refused}")

@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 import click
 
-from ..devices import DeviceError, find_devices, install_rule, open_usb
+from ..devices import DeviceError, Found, find_devices, install_rule, open_usb
 from ..devices.wire import LONGEST_WATCHDOG_MS, SHORTEST_WATCHDOG_MS
 from ..errors import InputError
+from ..verdict import GOOD, Verdict, no, usable
 from .arguments import json_option
 from .ending import WorkError
-from .output import number, print_json, talk
+from .output import end_with, number, print_json, print_verdict, talk
+from .printing import print_line
 from .verb import Verb
 
 
@@ -43,37 +46,55 @@ def devices(
 ) -> None:
     """List haptic devices: what they say of themselves, or why they cannot be used; or set one up.
 
-    Nothing moves by that, and no force is enabled: what renders does so itself.
+    Nothing moves by that, and no force is enabled: what renders does so itself. Exit code 1: devices are
+    plugged in, and none of them can be used.
     """
     try:
         if install_udev_rule:
             install_rule(talk)
+            if as_json:
+                print_json({"verdict": str(GOOD)})
+            else:
+                print_verdict(GOOD)
             return
         if disable or clear or zero or watchdog_ms is not None:
             _set_up(device, disable=disable, clear=clear, zero=zero, watchdog_ms=watchdog_ms)
         found = find_devices()
     except DeviceError as error:
         raise WorkError(str(error)) from None
+    verdict = _verdict(found)
     if as_json:
-        print_json({"devices": [asdict(one) for one in found]})
+        print_json({"verdict": str(verdict), "devices": [asdict(one) for one in found]})
+        end_with(verdict)
         return
+    print_verdict(verdict)
     for one in found:
         name = " ".join(part for part in (one.product, one.serial) if part) or "without a name"
-        click.echo(f"{name} ({one.place})")
+        print_line(f"{name} ({one.place})")
         if one.info is None:
-            click.echo(f"  {one.problem}")
+            print_line(f"  {one.problem}")
             continue
         info = one.info
-        click.echo(
-            f"  --device usb:{one.serial}\n"
+        print_line(f"  --device usb:{one.serial}")
+        print_line(
             f"  encoder {info.counts_per_rev} counts a turn ({number(info.encoder_step)} rad), "
-            f"torque up to {number(info.max_torque)} N*m, {info.rate_hz} Hz, watchdog {info.watchdog_ms} ms\n"
+            f"torque up to {number(info.max_torque)} N*m, {info.rate_hz} Hz, watchdog {info.watchdog_ms} ms"
+        )
+        print_line(
             f"  force transducer: {'yes' if info.transducer else 'no'}; "
             f"velocity: {'measured' if info.measures_velocity else 'not measured'}; "
             f"firmware {info.firmware >> 8}.{info.firmware & 0xFF}, uid {info.uid:016x}"
         )
+    end_with(verdict)
+
+
+def _verdict(found: Sequence[Found]) -> Verdict:
+    """Good if every device can be used, no if none of those that are plugged in can."""
+    problems = [f"{one.serial or one.place}: {one.problem}" for one in found if one.info is None]
     if not found:
-        click.echo("no haptic USB device is plugged in; --device simulated needs none")
+        return Verdict((usable("no haptic USB device is plugged in; --device simulated needs none"),))
+    judge = no if len(problems) == len(found) else usable
+    return Verdict(tuple(judge(problem) for problem in problems))
 
 
 def _set_up(device: str, *, disable: bool, clear: bool, zero: bool, watchdog_ms: int | None) -> None:

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
-import sys
+import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,12 +15,18 @@ from dataclasses import dataclass
 
 import click
 
+from .printing import OutputError, echo, end_line_on_terminal, print_line
+
 FAILED = 1
 """The work failed, or the verdict is no."""
 BAD_INPUT = 2
 """Bad usage or bad input."""
 INTERRUPTED = 130
 """Ctrl-C; the output does not exist."""
+
+
+_GRACE_S = 0.05
+"""Seconds that Python gets to raise KeyboardInterrupt by itself."""
 
 
 class WorkError(Exception):
@@ -35,17 +42,18 @@ class Ending:
     help: str = ""
 
     def tell(self, *, as_json: bool) -> None:
-        """To a machine as one object on standard output, to a person as one line on standard error.
+        """Print the sentence: as one object on standard output with --json, else on standard error.
 
-        Where nobody can be told, the exit code has to do.
+        A stream that cannot be written leaves the exit code alone.
         """
-        with suppress(OSError):
-            if as_json and self.sentence:
-                click.echo(json.dumps({"error": self.sentence}, ensure_ascii=False))
+        if as_json and self.sentence:
+            with suppress(OutputError, BrokenPipeError):
+                echo(json.dumps({"error": self.sentence}))
                 return
-        with suppress(OSError):
-            if self.help or self.sentence:
-                click.echo(self.help or f"error: {self.sentence}", err=True)
+        if self.help:
+            echo(self.help, err=True)
+        elif self.sentence:
+            print_line(f"error: {self.sentence}", err=True)
 
 
 @contextmanager
@@ -58,12 +66,45 @@ def terminated_as_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def drop_what_cannot_be_written() -> None:
-    """Leave the interpreter nothing to flush at exit: a full disk or a closed pipe was told before."""
+@contextmanager
+def interrupted_at_once() -> Iterator[None]:
+    """End the process soon after Ctrl-C, also while a library computes.
+
+    Python raises KeyboardInterrupt between two of its own instructions, but one matrix or one file can take
+    seconds. If it was not raised soon, a thread ends the process. Results must be written inside `finishing`,
+    where Ctrl-C is ignored.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    context = click.get_current_context(silent=True)
+    as_json = context is not None and bool(context.params.get("as_json"))
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    over = threading.Event()
+
+    def watch() -> None:
+        while (number := os.read(reader, 1)) != b"\0":
+            if number[0] == signal.SIGINT and not over.wait(_GRACE_S):
+                for worker in multiprocessing.active_children():
+                    worker.terminate()
+                end_line_on_terminal()
+                ending = ending_of(KeyboardInterrupt())
+                ending.tell(as_json=as_json)
+                os._exit(ending.code)
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        yield
+    finally:
+        over.set()
+        signal.set_wakeup_fd(before)
+        os.write(writer, b"\0")
+        watching.join()
+        os.close(reader)
+        os.close(writer)
 
 
 def ending_of(error: BaseException) -> Ending:
@@ -80,7 +121,7 @@ def ending_of(error: BaseException) -> Ending:
         return Ending(FAILED)
     if isinstance(error, ValueError):
         return Ending(BAD_INPUT, _one_line(str(error)))
-    if isinstance(error, WorkError):
+    if isinstance(error, (WorkError, OutputError)):
         return Ending(FAILED, _one_line(str(error)))
     if isinstance(error, MemoryError):
         return Ending(FAILED, "there is not enough memory for this recording")

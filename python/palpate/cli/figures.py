@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..recording.files import replacing
+from .printing import visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +20,9 @@ _COLUMN_INCHES = 3.5
 """Width of one column of a journal page."""
 
 _DOTS_PER_INCH = 200
+
+_TITLE_COLUMNS = 60
+"""Characters of a title that fit the width of a figure."""
 
 _STYLE: Any = {
     "font.size": 8.0,
@@ -39,11 +44,12 @@ def require_figure_name(path: Path) -> None:
 
 @contextmanager
 def figure_file(
-    path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1
+    path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1, title: str = ""
 ) -> Iterator[list[Axes]]:
     """Give axes one below the other, of the given shares of the height; the file is complete or not there.
 
-    Several axes share their position axis; in several columns, row by row, each has its own.
+    Several axes share their position axis; in several columns, row by row, each has its own. The title stands
+    above them, wrapped to the width of the figure.
     """
     import matplotlib
 
@@ -55,6 +61,11 @@ def figure_file(
         axes = figure.subplots(
             len(rows), columns, squeeze=False, sharex=columns == 1, gridspec_kw={"height_ratios": rows}
         ).ravel()
+        if title:
+            lines = [
+                part for line in title.split("\n") for part in textwrap.wrap(visible(line), _TITLE_COLUMNS)
+            ]
+            figure.suptitle("\n".join(lines).replace("$", r"\$"), fontsize=_STYLE["axes.titlesize"])
         yield list(axes)
         if columns == 1:
             for each in axes:

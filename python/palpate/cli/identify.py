@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +14,23 @@ import numpy as np
 
 from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
 from .beside_baselines import as_records, baselines_option, fit_baselines, print_beside
+from .ending import interrupted_at_once
 from .figures import require_figure_name
 from .identify_options import identify_options
 from .large_files import LargeFiles, large_file_options
-from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
+from .output import (
+    end_with,
+    finishing,
+    number,
+    print_json,
+    print_numbers,
+    print_verdict,
+    require_distinct,
+    require_writable,
+    talk,
+)
 from .pictures import picture_verification
+from .progress import progress
 from .verb import Verb
 
 if TYPE_CHECKING:
@@ -47,6 +60,7 @@ if TYPE_CHECKING:
 @json_option
 @reading_options
 @identify_options
+@interrupted_at_once()
 def identify(
     recording_files: tuple[Path, ...],
     output: Path,
@@ -60,13 +74,18 @@ def identify(
 ) -> None:
     """Identify a model of force over position from recordings.
 
-    A recording is CSV or Parquet with a header of names that end in a unit, such as position_rad and
-    torque_Nm. Columns are chosen by name and unit; the first line printed says which. The model is as simple
-    as the data allows: a constant, a line, a wavelet network, and hysteresis where press and release differ.
+    A recording is CSV, Parquet, Excel, NumPy (.npz), MATLAB (.mat) or MCAP. The name of a column states its
+    unit: position_rad, "Force [gf]", "Force (mN)", "Force / N". Columns are chosen by name and unit; the
+    first line printed says which. The model is as simple as the data allows: a constant, a line, a wavelet
+    network, and hysteresis where press and release differ.
     """
     from ..identification import identify as identify_model
+    from ..identification.judgement import error_findings
     from ..identification.options import RESERVED_INPUTS
+    from ..identification.progress import reporting_to
+    from ..verdict import Verdict
     from ..verification import verify
+    from ..verification.judgement import circumstances
 
     if plot is not None:
         require_figure_name(plot)
@@ -86,15 +105,21 @@ def identify(
         recordings, judged_on = [train for train, _ in parts], [test for _, test in parts]
     talk("identifying ...")
     start = time.perf_counter()
-    if large.wanted:
-        model = large.identify(recording_files, reading, options)
-    else:
-        model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
+    with progress("identifying") as shown, reporting_to(lambda name, n: shown(f"{name}, {n} wavelets")):
+        if large.wanted:
+            model = large.identify(recording_files, reading, options)
+        else:
+            model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
     for note in model.notes.get("identification", ()):
         talk(f"  {note}")
     nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
+    verdict = model.verdict
+    if hold_out_every is not None:
+        held_out = sum(verification.n for _, verification in verified)
+        verdict += Verdict(tuple(error_findings(nrmse, f"{held_out} held-out rows")))
+        verdict += Verdict(tuple(chain.from_iterable(circumstances(model, *each) for each in verified)))
     result = {
         "model": str(output),
         "n_wavelets": model.n_wavelets,
@@ -102,12 +127,17 @@ def identify(
         "rung": model.fit.rung,
         "stop_reason": model.stop_reason,
         "nrmse": nrmse,
+        "verdict": str(verdict),
         "seconds": seconds,
     }
+    if hold_out_every is not None:
+        result["held_out_rows"] = sum(verification.n for _, verification in verified)
     if beside:
         result["baselines"] = as_records(others)
     rows = sum(len(recording) for recording in judged_on)
-    judged = "the rows it was identified on" if hold_out_every is None else f"{rows} rows held out"
+    compared = sum(verification.n for _, verification in verified)
+    of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
+    judged = "the rows it was identified on" if hold_out_every is None else f"{of_rows} rows held out"
     if hold_out_every is None and options["loss"] == "huber":
         judged += ", those far from the others weighed down"
     with finishing():
@@ -116,7 +146,9 @@ def identify(
         model.save(output)
         if as_json:
             print_json(result)
+            end_with(verdict)
             return
+        print_verdict(verdict)
         print_numbers(
             {
                 "model": str(output),
@@ -129,6 +161,7 @@ def identify(
         )
         if beside:
             print_beside(nrmse, model.n_parameters, seconds, others)
+        end_with(verdict)
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:

@@ -45,6 +45,9 @@ HELP = {
     "period": "Period of a periodic environment, in its position unit.",
 }
 
+_METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE"}
+"""What the numbers of an option are."""
+
 
 def _numbers(ctx: click.Context, param: click.Parameter, value: str) -> tuple[float, ...]:
     """Numbers joined by commas."""
@@ -81,6 +84,7 @@ def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
         text["default"] = ",".join(f"{number:g}" for number in default)
         return click.option(flag, name, metavar="NUMBERS", callback=_numbers, **text)
     if len(kinds) == 1 and get_args(kinds[0]):
-        return click.option(flag, name, type=float, nargs=len(get_args(kinds[0])), **text)
+        text |= {"nargs": len(get_args(kinds[0])), "metavar": _METAVAR.get(name)}
+        return click.option(flag, name, type=float, **text)
     kind = click.Choice(WORDS[name]) if name in WORDS else kinds[0]
     return click.option(flag, name, type=kind, **text)

@@ -15,6 +15,7 @@ import click
 
 from .arguments import ReadingOptions
 from .output import talk
+from .printing import echo
 
 if TYPE_CHECKING:
     from ..model import Model
@@ -24,7 +25,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _EVERY_S = 10.0
 """Seconds between two lines of progress where standard error is a file."""
 
-_READS = ("position", "force", "direction", "units", "negate", "invalid")
+_READS = ("position", "force", "time", "direction", "units", "negate", "invalid")
 """Reading options that make sense without all rows at once."""
 
 
@@ -107,14 +108,14 @@ class _Progress:
         now = time.monotonic()
         line = f"read {done} of {total} parts ({100 * done / total:.0f} %) in {now - self._start:.0f} s"
         if self._screen:
-            click.echo(f"\r{line}", err=True, nl=False)
+            echo(f"\r{line}", err=True, nl=False)
         elif done == total or now - self._told >= _EVERY_S:
             self._told = now
             talk(line)
 
     def end(self) -> None:
         if self._screen:
-            click.echo(err=True)
+            echo("", err=True)
 
 
 def _chosen(model: Model) -> str:

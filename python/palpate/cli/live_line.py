@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One line that is alive while a recording grows, on a terminal only."""
+"""One line that shows rows, position and force while a recording grows, on a terminal only."""
 
 from __future__ import annotations
 
 import math
-import shutil
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-import click
 
 from ..devices import DeviceError
 from ..errors import InputError
 from .ending import terminated_as_interrupted
 from .output import number
+from .progress import OverwrittenLine
 
 
 @contextmanager
@@ -47,23 +44,19 @@ class LiveLine:
     def __init__(self, rate_hz: float, units: tuple[str, str]) -> None:
         self._rate_hz = rate_hz
         self._units = units
-        self._terminal = sys.stderr.isatty()
+        self._line = OverwrittenLine()
         self._lower, self._upper = math.inf, -math.inf
 
     def show(self, rows: int, position: float, force: float, lost: int) -> None:
         """Take what is true now."""
         self._lower, self._upper = min(self._lower, position), max(self._upper, position)
-        if self._terminal:
-            text = (
-                f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "
-                f"position {number(position)} {self._units[0]} "
-                f"(so far {number(self._lower)} to {number(self._upper)})  "
-                f"force {number(force)} {self._units[1]}"
-            )
-            width = shutil.get_terminal_size().columns - 1
-            click.echo(f"\r{text:<{width}.{width}}", nl=False, err=True)
+        self._line.show(
+            f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "
+            f"position {number(position)} {self._units[0]} "
+            f"(so far {number(self._lower)} to {number(self._upper)})  "
+            f"force {number(force)} {self._units[1]}"
+        )
 
     def end(self) -> None:
-        """Leave the line."""
-        if self._terminal:
-            click.echo(err=True)
+        """Leave the line as it is."""
+        self._line.end()

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 
 import click
 
-from .ending import drop_what_cannot_be_written, ending_of
+from .ending import INTERRUPTED, ending_of
+from .printing import drop_what_cannot_be_written, prepare_streams, print_line
 from .verb import Verbs
 
 _VERBS = {
@@ -51,7 +53,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
     if wanted:
         from .._core import __version__
 
-        click.echo(f"palpate {__version__}")
+        print_line(f"palpate {__version__}")
         ctx.exit()
 
 
@@ -80,7 +82,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0 done; 1 the work failed; 2 bad usage or bad input; 130 Ctrl-C, and the output does not exist. A failure
     is one sentence on standard error, or with --json {"error": "..."} on standard output.
     """
+    prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
+    code = 0
     try:
         with palpate.make_context("palpate", given) as context:
             palpate.invoke(context)
@@ -88,6 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BaseException as error:
         ending = ending_of(error)
         ending.tell(as_json="--json" in given)
-        drop_what_cannot_be_written()
-        return ending.code
-    return 0
+        code = ending.code
+    drop_what_cannot_be_written()
+    if code == INTERRUPTED and arguments is None:
+        os._exit(code)  # taking down the libraries takes longer than a person waits
+    return code

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a verb says and writes: numbers on standard output, talk on standard error, files checked first."""
+"""Prints results on standard output and talk on standard error, and checks output files before the work."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import json
 import math
 import signal
 import tempfile
-import textwrap
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,16 +16,19 @@ from typing import Any
 import click
 
 from ..errors import InputError
+from ..verdict import Verdict
+from .ending import FAILED
+from .printing import WIDEST, echo, print_line, print_value, terminal_width, visible
 
 
 def talk(sentence: str) -> None:
-    """Tell a person, on standard error."""
-    click.echo(sentence, err=True)
+    """Print a sentence for a person, on standard error."""
+    print_line(sentence, err=True)
 
 
 def print_json(result: Mapping[str, Any]) -> None:
-    """One object on standard output; a number that is not finite becomes null, which JSON can say."""
-    click.echo(json.dumps(_finite(result), ensure_ascii=False, allow_nan=False))
+    """Print one object on standard output, in ASCII; a number that is not finite becomes null."""
+    echo(json.dumps(_finite(result), allow_nan=False))
 
 
 def _finite(value: Any) -> Any:
@@ -45,27 +47,54 @@ def number(value: float) -> str:
 
 
 def print_numbers(rows: Mapping[str, str]) -> None:
-    """One line for each number: its name, aligned, and its value."""
+    """Print one line for each number: its name, aligned, and its value."""
     width = max(map(len, rows))
     for name, value in rows.items():
-        click.echo(f"{name:<{width}}  {value}")
+        print_value(name, value, width)
+
+
+def print_verdict(verdict: Verdict) -> None:
+    """Print the verdict on standard output, before any number: its level, then a line for each reason."""
+    print_line(f"verdict: {verdict.level}")
+    for reason in verdict.reasons:
+        print_paragraph(reason, indent="  ")
+
+
+def end_with(verdict: Verdict) -> None:
+    """End the verb with the exit code of its verdict.
+
+    Raises
+    ------
+    click.exceptions.Exit
+        The verdict is no: exit code 1.
+    """
+    if verdict.level == "no":
+        raise click.exceptions.Exit(FAILED)
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table whose first column is text and whose others are numbers, aligned right."""
-    lines = [list(header), *map(list, rows)]
+    """Print a table whose first column is text and whose others are numbers, aligned right.
+
+    On a terminal that is too narrow the numbers stand on a line of their own, below the text.
+    """
+    lines = [[visible(cell) for cell in line] for line in (header, *rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(header))]
+    terminal = terminal_width()
+    apart = terminal is not None and sum(widths) + 2 * (len(widths) - 1) > terminal
+    if terminal is not None and sum(widths[1:]) + 2 * len(widths) > terminal:
+        widths = [0] * len(widths)
     for line in lines:
-        cells = [
-            line[0].ljust(widths[0]),
-            *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)),
-        ]
-        click.echo("  ".join(cells).rstrip())
+        numbers = "  ".join(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True))
+        if apart:
+            print_line(line[0])
+            print_line(f"  {numbers}".rstrip())
+        else:
+            print_line(f"{line[0]:<{widths[0]}}  {numbers}".rstrip())
 
 
 def print_paragraph(text: str, *, indent: str = "") -> None:
-    """Text broken to 80 columns; what follows its first line stands two columns further in."""
-    click.echo(textwrap.fill(text, 80, initial_indent=indent, subsequent_indent=indent + "  "))
+    """Print text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
+    print_line(indent + text, elsewhere=WIDEST)
 
 
 def require_writable(target: Path, *, inputs: Sequence[Path] = ()) -> None:

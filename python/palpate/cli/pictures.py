@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 _LIGHTER = 0.01
 """Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
 
+
+_MOST_NAMES = 2
+"""Source files that a title names."""
 
 _DRIVEN = {
     "motion-driven": "recorded motion drives the device",
@@ -64,6 +67,21 @@ def _is_simulated(recording: Recording) -> bool:
     return "simulated" in recording.metadata
 
 
+def source_name(files: Iterable[str]) -> str:
+    """The names of source files without their folders, for the title of a figure."""
+    names = [Path(file).name for file in files]
+    if len(names) > _MOST_NAMES:
+        return f"{names[0]} and {len(names) - 1} more"
+    return " and ".join(names) or "arrays"
+
+
+def _error_text(reference: NDArray[np.float64], other: NDArray[np.float64]) -> str:
+    """The NRMSE of the forces that a figure compares."""
+    spread = float(np.std(reference))
+    error = float(np.sqrt(np.mean((other - reference) ** 2)))
+    return f"NRMSE {number(error / spread) if spread else 'not defined'} on {len(reference)} rows"
+
+
 def picture_verification(
     path: Path,
     model: Model,
@@ -92,7 +110,9 @@ def picture_verification(
     )
     modelled = np.concatenate([verification.force for _, verification in verified])
     simulated = any(_is_simulated(recording) for recording, _ in verified)
-    with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
+    files = source_name(file for each, _ in verified for file in each.source.files)
+    title = f"{files}\n{_error_text(recording.force, modelled)}"
+    with figure_file(path, height_inches=4.0, rows=(2.5, 1.0), title=title) as (force, residual):
         draw_measured_and_modelled(
             force,
             residual,
@@ -127,7 +147,11 @@ def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
 
     modelled = force_at(plan, rendered.position, rendered.sample_period)
     one_curve = not (plan.model.hysteretic or plan.model.of_velocity)
-    with figure_file(path, height_inches=3.6, rows=(2.5, 1.0)) as (force, residual):
+    title = (
+        f"model of {source_name(plan.model.data.files)}, rendered: {plan.structure}\n"
+        f"{_error_text(modelled, rendered.force)}"
+    )
+    with figure_file(path, height_inches=4.0, rows=(2.5, 1.0), title=title) as (force, residual):
         draw_measured_and_modelled(force, residual, rendered, modelled, one_curve=one_curve, seen="rendered")
 
 
@@ -136,24 +160,31 @@ def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[Close
     from ..planning import describe
     from ..plotting import draw_real_against_rendered
 
-    with figure_file(path, height_inches=0.3 + 2.2 * len(loops), rows=(1.0,) * len(loops)) as axes:
+    height, rows = 0.5 + 2.2 * len(loops), (1.0,) * len(loops)
+    with figure_file(
+        path, height_inches=height, rows=rows, title=source_name(recording.source.files)
+    ) as axes:
         for each, loop in zip(axes, loops, strict=True):
             draw_real_against_rendered(
                 each,
                 (loop.recorded_position, loop.recorded_force),
                 (loop.rendered_position, loop.rendered_force),
                 loop.units,
-                title=f"{_DRIVEN[loop.view]}\n{describe(loop.scheme)}",
+                title=f"{_DRIVEN[loop.view]}\n{describe(loop.scheme)}: NRMSE {number(loop.nrmse)}",
                 real_name="recorded (simulated)" if _is_simulated(recording) else "recorded",
             )
+        handles, names = axes[0].get_legend_handles_labels()
+        axes[0].figure.legend(
+            handles, names, frameon=False, markerscale=1.5, loc="outside lower center", ncols=2
+        )
 
 
-def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str) -> None:
-    """The force error of each structure that was rendered."""
+def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, *, of: str) -> None:
+    """The force error of each structure that was rendered; `of` says what was rendered."""
     from ..plotting import draw_structures
 
     shown = [(row.name, row.error) for row in rows if row.error is not None]
-    with figure_file(path, height_inches=0.7 + 0.3 * len(shown)) as (axes,):
+    with figure_file(path, height_inches=0.9 + 0.3 * len(shown), title=of) as (axes,):
         draw_structures(
             axes,
             [name for name, _ in shown],
@@ -169,5 +200,7 @@ def picture_path(path: Path, model: Model) -> None:
 
     if not model.path:
         raise InputError("the model does not say how it was found: it holds no path of networks")
-    with figure_file(path, height_inches=3.6, rows=(1.6, 1.0)) as (error, criterion):
+    fit = model.fit
+    title = f"{source_name(model.data.files)}\n{fit.n_wavelets} wavelets, NRMSE {number(fit.nrmse)}"
+    with figure_file(path, height_inches=4.0, rows=(1.4, 1.0), title=title) as (error, criterion):
         draw_path(error, criterion, model.path, model.units["force"])

@@ -10,18 +10,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .arguments import PATH, json_option, plot_option
-from .ending import WorkError
+from .ending import interrupted_at_once
 from .figures import require_figure_name
 from .output import (
+    end_with,
     finishing,
     number,
     print_json,
     print_numbers,
     print_paragraph,
+    print_verdict,
     require_distinct,
     require_writable,
     talk,
 )
+from .printing import print_line
 from .verb import Verb
 
 if TYPE_CHECKING:
@@ -29,21 +32,34 @@ if TYPE_CHECKING:
     from ..planning import Plan
 
 
-def _list_examples(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
-    """Print every example profile with its file and its sources, and end."""
-    if not wanted:
-        return
+class _PlanVerb(Verb):
+    """The verb, or the list of example profiles, which needs neither model nor device."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if "--examples" in args:
+            _list_examples(as_json="--json" in args)
+            ctx.exit()
+        return super().parse_args(ctx, args)
+
+
+def _list_examples(*, as_json: bool) -> None:
+    """Print every example profile with its file and its sources."""
     from ..planning import example_profiles
 
-    for name, (file, sources) in example_profiles().items():
-        click.echo(f"{name}  {file}")
+    examples = example_profiles()
+    if as_json:
+        print_json(
+            {name: {"file": str(file), "sources": list(told)} for name, (file, told) in examples.items()}
+        )
+        return
+    for name, (file, sources) in examples.items():
+        print_line(f"{name}  {file}")
         for paragraph in sources:
             print_paragraph(paragraph, indent="  ")
-    ctx.exit()
 
 
 @click.command(
-    cls=Verb,
+    cls=_PlanVerb,
     no_args_is_help=True,
     epilog="Example: palpate plan press.json --device knob.toml -o press.json",
 )
@@ -61,16 +77,23 @@ def _list_examples(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
 @click.option("--mass", type=float, default=None, help="m; the model's own. 0 leaves it out.")
 @click.option("--damping", type=float, default=None, help="B_o; the model's own. 0 leaves it out.")
 @click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
+@click.option(
+    "--accept-force-error",
+    type=float,
+    metavar="SHARE",
+    default=None,
+    show_default="0.1",
+    help="Largest difference of felt and identified force to accept, over the range of the force.",
+)
 @plot_option("the root locus of the explicit structure over its damping")
 @click.option(
     "--examples",
     is_flag=True,
-    is_eager=True,
     expose_value=False,
-    callback=_list_examples,
     help="List the example profiles with their sources, and end.",
 )
 @json_option
+@interrupted_at_once()
 def plan(
     model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
 ) -> None:
@@ -78,7 +101,9 @@ def plan(
 
     The simplest structure that is certified is taken: direct; direct with its slope limited to what the
     device can render; massless behind a coupling; implicit; explicit, which is stable at best. Every refusal
-    says which inequality failed and by how much. Exit code 1: no structure holds, and nothing is written.
+    says which inequality failed and by how much. The identified network stays in the file; what is rendered
+    in its place stands under plan. Exit code 1: no structure holds, or the felt force differs by more than is
+    accepted. Nothing is written then.
     """
     from ..model import load_model
     from ..planning import DeviceProfile, profile_file
@@ -95,33 +120,61 @@ def plan(
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
     began = time.perf_counter()
-    chosen = choose(model, profile, **wishes)
+    chosen = choose(model, profile, **{name: wish for name, wish in wishes.items() if wish is not None})
     seconds = time.perf_counter() - began
-    certificate = chosen.certificate
+    verdict, certificate = chosen.verdict, chosen.certificate
     assert certificate is not None
-    if certificate.refused:
-        raise WorkError("no structure holds on this device: " + "; ".join(chosen.refused))
+    holds = verdict.level != "no"
     with finishing():
-        if output is not None:
+        if output is not None and holds:
             chosen.stored().save(output)
         if plot is not None:
             _picture(plot, chosen, profile)
+        written = output if holds else None
         if as_json:
-            from ..model.certified import certificate_record
-
-            record = certificate_record(certificate)
-            felt, steepest = _felt_slopes(chosen, certificate)
-            slopes = {"steepest_slope": steepest, "felt_slope": felt}
-            print_json({"plan": chosen.record(), "certificate": record, **slopes, "seconds": seconds})
+            print_json(_result(chosen, certificate, written, seconds))
         else:
-            _tell(chosen, certificate, seconds)
+            _tell(chosen, certificate, written, seconds)
+    end_with(verdict)
 
 
-def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
-    """The plan first, then what was refused on the way to it, then every inequality."""
+def structure_words(plan: Plan) -> str:
+    """The structure, and the changes to the identified network that it renders."""
+    words = [plan.structure]
+    if plan.scheme.compensated:
+        words.append("compensated")
+    if plan.limited is not None:
+        words.append("with a limited network")
+    return ", ".join(words)
+
+
+def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
+    from ..model.certified import certificate_record
+
+    error = plan.force_error
+    felt, steepest = _felt_slopes(plan, certificate)
+    return {
+        "structure": plan.structure,
+        "verdict": str(plan.verdict),
+        "force_error_share": error.share,
+        "force_error_rms_share": error.rms_share,
+        "force_error": {"largest": error.largest, "rms": error.rms},
+        "needs": plan.needs,
+        "written": None if written is None else str(written),
+        "plan": plan.record(),
+        "certificate": certificate_record(certificate),
+        "steepest_slope": steepest,
+        "felt_slope": felt,
+        "seconds": seconds,
+    }
+
+
+def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
+    """The verdict first, then the plan, then what was refused on the way to it, then every inequality."""
+    print_verdict(plan.verdict)
     scheme = plan.scheme
     unit = plan.model.units["force"] or "in the model's unit"
-    rows = {"structure": plan.structure + (", compensated" if scheme.compensated else "")}
+    rows = {"structure": structure_words(plan)}
     if plan.solver is not None:
         rows["solver"] = plan.solver
     if plan.structure != "direct":
@@ -135,13 +188,19 @@ def _tell(plan: Plan, certificate: Certificate, seconds: float) -> None:
     felt, steepest = _felt_slopes(plan, certificate)
     if felt < steepest:
         rows["softer"] = f"slopes up to {number(steepest)} are felt as up to {number(felt)}"
-    lost = plan.loss
-    rows["force lost"] = (
-        "none" if lost is None else f"up to {number(lost.largest)}, {number(lost.rms)} RMS ({unit})"
+    error = plan.force_error
+    rows["force error"] = (
+        f"up to {number(error.largest)} {unit}, {100.0 * error.share:.3g} % of the range; "
+        f"RMS {100.0 * error.rms_share:.3g} % of the spread"
+        if error.largest
+        else "none"
     )
-    rows["verdict"] = certificate.verdict
+    rows["certificate"] = certificate.verdict
     rows["holds for"] = f"up to {number(1e3 * certificate.longest_period_s)} ms between two samples"
     rows["planned in"] = f"{seconds:.1f} s"
+    rows["written"] = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
+    if plan.verdict.level == "no":
+        rows["written"] = "nothing, because the verdict is no"
     print_numbers(rows)
     if plan.refused:
         click.echo("\nrefused")
@@ -181,9 +240,10 @@ def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
     from ..planning.root_locus import root_locus
     from ..plotting import draw_root_locus
     from .figures import figure_file
+    from .pictures import source_name
 
     radius = usual_play_radius(plan.model, profile)
-    bounds = force_bounds(plan.model, radius)
+    bounds = force_bounds(plan.rendered, radius)
     scheme = plan.scheme
     if plan.structure != "explicit":
         scheme = explicit_scheme(
@@ -198,6 +258,7 @@ def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
     slopes = np.unique([max(bounds.slope_min, -0.9 * scheme.coupling_stiffness), bounds.slope_max])
     units = plan.model.units
     unit = f"{units['force']}/{units['position']}".replace("*", "\u00b7") if units["force"] else ""
-    with figure_file(path, height_inches=3.6) as (axes,):
+    title = f"model of {source_name(plan.model.data.files)}, explicit, on {profile.id}"
+    with figure_file(path, height_inches=3.8, title=title) as (axes,):
         locus = root_locus(scheme, slopes, profile.period_s)
         draw_root_locus(axes, locus, damping=scheme.damping, slope_unit=unit)

@@ -9,11 +9,12 @@ from typing import Any
 import click
 
 from ..errors import InputError
+from ..recording.files import require_absent
 from .arguments import PATH, json_option
 from .device_options import device_options
-from .ending import WorkError
 from .live_line import live_line
-from .output import number, print_json, print_numbers, require_writable, talk
+from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
+from .session_verdict import session_verdict
 from .verb import Verb
 
 
@@ -24,6 +25,7 @@ from .verb import Verb
 )
 @click.argument("recording", metavar="OUT.csv", type=PATH)
 @device_options
+@click.option("--force", is_flag=True, help="Replace an existing recording.")
 @click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
 @click.option("--duration-s", type=float, default=10.0, help="How long; inf: until Ctrl-C.")
 @click.option("--probe", is_flag=True, help="The device moves the handle by itself, slowly to and fro.")
@@ -48,6 +50,7 @@ from .verb import Verb
 @json_option
 def record(
     recording: Path,
+    force: bool,
     device: str,
     object_file: Path | None,
     wait_ms: float | None,
@@ -69,6 +72,8 @@ def record(
     from ..model import load_model
 
     require_writable(recording, inputs=() if object_file is None else (object_file,))
+    if not force:
+        require_absent(recording)
     given = [name for name, value in sweep.items() if value is not None]
     if given and not probe:
         raise InputError(f"--{given[0].replace('_', '-')} is for --probe, which was not given")
@@ -79,6 +84,7 @@ def record(
     with live_line(rate_hz, units) as line:
         summary = record_object(
             recording,
+            force=force,
             device=device,
             object=mounted,
             transducer=transducer,
@@ -92,11 +98,12 @@ def record(
         )
     for note in summary["notes"]:
         talk(f"  {note}")
-    if not summary["orderly"]:
-        raise WorkError(f"{summary['ended']}; zero force sent, device closed")
+    verdict = session_verdict(summary)
     if as_json:
         print_json(summary)
+        end_with(verdict)
         return
+    print_verdict(verdict)
     reached = {
         name: f"{number(summary[f'{name}_range'][0])} to {number(summary[f'{name}_range'][1])} {unit}"
         for name, unit in zip(("position", "force"), units, strict=True)
@@ -110,3 +117,4 @@ def record(
             f"{summary['lost_samples']} samples lost, {summary['repeated_samples']} repeated",
         }
     )
+    end_with(verdict)

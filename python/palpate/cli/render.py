@@ -9,10 +9,12 @@ from typing import Any
 import click
 
 from .._core import LoopSettings, usual_telemetry_hz
+from ..recording.files import require_absent
 from .arguments import PATH, json_option
-from .ending import WorkError, terminated_as_interrupted
-from .output import number, print_json, print_numbers, require_writable, talk
+from .live_line import live_line
+from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
 from .scheme_options import chosen_plan, scheme_options
+from .session_verdict import session_verdict
 from .verb import Verb
 
 _LOOP = LoopSettings()
@@ -33,6 +35,7 @@ _LOOP = LoopSettings()
     default=None,
     help="Write every tick to this recording; it grows as OUT.csv.part.",
 )
+@click.option("--force", is_flag=True, help="Replace an existing recording.")
 @click.option(
     "--telemetry-port",
     type=click.IntRange(1, 65535),
@@ -55,6 +58,7 @@ def render(
     rate_hz: float,
     duration_s: float,
     record: Path | None,
+    force: bool,
     telemetry_port: int | None,
     telemetry_hz: float,
     lowest_rate_share: float,
@@ -72,31 +76,36 @@ def render(
 
     if record is not None:
         require_writable(record, inputs=(model_file,))
+        if not force:
+            require_absent(record)
     model = load_model(model_file)
     bench = bench_for(model)
     plan = chosen_plan(model, bench, scheme)
     talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated: nothing moves")
-    with terminated_as_interrupted():
+    with live_line(rate_hz, (model.units["position"], model.units["force"])) as line:
         summary = render_live(
-            model,
+            plan.rendered,
             plan.scheme,
             position_unit=model.units["position"],
             force_unit=model.units["force"],
             rate_hz=rate_hz,
             duration_s=duration_s,
             record="" if record is None else str(record),
+            force=force,
             model_name=str(model_file),
             telemetry_port=telemetry_port,
             telemetry_hz=telemetry_hz,
             lowest_rate_share=lowest_rate_share,
+            progress=line.show,
         )
     for note in summary["notes"]:
         talk(f"  {note}")
-    if not summary["orderly"]:
-        raise WorkError(f"{summary['ended']}; zero force sent, device closed")
+    verdict = session_verdict(summary)
     if as_json:
         print_json(summary)
+        end_with(verdict)
         return
+    print_verdict(verdict)
     rows = {
         "ended": summary["ended"],
         "rate": f"{number(summary['rate_hz'])} Hz of {number(rate_hz)} Hz, "
@@ -108,6 +117,7 @@ def render(
     if record is not None:
         rows["recorded"] = f"{summary['record']}: {summary['recorded']} rows, {summary['lost_records']} lost"
     print_numbers(rows)
+    end_with(verdict)
 
 
 def _percentiles(durations: dict[str, float]) -> str:

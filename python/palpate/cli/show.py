@@ -4,14 +4,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .arguments import PATH
+from ..verdict import GOOD, Verdict, usable
+from .arguments import PATH, json_option
 from .figures import figure_file, require_figure_name
-from .output import number, print_table
+from .output import (
+    end_with,
+    finishing,
+    number,
+    print_json,
+    print_numbers,
+    print_table,
+    print_verdict,
+    require_writable,
+)
 from .pictures import picture_path
+from .printing import print_line
 from .verb import Verb
+
+if TYPE_CHECKING:
+    from ..model import Model
+    from ..verification import Stroke
+
+_SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
+          "slope_bounds", "data")  # fmt: skip
+"""Fields of the model file that --json repeats as they are."""
 
 
 @click.command(cls=Verb, no_args_is_help=True, epilog="Example: palpate show press.json")
@@ -28,27 +48,95 @@ from .verb import Verb
     type=PATH,
     help="Draw every network that was considered; with --beside both models and their difference.",
 )
-def show(model_file: Path, beside: Path | None, plot: Path | None) -> None:
-    """Print a model: its terms, its domain, its units, and how it was identified."""
+@json_option
+def show(model_file: Path, beside: Path | None, plot: Path | None, as_json: bool) -> None:
+    """Print a model: its verdict, terms, domain and units, how it was identified, and its plan.
+
+    Exit code 1: the verdict of the model is "no".
+    """
     from ..model import load_model
 
     if plot is not None:
         require_figure_name(plot)
+        require_writable(plot, inputs=tuple(filter(None, (model_file, beside))))
     model = load_model(model_file)
-    if beside is None:
-        click.echo(str(model))
+    if beside is not None:
+        _compare(model, model_file, load_model(beside), beside, plot=plot, as_json=as_json)
+        return
+    with finishing():
         if plot is not None:
             picture_path(plot, model)
-        return
+        if as_json:
+            print_json(_record(model, model_file))
+        else:
+            for line in str(model).split("\n"):
+                print_line(line, hanging=4)
+            if (plan := _plan_record(model)) is not None:
+                print_line()
+                print_numbers({f"plan, {name}": str(value) for name, value in plan.items()})
+        end_with(model.verdict)
+
+
+def _record(model: Model, file: Path) -> dict[str, Any]:
+    """What `show` prints, under the names of the model file."""
+    content = model.to_dict()
+    fit = {name: value for name, value in content["fit"].items() if name != "path"}
+    return {
+        "model": str(file),
+        "verdict": str(model.verdict),
+        **{name: content[name] for name in _SHOWN},
+        "fit": fit,
+        "plan": _plan_record(model),
+    }
+
+
+def _plan_record(model: Model) -> dict[str, Any] | None:
+    """Structure, device and verdict of the plan in a model file."""
+    if model.plan is None:
+        return None
+    from ..planning import Plan
+    from .plan import structure_words
+
+    plan = Plan.of(model)
+    return {
+        "structure": structure_words(plan),
+        "device": None if plan.certificate is None else plan.certificate.device.id,
+        "verdict": str(plan.verdict),
+    }
+
+
+def _compare(
+    model: Model, model_file: Path, other: Model, other_file: Path, *, plot: Path | None, as_json: bool
+) -> None:
+    """Print how far two models are from each other, with a verdict on both and on their difference."""
     from ..verification import compare
 
-    strokes = compare(model, load_model(beside))
-    print_table(
-        ("stroke", "largest difference, in just noticeable ones"),
-        [(stroke.name or "both", number(stroke.worst)) for stroke in strokes],
-    )
-    if plot is not None:
-        from ..plotting import draw_two_models
+    strokes = compare(model, other)
+    verdict = model.verdict + other.verdict + _noticed(strokes)
+    with finishing():
+        if plot is not None:
+            from ..plotting import draw_two_models
 
-        with figure_file(plot, height_inches=3.6, rows=(2.2, 1.0)) as (above, beneath):
-            draw_two_models(above, beneath, strokes, model.units, names=(model_file.stem, beside.stem))
+            title = f"{model_file.name} and {other_file.name}"
+            with figure_file(plot, height_inches=3.6, rows=(2.2, 1.0), title=title) as (above, beneath):
+                names = (model_file.stem, other_file.stem)
+                draw_two_models(above, beneath, strokes, model.units, names=names)
+        if as_json:
+            largest = {stroke.name or "both": stroke.worst for stroke in strokes}
+            files = {"model": str(model_file), "beside": str(other_file)}
+            print_json({**files, "verdict": str(verdict), "worst_jnd": largest})
+        else:
+            print_verdict(verdict)
+            print_table(
+                ("stroke", "largest difference, in just noticeable ones"),
+                [(stroke.name or "both", number(stroke.worst)) for stroke in strokes],
+            )
+        end_with(verdict)
+
+
+def _noticed(strokes: tuple[Stroke, ...]) -> Verdict:
+    """A finding if a hand notices the difference between two models."""
+    worst = max(stroke.worst for stroke in strokes)
+    if worst <= 1.0:
+        return GOOD
+    return Verdict((usable(f"a hand notices the difference: up to {number(worst)} just noticeable ones"),))

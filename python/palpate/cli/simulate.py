@@ -9,11 +9,24 @@ from typing import Any
 
 import click
 
+from ..recording.files import require_absent
+from ..recording.writing import write_csv
 from .arguments import PATH, json_option, plot_option
-from .ending import WorkError
+from .ending import interrupted_at_once
 from .figures import require_figure_name
-from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
+from .output import (
+    end_with,
+    finishing,
+    number,
+    print_json,
+    print_numbers,
+    print_verdict,
+    require_distinct,
+    require_writable,
+    talk,
+)
 from .pictures import picture_rendering
+from .progress import progress
 from .scheme_options import chosen_plan, scheme_options
 from .verb import Verb
 
@@ -27,10 +40,18 @@ from .verb import Verb
 @scheme_options
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time.")
 @click.option("-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Write what was rendered.")
+@click.option("--force", is_flag=True, help="Replace an existing recording.")
 @plot_option("rendered force beside the model's, differences beneath")
 @json_option
+@interrupted_at_once()
 def simulate(
-    model_file: Path, duration_s: float, output: Path | None, plot: Path | None, as_json: bool, **scheme: Any
+    model_file: Path,
+    duration_s: float,
+    output: Path | None,
+    force: bool,
+    plot: Path | None,
+    as_json: bool,
+    **scheme: Any,
 ) -> None:
     """Render a model in closed loop with a simulated device and a simulated hand.
 
@@ -40,7 +61,7 @@ def simulate(
     This shows what happens, and proves nothing.
     """
     from ..model import load_model
-    from ..planning import bench_for, force_error
+    from ..planning import bench_for, force_error, force_range, judge
     from ..planning import simulate as render
 
     if plot is not None:
@@ -48,44 +69,55 @@ def simulate(
     for target in filter(None, (output, plot)):
         require_writable(target, inputs=(model_file,))
     require_distinct(output, plot)
+    if output is not None and not force:
+        require_absent(output)
     model = load_model(model_file)
     bench = bench_for(model)
     plan = chosen_plan(model, bench, scheme)
     device = bench.device if plan.certificate is None else plan.certificate.device
     talk(f"read {model_file}: {model!r}; rendering on a {device.id}, which is simulated")
-    rendered = render(plan, device, bench.hand, duration_s)
-    error = force_error(plan, rendered)
-    endings = Counter(rendered.columns["status"])
-    if endings["NonFinite"]:
-        raise WorkError(
-            f"the rendering ran away: {endings['NonFinite']} of {len(rendered)} ticks had no finite force"
+    ticks = max(duration_s / device.period_s, 1.0)
+    with progress("simulating") as shown:
+        rendered = render(
+            plan, device, bench.hand, duration_s, lambda tick: shown(f"{100 * tick / ticks:.1f} %")
         )
+    error = force_error(plan, rendered)
+    verdict = judge(plan, rendered, error)
+    endings = Counter(rendered.columns["status"])
+    span = force_range(plan)
+    share = error.end / span if span > 0 else None
     extrapolated = float(rendered.columns["extrapolated"].mean())
     result = {
+        "verdict": str(verdict),
         "structure": plan.structure,
         "duration_s": duration_s,
         "ticks": len(rendered),
         "force_error_end": error.end,
         "force_error_instant": error.instant,
+        "force_error_share": share,
         "extrapolated": extrapolated,
         "status": dict(endings),
     }
     with finishing():
-        if output is not None:
-            rendered.write(output)
+        if output is not None and not endings["NonFinite"]:
+            write_csv(rendered, output, replace=force)
         if plot is not None:
             picture_rendering(plot, plan, rendered)
         if as_json:
             print_json(result)
+            end_with(verdict)
             return
+        print_verdict(verdict)
         unit = rendered.units["force"]
         print_numbers(
             {
                 "structure": plan.structure,
                 "duration": f"{number(duration_s)} s",
-                "force error, end of tick": f"{number(error.end)} {unit} RMS",
+                "force error, end of tick": f"{number(error.end)} {unit} RMS"
+                + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
                 "force error, sampled": f"{number(error.instant)} {unit} RMS",
                 "extrapolated": f"{100 * extrapolated:.3g} %",
                 "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
             }
         )
+        end_with(verdict)

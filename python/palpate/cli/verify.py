@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .arguments import PATH, ReadingOptions, columns_of, json_option, plot_option, reading_options
+from ..errors import InputError
+from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from .ending import interrupted_at_once
 from .figures import require_figure_name
-from .output import finishing, number, print_json, print_numbers, require_distinct, require_writable, talk
+from .output import (
+    end_with,
+    finishing,
+    number,
+    print_json,
+    print_numbers,
+    print_verdict,
+    require_distinct,
+    require_writable,
+    talk,
+)
 from .pictures import close_loops, picture_closed_loops, picture_verification, print_closed_loops
 from .verb import Verb
 
@@ -25,31 +37,45 @@ if TYPE_CHECKING:
 @click.argument("recording_file", metavar="RECORDING", type=PATH)
 @plot_option("measured and modelled force over position, residuals beneath")
 @plot_option("recorded and rendered force over position, the loop closed both ways", "--plot-closed-loop")
+@click.option(
+    "--play-radius",
+    type=float,
+    default=None,
+    metavar="NUMBER",
+    help="r of a model with hysteresis: its play operator follows the positions, whatever the direction. "
+    "Without a direction: that of the flight record, the model or its plan, or 1 % of the travel.",
+)
 @json_option
 @reading_options
+@interrupted_at_once()
 def verify(
     model_file: Path,
     recording_file: Path,
     plot: Path | None,
     plot_closed_loop: Path | None,
+    play_radius: float | None,
     as_json: bool,
     reading: ReadingOptions,
 ) -> None:
     """Compare a model with a recording, best one that it has not seen.
 
     The closed loop is run both ways: the recorded motion moves the device and the rendered force is compared;
-    the recorded force drives the object and the resulting position is compared.
+    the recorded force drives the object and the resulting position is compared. The exit code is 1 if the
+    verdict is no.
     """
     from ..model import load_model
+    from ..verification import columns_of
     from ..verification import verify as verify_model
 
+    if recording_file.suffix == ".json" != model_file.suffix:
+        raise InputError(f"the model comes first: palpate verify {recording_file} {model_file}")
     for figure in filter(None, (plot, plot_closed_loop)):
         require_figure_name(figure)
         require_writable(figure, inputs=(model_file, recording_file))
     require_distinct(plot, plot_closed_loop)
     model = load_model(model_file)
     recording = reading.read(recording_file, columns_of(model))
-    verification = verify_model(model, recording)
+    verification = verify_model(model, recording, play_radius=play_radius)
     for note in verification.notes:
         talk(f"  {note}")
     loops: list[ClosedLoop] = []
@@ -67,10 +93,13 @@ def verify(
                 {
                     name: getattr(verification, name)
                     for name in ("nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh",
-                                 "extrapolated", "units")
+                                 "extrapolated")
                 }
+                | {"verdict": str(verification.verdict), "units": verification.units}
             )  # fmt: skip
+            end_with(verification.verdict)
             return
+        print_verdict(verification.verdict)
         unit = recording.units["force"]
         print_numbers(
             {
@@ -79,7 +108,7 @@ def verify(
                 "r2": f"{verification.r2:.6f}",
                 "worst": f"{number(verification.worst)} {unit}",
                 "within what a hand can tell": f"{100 * verification.within_jnd:.3g} % of rows",
-                "rows": str(verification.n),
+                "rows": f"{verification.n} of {len(recording)}",
                 "fresh": "yes" if verification.fresh else "no: the model was identified on this data",
                 "outside the model's domain": f"{verification.extrapolated} rows",
             }
@@ -87,3 +116,4 @@ def verify(
         if loops:
             click.echo()
             print_closed_loops(loops)
+        end_with(verification.verdict)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a device is fit to render force: what was measured, and a verdict to paste anywhere."""
+"""Check of a device: measurements, findings and the verdict whether it is fit to render force."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from .._core import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..model import Model
 from ..planning import DeviceProfile
+from ..verdict import Verdict, no, usable
 from .finding import Finding
 from .fitting import compare, profile_of
 from .listening import findings_at_rest
 from .measuring import Progress, measure
+from .mechanics import Mechanics
 from .push import Push, push_response
 
 LISTENING_SHARE = 0.7
@@ -26,6 +28,11 @@ LISTENING_SHARE = 0.7
 PUSH_SHARE = 0.005
 """A push, over the largest force of the device."""
 
+_STATE_FRICTION = (
+    "let go of the handle and check for 10 s; if the friction is above the pushes, state it with "
+    "--coulomb-friction"
+)
+_NO_FRICTION = "without friction no certificate of direct rendering holds for an encoder with steps"
 _SHORTEST_S = 2.0
 _DELAY_TOLERANCE = 0.25
 """Of a sample: what the clocks of host and device leave open."""
@@ -34,6 +41,8 @@ _SEEN_STEPS = 5.0
 _SURE = 3.0
 """Standard errors that a push has to stand out by."""
 _SIGN = "sign of the force"
+_SIMULATED_FRICTION = 0.002
+"""Coulomb friction of the simulated device, a bearing's, over its largest force."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,8 @@ class Check:
     numbers: Mapping[str, float | None]
     base: CoreProfile
     """What the device says of itself, its mechanics apart."""
+    coulomb_friction: float | None = None
+    """Friction that was stated by the user [N or N*m]"""
 
     @property
     def suitable(self) -> bool:
@@ -57,24 +68,42 @@ class Check:
         return not any(finding.right is False and finding.forbids_force for finding in self.findings)
 
     @property
-    def verdict(self) -> str:
-        """One sentence: OK, or what is wrong and what to try."""
-        wrong = [finding for finding in self.findings if finding.right is False]
-        if wrong:
-            told = "; ".join(f"{finding.name}: {finding.told} ({finding.advice})" for finding in wrong)
-            return f"NOT SUITABLE: {self.device}: {told}"
-        unseen = [finding.name for finding in self.findings if finding.right is None and finding.advice]
-        rest = f"; not seen: {', '.join(unseen)}" if unseen else ""
-        return f"OK: {self.device} is fit to render force{rest}"
+    def verdict(self) -> Verdict:
+        """The verdict on the device: no if a finding is wrong, usable if something was not seen."""
+        return Verdict(
+            tuple(
+                (usable if finding.right is None else no)(
+                    f"{finding.name}: {finding.told}" + (f" ({finding.advice})" if finding.advice else "")
+                )
+                for finding in self.findings
+                if finding.right is False or (finding.right is None and finding.advice)
+            )
+        )
 
     def profile(self) -> DeviceProfile:
-        """The device as it was measured; InputError where its mechanics were not, or a sign is wrong.
+        """The device as it was measured.
 
-        What a certificate counts on is thereby a device whose motor was seen to push the right way.
+        Raises
+        ------
+        InputError
+            Its mechanics were not measured, or a sign is wrong.
         """
         if not self.may_push:
-            raise InputError(f"there is no profile of a device that must not make force; {self.verdict}")
+            raise InputError("there is no profile of a device that must not make force")
         return profile_of(self.base, self.numbers)
+
+    def profile_notes(self) -> tuple[str, ...]:
+        """For each number of the profile whether it was measured, stated or said by the device."""
+        stated = self.coulomb_friction is not None
+        friction = "stated, not measured" if stated else "measured, less its uncertainty: a lower bound"
+        delay = "measured" if self.numbers["delay_samples"] is not None else "not measured; assumed to be 0"
+        return (
+            f"{self.device}, measured by palpate check-device.",
+            "inertia, viscous_damping: measured by pushes. period_s: said by the device. jitter_s: measured.",
+            f"coulomb_friction: {friction}.",
+            f"delay_samples: {delay}.",
+            "encoder_step, force_step, force_limit: said by the device, not measured.",
+        )
 
 
 def check_device(
@@ -87,6 +116,7 @@ def check_device(
     push: bool = False,
     profile: DeviceProfile | None = None,
     model: Model | None = None,
+    coulomb_friction: float | None = None,
     wait_s: float | None = None,
     progress: Progress | None = None,
 ) -> Check:
@@ -115,6 +145,8 @@ def check_device(
         What the device is thought to be.
     model : Model, optional
         One with a certificate: whether that holds on this device.
+    coulomb_friction : float, optional
+        Friction of the device, where it is known and cannot be measured [N or N*m]; a lower bound.
     wait_s : float, optional
         How long a packet of a USB device is waited for [s].
     progress : callable, optional
@@ -127,6 +159,8 @@ def check_device(
     """
     if duration_s < _SHORTEST_S:
         raise InputError(f"duration_s is {duration_s:g}, must be at least {_SHORTEST_S:g} to see anything")
+    if coulomb_friction is not None and not 0.0 <= coulomb_friction < math.inf:
+        raise InputError(f"coulomb_friction is {coulomb_friction:g}, must be a finite number >= 0")
     counted_on = _counted_on(profile, model)
     common: dict[str, Any] = {
         "object": object,
@@ -136,6 +170,7 @@ def check_device(
         "progress": progress,
         "keep": True,
         "lowest_rate_share": 0.0,  # a low rate is a finding, and no reason to stop
+        "friction_share": _SIMULATED_FRICTION,
     }
     listened = measure(device, duration_s=duration_s * (LISTENING_SHARE if push else 1.0), **common)
     check = judge(listened)
@@ -146,7 +181,8 @@ def check_device(
     else:
         force = PUSH_SHARE * check.base.force_limit
         pushed = measure(device, duration_s=duration_s * (1.0 - LISTENING_SHARE), push=force, **common)
-        check = with_pushes(check, push_response(pushed["kept"]))
+        push_seen = push_response(pushed["kept"], check.base.encoder_step, coulomb_friction)
+        check = with_pushes(replace(check, coulomb_friction=coulomb_friction), push_seen)
     compared = tuple(compare(other, check.numbers, name=name) for name, other in counted_on.items())
     return _with(check, *compared)
 
@@ -178,6 +214,8 @@ def judge(listened: Mapping[str, Any]) -> Check:
         "delay_samples": None,
         "inertia": None,
         "viscous_damping": None,
+        "coulomb_friction": None,
+        "coulomb_friction_at_least": None,
         **{f"period_{name}": value for name, value in listened["period"].items()},
     }
     findings = findings_at_rest(listened)
@@ -200,19 +238,40 @@ def judge(listened: Mapping[str, Any]) -> Check:
 def with_pushes(check: Check, push: Push) -> Check:
     """Add what pushes showed to a check."""
     findings = [*check.findings, _sign(push, check.base.encoder_step)]
-    numbers = {**check.numbers, "inertia": push.inertia, "viscous_damping": push.damping}
+    numbers = dict(check.numbers)
     if push.delay_samples is not None and numbers["delay_samples"] is None:
         numbers["delay_samples"] = float(push.delay_samples)
         findings.append(Finding("delay", f"{push.delay_samples} samples from a sample to its force"))
-    if push.inertia is not None and push.damping is not None:
-        turns = check.base.position_unit == "rad"
-        units = ("kg*m^2", "N*m*s/rad") if turns else ("kg", "N*s/m")
-        findings.append(
-            Finding(
-                "mechanics", f"inertia {push.inertia:.3g} {units[0]}, damping {push.damping:.3g} {units[1]}"
-            )
-        )
+    mechanics = push.mechanics
+    if mechanics is None:
+        findings.append(Finding("friction", f"not measured: {push.unseen}", None, _STATE_FRICTION))
+    else:
+        numbers["inertia"], numbers["viscous_damping"] = mechanics.inertia, mechanics.damping
+        numbers["coulomb_friction"] = mechanics.friction
+        numbers["coulomb_friction_at_least"] = mechanics.friction_at_least
+        findings += _mechanics(mechanics, check)
     return replace(check, findings=tuple(findings), numbers=numbers)
+
+
+def _mechanics(mechanics: Mechanics, check: Check) -> list[Finding]:
+    turns = check.base.position_unit == "rad"
+    units = ("kg*m^2", "N*m*s/rad", "N*m") if turns else ("kg", "N*s/m", "N")
+    least = mechanics.friction_at_least
+    found = [
+        Finding(
+            "mechanics",
+            f"inertia {mechanics.inertia:.3g} {units[0]}, damping {mechanics.damping:.3g} {units[1]}",
+        )
+    ]
+    if check.coulomb_friction is not None:
+        found.append(Finding("friction", f"{least:.3g} {units[2]}, stated and not measured"))
+    elif least > 0.0:
+        told = f"{mechanics.friction:.3g} {units[2]}, at least {least:.3g}"
+        found.append(Finding("friction", told))
+    else:
+        told = f"none was found, {3.0 * mechanics.friction_unsure:.1g} {units[2]} at most"
+        found.append(Finding("friction", told, None, _NO_FRICTION))
+    return found
 
 
 def _sign(push: Push, step: float) -> Finding:

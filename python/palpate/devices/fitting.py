@@ -14,7 +14,7 @@ from .finding import Finding
 _CLOCK_TOLERANCE = 0.005
 _STEP_TOLERANCE = 0.01
 _DAMPING_TOLERANCE = 0.1
-"""A measured damping may be below the one counted on by so much: friction and noise are in it."""
+"""Measured damping and friction may be below those counted on by this share: noise is in them."""
 
 Numbers = Mapping[str, float | None]
 
@@ -28,12 +28,13 @@ def compare(expected: CoreProfile, measured: Numbers, *, name: str) -> Finding:
         The profile, or the device of a certificate.
     measured : mapping
         ``period_s``, ``jitter_s``, ``delay_samples``, ``encoder_step``, ``force_limit``,
-        ``viscous_damping``; None where it was not measured.
+        ``viscous_damping``, ``coulomb_friction``; None where it was not measured.
     name : str
         Of the finding.
     """
     period, jitter = measured["period_s"], measured["jitter_s"]
     delay, damping = measured["delay_samples"], measured["viscous_damping"]
+    friction = measured["coulomb_friction"]
     step, limit = measured["encoder_step"], measured["force_limit"]
     assert period is not None
     assert jitter is not None
@@ -55,7 +56,10 @@ def compare(expected: CoreProfile, measured: Numbers, *, name: str) -> Finding:
         wrong.append(f"its largest force is {limit:.4g}, {expected.force_limit:.4g} is counted on")
     if damping is not None and damping < expected.viscous_damping * (1.0 - _DAMPING_TOLERANCE):
         wrong.append(f"its damping is {damping:.3g}, {expected.viscous_damping:.3g} is counted on")
-    unseen = [word for word, value in (("delay", delay), ("damping", damping)) if value is None]
+    if friction is not None and friction < expected.coulomb_friction * (1.0 - _DAMPING_TOLERANCE):
+        wrong.append(f"its friction is {friction:.3g}, {expected.coulomb_friction:.3g} is counted on")
+    seen = {"delay": delay, "damping": damping, "friction": friction}
+    unseen = [word for word, value in seen.items() if value is None]
     held = "holds" + (f" as far as it was seen (not: {', '.join(unseen)})" if unseen else "")
     return Finding(
         name,
@@ -68,17 +72,21 @@ def compare(expected: CoreProfile, measured: Numbers, *, name: str) -> Finding:
 def profile_of(base: CoreProfile, measured: Numbers) -> DeviceProfile:
     """The profile of a device as it was measured.
 
-    Friction is 0, the lower bound that a certificate may count on; the force step is what the device says.
+    Friction is a lower bound, which is what a certificate may count on; encoder, force step and force limit
+    are what the device says.
 
     Raises
     ------
     InputError
-        Inertia and damping were not measured.
+        The mechanics were not measured.
     """
     inertia, damping = measured["inertia"], measured["viscous_damping"]
-    if inertia is None or damping is None:
+    friction = measured["coulomb_friction_at_least"]
+    if inertia is None or damping is None or friction is None:
         raise InputError(
-            "a profile needs inertia and damping: push a handle that nobody holds and nothing is mounted on"
+            "a profile needs inertia, damping and friction: push a handle that nobody holds and nothing is "
+            "mounted on, for 10 s; if the friction is above the pushes, state it with --coulomb-friction (in "
+            "Python coulomb_friction)"
         )
     period, jitter, delay = measured["period_s"], measured["jitter_s"], measured["delay_samples"]
     assert period is not None
@@ -90,7 +98,7 @@ def profile_of(base: CoreProfile, measured: Numbers) -> DeviceProfile:
         jitter_s=max(0.0, period + jitter - base.period_s),
         inertia=inertia,
         viscous_damping=damping,
-        coulomb_friction=0.0,
+        coulomb_friction=friction,
         encoder_step=base.encoder_step,
         force_step=base.force_step,
         delay_samples=int(delay or 0),

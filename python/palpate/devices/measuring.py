@@ -61,6 +61,7 @@ def record(
     *,
     device: str = "simulated",
     object: Model | None = None,
+    force: bool = False,
     probe: bool = False,
     duration_s: float = 10.0,
     rate_hz: float = 1000.0,
@@ -80,7 +81,9 @@ def record(
     Parameters
     ----------
     path : str or Path
-        The recording; it grows as path.part.
+        The recording; it grows as path.part, which is locked while it grows.
+    force : bool
+        Whether an existing recording is replaced; without, it is refused.
     device : str
         ``simulated``, or ``usb[:SERIAL]``.
     object : Model, optional
@@ -103,7 +106,8 @@ def record(
     Returns
     -------
     dict
-        What was done, by name: recorded rows, rate, how it ended, ...
+        What was done, by name: verdict ("good", "usable: ..." or "no: ..."), findings, recorded rows, rate,
+        how it ended, ...
 
     Raises
     ------
@@ -125,6 +129,7 @@ def record(
         device,
         object=object,
         record=str(path),
+        force=force,
         probe=probe,
         duration_s=duration_s,
         rate_hz=rate_hz,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a device and its handle do when it is pushed: sign, delay, inertia and damping."""
+"""What a device and its handle do when it is pushed: sign, delay and mechanics."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from .._typing import Float1D
+from .mechanics import Mechanics, mechanics_of
 
-_MOST_LEFT = 0.05
-"""RMS of what the two numbers leave unexplained, over what they explain; above, they are not told."""
+_LARGE = 0.9
+"""Pushes above this share of the largest one show the sign of the force: they move the handle alike [-]"""
 _FEWEST_PUSHES = 3
 
 
@@ -29,59 +30,57 @@ class Push:
     """Whether the force that the device says it made has the sign of the one that it was told to make."""
     delay_samples: int | None
     """Whole samples from command to force."""
-    inertia: float | None
-    """J [kg or kg*m^2]; None where the motion does not tell."""
-    damping: float | None
-    """b, viscous [N*s/m or N*m*s/rad]."""
+    mechanics: Mechanics | None
+    """Inertia, damping and friction; None where the motion does not tell."""
+    unseen: str = ""
+    """Why the motion does not tell the mechanics."""
 
 
-def push_response(ticks: Mapping[str, Any]) -> Push:
+def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction: float | None = None) -> Push:
     """Read sign, delay and mechanics from the ticks of alternating pushes.
 
     A force F > 0 pushes towards smaller positions. How far a push moved the handle is counted from where the
-    handle would have gone on to by itself, since a hand may be on it. The mechanics J dv/dt = -F - b v of a
-    handle at rest, integrated twice so that nothing is differentiated, are linear in both numbers:
-
-        J (x - x_0) + b int (x - x_0) dt = - int int F dt dt.
-
-    Everything but the delay is in the device's own time: how late the host was does not matter.
+    handle would have gone on to by itself, since a hand may be on it. Everything but the delay is in the
+    device's own time: how late the host was does not matter.
 
     Parameters
     ----------
     ticks : mapping
         ``force`` (sent), ``applied``, ``position``, ``device_time``, ``sequence``: (n,) each.
+    encoder_step : float
+        [m or rad]
+    friction : float, optional
+        Coulomb friction of the device, where it is known [N or N*m].
     """
     fresh = np.concatenate(([True], np.diff(ticks["sequence"].astype(np.int64)) > 0))
     sent, applied, position, time = (
         np.asarray(ticks[name])[fresh] for name in ("force", "applied", "position", "device_time")
     )
     ways: list[float] = []
+    sizes: list[float] = []
     obedience = 0.0
-    columns: list[Float1D] = []
-    targets: list[Float1D] = []
     # A reading tells the force that acted until it was taken: a push begins one reading before it is seen.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     for begin in begins[begins > 2]:  # before the first push nobody knows where the handle goes
         held = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
-        last = min(begin + 2 * held, len(position))
-        rows = slice(begin, last)
         told = float(np.sign(sent[max(0, begin + 1 - held) : begin + 1 + held].sum()))
         obedience += told * float(np.sign(applied[begin + 1]))
         ways.append(-told * _way(time, position, begin, held))
-        moved, seconds = position[rows] - position[begin], np.diff(time[rows])
-        impulse = np.concatenate(([0.0], np.cumsum(applied[begin + 1 : last] * seconds)))
-        columns.append(np.stack([moved, _integral(moved, seconds)], axis=1))
-        targets.append(-_integral(impulse, seconds))
-    inertia, damping = _mechanics(columns, targets)
+        sizes.append(float(np.abs(applied[begin + 1 : begin + 1 + held]).max()))
+    large = [way for way, size in zip(ways, sizes, strict=True) if size >= _LARGE * max(sizes)]
+    ways = large if len(large) >= _FEWEST_PUSHES else ways
+    mechanics, unseen = mechanics_of(
+        {"applied": applied, "position": position, "device_time": time}, encoder_step, friction
+    )
     enough = len(ways) >= _FEWEST_PUSHES
     return Push(
         moved=float(np.mean(ways)) if ways else 0.0,
         unsure=float(np.std(ways, ddof=1)) / math.sqrt(len(ways)) if enough else math.inf,
         obeyed=obedience >= 0.0,
         delay_samples=_delay(ticks),
-        inertia=inertia,
-        damping=damping,
+        mechanics=mechanics,
+        unseen=unseen,
     )
 
 
@@ -92,26 +91,9 @@ def _way(time: Float1D, position: Float1D, begin: int, held: int) -> float:
     return float(position[end] - hand(time[end]))
 
 
-def _mechanics(columns: list[Float1D], targets: list[Float1D]) -> tuple[float | None, float | None]:
-    """Least squares; nothing where the two numbers do not explain the motion."""
-    if not columns:
-        return None, None
-    A, y = np.concatenate(columns), np.concatenate(targets)
-    fit, *_ = np.linalg.lstsq(A, y, rcond=None)
-    left = float(np.linalg.norm(A @ fit - y)) / max(float(np.linalg.norm(y)), 1e-300)
-    if fit[0] <= 0.0 or fit[1] < 0.0 or left > _MOST_LEFT:
-        return None, None
-    return float(fit[0]), float(fit[1])
-
-
 def _delay(ticks: Mapping[str, Any]) -> int | None:
     """Samples from a command to the first reading whose force is it, less the one that each command takes."""
     sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
     begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
     delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]
     return int(np.median(delays)) if delays else None
-
-
-def _integral(values: Float1D, seconds: Float1D) -> Float1D:
-    """Trapezoids from the first value on."""
-    return np.concatenate(([0.0], np.cumsum(0.5 * seconds * (values[1:] + values[:-1]))))

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 
+from ..recording.files import replacing
 from .errors import DeviceError
 
 RULE = "60-palpate.rules"
@@ -43,9 +44,8 @@ def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
         again = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
         raise DeviceError(f"writing {target} needs root; run: {again}")
     text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
-    beside = target.with_suffix(".new")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(target)
+    with replacing(target) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     tell(f"wrote {target}:")
     tell(text.splitlines()[-1])
     for command in _RELOAD:

@@ -120,7 +120,7 @@ def decode_info(data: bytes) -> DeviceInfo:
     return DeviceInfo(
         firmware=firmware,
         counts_per_rev=counts,
-        max_torque=1e-6 * max_torque,
+        max_torque=max_torque / 1e6,
         rate_hz=rate,
         watchdog_ms=watchdog,
         transducer=bool(capabilities & _TRANSDUCER),

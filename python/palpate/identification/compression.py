@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .._typing import Float1D, Float2D
 from .distinct import distinct_rows
+from .limits import NO_LIMITS, RowLimits
 
 SIDE_LEVELS = 16
 """Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
@@ -50,6 +51,8 @@ class Compressed:
     """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
     samples: float
     """Rows of the recording that are stood for, or the sum of their weights"""
+    limits: RowLimits = NO_LIMITS
+    """What limits the information in the samples"""
 
     def standing_for(self, samples: float) -> "Compressed":
         """The same rows, standing for that many samples."""
@@ -70,6 +73,8 @@ class Compressor:
         Samples that each row stands for, >= 0; 1 without it. A row of weight 0 is no row.
     within : float
         Sum of squares about the rows themselves, where they stand for several samples.
+    limits : RowLimits
+        What limits the information in the samples.
     """
 
     def __init__(
@@ -80,8 +85,9 @@ class Compressor:
         max_positions: int,
         weight: Float1D | None = None,
         within: float = 0.0,
+        limits: RowLimits = NO_LIMITS,
     ) -> None:
-        self._within = within
+        self._within, self._limits = within, limits
         self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
         """The rows that stand for all."""
         self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
@@ -137,7 +143,7 @@ class Compressor:
             part, _ = _ranked(self._key * SIDE_PARTS // (int(self._key.max()) + 1), weight)
             dy = _without_slopes(dy, ds[:, None], part, weight)
         within = self._within + float(dy @ (weight * dy))
-        return Compressed(x, y, count, merged_side, spread, within, float(weight.sum()))
+        return Compressed(x, y, count, merged_side, spread, within, float(weight.sum()), self._limits)
 
     def _part(self, rows: NDArray[np.bool_]) -> "Compressor":
         """The same cells with fewer rows."""

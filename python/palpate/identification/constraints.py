@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constraints that hold over a whole domain: h >= 0 and slope bounds; a force fixed at a place (one input).
+"""Constraints over a domain of one input: h >= 0, slope bounds, a fixed force, equal ends of a period.
 
 Each is a bound on a *reading* of the network, a combination of its channels or the slope of one, at every
 position of the domain. The least squares is solved with the bound imposed where it was found violated.
@@ -62,6 +62,15 @@ class Bound:
     """How much of the reading weighs as much as a force of 1: 1 for a force"""
     at: float | None = None
     """The only position where it holds [box]; None: everywhere"""
+    seam: bool = False
+    """The reading is the difference between the two ends of the box: 0 for a force that repeats"""
+
+    def columns(self, basis: Basis, x: Float1D) -> Float2D:
+        """(k, 2 + N) the reading at positions (k,) of one channel, as a combination of its coefficients."""
+        if not self.seam:
+            return _columns(basis, self.of_slope, x)
+        lower, upper = _columns(basis, self.of_slope, np.array([0.0, 1.0]))
+        return np.tile(upper - lower, (len(x), 1))
 
     def channels(self, problem: SeparableProblem) -> Float1D:
         """The reading as a combination of the problem's channels."""
@@ -74,13 +83,22 @@ def domain_bounds(
     hysteresis: bool,
     slopes: tuple[float, float] | None,
     fixed: tuple[float, float] | None = None,
+    periodic: bool = False,
 ) -> list[Bound]:
     """The bounds in force: h >= 0, and (min, max) of the slope [force/box] of the strokes g + h and g - h.
 
     With fixed, (position [box], force), g goes through that point: a bound from above and one from below.
+    With periodic, g (and h) and their slopes are equal at both ends of the box.
     """
     two = len(problem.readout) == 2
     bounds = []
+    if periodic:
+        bounds += [
+            Bound(part, of_slope, "one period", sign, 0.0, 0.0, seam=True)
+            for part in ([(1.0, 0.0), (0.0, 1.0)] if two else [(1.0,)])
+            for of_slope in (False, True)
+            for sign in (1.0, -1.0)
+        ]
     if fixed is not None:
         g = (1.0, 0.0) if two else (1.0,)
         bounds += [Bound(g, False, "fixed force", sign, fixed[1], 0.0, fixed[0]) for sign in (1.0, -1.0)]
@@ -105,6 +123,7 @@ def moved_to_bounds(
     What the bounds forbid is no longer in these rows, so that a network grown on them has its wavelets where
     the bounded force law needs them. h is projected pointwise, h := max(h, 0), slopes by isotonic regression.
     """
+    bounds = [bound for bound in bounds if not bound.seam]
     grid = np.linspace(0.0, 1.0, GRID + 1)
     readings = problem.readout @ solution.coefficients @ _columns(solution.basis, False, grid).T
     before = readings.copy()
@@ -135,7 +154,7 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
         if not any(len(x) for _, x in found):
             return current
         for bound, x in found:
-            reading = np.kron(bound.channels(problem), _columns(free.basis, bound.of_slope, x))
+            reading = np.kron(bound.channels(problem), bound.columns(free.basis, x))
             rows.append(np.asarray(bound.sign * reading, dtype=np.float64))
             limits.append(np.full(len(x), bound.sign * bound.limit + margin * bound.unit))
         coefficients = _least_squares(problem, free, np.concatenate(rows), np.concatenate(limits))
@@ -148,11 +167,11 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
     weights = bound.channels(problem) @ solution.coefficients
 
     def excess(x: Float1D) -> Float1D:
-        reading = _columns(solution.basis, bound.of_slope, x) @ weights
+        reading = bound.columns(solution.basis, x) @ weights
         return np.asarray(bound.sign * (reading - bound.limit))
 
-    if bound.at is not None:
-        here = np.array([bound.at])
+    if bound.at is not None or bound.seam:
+        here = np.array([bound.at or 0.0])
         return here[excess(here) < -POINT_TOLERANCE * problem.force_range]
     edges = np.linspace(0.0, 1.0, CELLS + 1)
     left, right = edges[:-1], edges[1:]
@@ -258,8 +277,9 @@ def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Flo
 
 def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequence[Bound]) -> Solution:
     """As much of the solution as keeps all bounds, the rest a straight line well inside this convex set."""
-    lows = [bound.limit for bound in bounds if bound.of_slope and bound.sign > 0]
-    highs = [bound.limit for bound in bounds if bound.of_slope and bound.sign < 0]
+    everywhere = [bound for bound in bounds if not bound.seam]
+    lows = [bound.limit for bound in everywhere if bound.of_slope and bound.sign > 0]
+    highs = [bound.limit for bound in everywhere if bound.of_slope and bound.sign < 0]
     inside = {
         (False, False): 0.0,
         (True, False): max(lows, default=0.0) + problem.force_range,
@@ -267,7 +287,7 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
         (True, True): 0.5 * (max(lows, default=0.0) + min(highs, default=0.0)),
     }
     readings = np.zeros((len(problem.readout), solution.coefficients.shape[1]))
-    readings[0, 1] = inside[bool(lows), bool(highs)]
+    readings[0, 1] = 0.0 if any(bound.seam for bound in bounds) else inside[bool(lows), bool(highs)]
     for bound in bounds:
         if bound.at is not None:
             readings[0, 0] = bound.limit - readings[0, 1] * bound.at

@@ -13,6 +13,26 @@ WORTH_TELLING = 3.0
 """RMS errors that release has to lie above press."""
 
 
+STEEP = 2.0
+"""Ratio of the slope where release lies above press to the mean slope, from which a force is late."""
+
+
+def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
+    """True if release lies above press mainly where the force is steep, as a late force makes it.
+
+    A force that is late by t makes h smaller by the slope times speed and t.
+    """
+    places = np.linspace(0.0, 1.0, GRID)
+    columns = _core.wavelet_columns(places, free.basis.alpha, free.basis.beta)
+    slopes = _core.wavelet_slope_columns(places, free.basis.alpha, free.basis.beta)
+    (_, slope, *of_g), (bias, tilt, *of_h) = problem.readout @ free.coefficients
+    steepness = np.abs(slope + slopes @ np.asarray(of_g))
+    above = np.maximum(-(bias + tilt * places + columns @ np.asarray(of_h)), 0.0)
+    if not above.any():
+        return False
+    return bool(np.average(steepness, weights=above**2) > STEEP * np.mean(steepness))
+
+
 def crossing(problem: SeparableProblem, free: Solution, lower: float, reach: float) -> str:
     """How far release lies above press at most, and where, as the end of a sentence; empty where hardly.
 

@@ -20,6 +20,7 @@ from ..recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_p
 from .folded_regression import FOLDS, NAMES, FoldedRegression
 from .gram import solve_gram
 from .options import IdentifyOptions
+from .periodic import modulo
 from .separable import RESOLVED, TINY, Basis
 from .stopping import ON_FRESH_ROWS
 
@@ -34,6 +35,9 @@ LEAST_SPREAD = 0.19
 v is hardly more than its sign, and damping no other than friction."""
 
 TOO_SHORT = "velocity and mass were not tried: the motion between gaps of time is too short, or too noisy"
+
+SLOW = 0.1
+"""Speed at which the smoothed sign of the velocity is tanh(1), as a share of the RMS speed."""
 
 MOST_ROWS = 20_000
 """Rows that are enough to see what a residual depends on."""
@@ -81,13 +85,17 @@ class Dynamics:
         Corner and length of the box of positions.
     n : int
         Rows of all recordings.
+    periodic : bool
+        Positions are taken modulo reach.
     """
 
-    def __init__(self, parts: Sequence[Piece], lower: float, reach: float, n: int) -> None:
+    def __init__(
+        self, parts: Sequence[Piece], lower: float, reach: float, n: int, *, periodic: bool = False
+    ) -> None:
         low_pass = quiet_low_pass(parts, order=2) if parts else None
         self._low_pass = low_pass or LowPass(1.0)
         self._parts = [] if low_pass is None else long_enough(parts, low_pass)
-        self._lower, self._reach, self._n = lower, reach, n
+        self._lower, self._reach, self._n, self._periodic = lower, reach, n, periodic
         self._step = max(1, int(1.0 / (PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
@@ -181,19 +189,31 @@ class Dynamics:
         """L v at every row (n,), and the rows (n,) that have one."""
         return at_rows(self._parts, self._low_pass, lambda part: part.velocity, self._n)
 
-    def left_to_velocity(self, residual: Float1D, box: Float2D, basis: Basis) -> float:
-        """Share of a residual (n,) that v psi_i(x), v x, v and v|v| explain: what a constant damping cannot.
+    def left_to_velocity(
+        self, residual: Float1D, box: Float2D, basis: Basis, *, friction: bool = False
+    ) -> float:
+        """Share of a residual (n,) that functions of velocity and position explain.
 
-        box (n, 1) are the positions, and the wavelets those of the force over position.
+        These are v|v|, and v times 1, x and psi_i(x). With friction, the smoothed sign of v takes part as v
+        does. box (n, 1) are the positions, and the wavelets those of the force over position. The share is
+        corrected for the number of functions.
         """
         velocity, known = self.velocity()
         rows = np.flatnonzero(known)[:: max(1, -(-int(known.sum()) // MOST_ROWS))]
         v, r, x = velocity[rows, None], residual[rows], box[rows]
-        columns = np.concatenate(
-            [v, v * np.abs(v), v * x, v * _core.wavelet_columns(x, basis.alpha, basis.beta)], 1
-        )
-        product = columns.T @ r
-        return float(product @ solve_gram(columns.T @ columns, product) / max(float(r @ r), TINY))
+        if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
+            return 0.0
+        over_x = np.concatenate([np.ones_like(x), x, _core.wavelet_columns(x, basis.alpha, basis.beta)], 1)
+        columns = [v * np.abs(v), v * over_x]
+        if friction:
+            slow = SLOW * float(np.sqrt(np.mean(v * v)))
+            columns.append(np.tanh(v / slow) * over_x)
+        table = np.concatenate(columns, 1)
+        product = table.T @ r
+        share = float(product @ solve_gram(table.T @ table, product) / max(float(r @ r), TINY))
+        if not friction:
+            return share
+        return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
 
     def _spread_of_speeds(self) -> float:
         """Standard deviation of |v| over its mean, both along the way: rests and turns hardly count there."""
@@ -207,6 +227,7 @@ class Dynamics:
         done = 0
         for part, fixed in zip(self._parts, self._fixed, strict=True):
             box = (part.position - self._lower) / self._reach
+            box = modulo(box) if self._periodic else box
             plain = np.concatenate(
                 [np.ones((len(box), 1)), box[:, None], _core.wavelet_columns(box, basis.alpha, basis.beta)],
                 axis=1,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float2D
+from ..arguments import number_of
 from ..errors import InputError
 from .distinct import distinct_rows
 from .options import IdentifyOptions
@@ -52,11 +53,12 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     palpate.InputError
         Naming the argument that is out of its range.
     """
-    if not (np.isfinite(a0) and a0 > 1.0):
+    a0, b0, whole = number_of("a0", a0), number_of("b0", b0), number_of("voices", voices)
+    if not a0 > 1.0:
         raise InputError(f"a0 is {a0!r}; the ratio of neighbouring dilations must be a finite number above 1")
-    if not (np.isfinite(b0) and b0 > 0.0):
+    if not b0 > 0.0:
         raise InputError(f"b0 is {b0!r}; the translation step must be a finite number above 0")
-    if isinstance(voices, bool) or int(voices) != voices or voices < 1:
+    if int(whole) != whole or whole < 1:
         raise InputError(f"voices is {voices!r}; it must be a whole number of 1 or more")
     # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, whatever the voice
     levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)

@@ -16,6 +16,9 @@ EVERY = 5
 BLOCKS = 50
 """A motion is kept back in stretches, of which there are so many in all: neighbours in time are no news."""
 
+TRIM = 0.1
+"""Share of the groups at each end that a robust gain leaves out."""
+
 MOST_ROWS = 20_000
 """More fresh rows than this are thinned out evenly: they tell no more."""
 
@@ -74,13 +77,26 @@ def kept_back(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
     return np.asarray(index * BLOCKS // n % EVERY == EVERY // 2)
 
 
-def gain(below: Float1D, above: Float1D) -> tuple[float, float]:
+def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:
+    """Rows (k, d) that lie within the range of other rows (m, d) in every input: True where they do (k,)."""
+    if len(others) == 0:
+        return np.zeros(len(rows), dtype=np.bool_)
+    within: NDArray[np.bool_] = (rows >= others.min(axis=0)) & (rows <= others.max(axis=0))
+    return np.asarray(within.all(axis=1))
+
+
+def gain(below: Float1D, above: Float1D, *, trim: float = 0.0) -> tuple[float, float]:
     """Fall of the mean squared error from errors below (k,) to above (k,) as a share, and its standard error.
 
-    The rows are taken in BLOCKS groups, so that errors that belong together count once.
+    The rows are taken in BLOCKS groups, so that errors that belong together count once. With trim, this share
+    of the groups is left out at both ends: where the error grows most and where it falls most.
     """
     square = np.array([below * below, above * above])
     groups = np.array([part.mean(axis=1) for part in np.array_split(square, min(BLOCKS, len(below)), axis=1)])
+    if trim:
+        cut = int(np.ceil(trim * len(groups)))
+        order = np.argsort(groups[:, 1] - groups[:, 0], kind="stable")
+        groups = groups[order[cut : len(groups) - cut]]
     before, after = groups.mean(axis=0)
     if before == 0.0:
         return 0.0, 0.0

@@ -16,6 +16,7 @@ from ..errors import InputError
 from .frame import resolved_frame
 from .fresh import FreshRows
 from .options import IdentifyOptions
+from .progress import report
 from .quasi_newton import refine_all
 from .refinement import refine
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
@@ -83,7 +84,7 @@ def judge(problem: SeparableProblem, solution: Solution, options: IdentifyOption
     """Criterion of a solution: the smaller the better."""
     p = problem.n_parameters(len(solution.basis))
     if options.criterion not in ON_FRESH_ROWS:
-        return deviance(options.criterion, problem.total(solution.rss), problem.samples, p)
+        return problem.deviance(options.criterion, solution.rss, p)
     if problem.fresh is None:
         raise InputError(f"criterion is {options.criterion!r}, but no rows were kept back to judge on")
     return fresh_deviance(options.criterion, problem.fresh, problem.fresh_errors(solution, problem.fresh))
@@ -111,6 +112,7 @@ def grow(
     they leave a fraction of the error, or where neighbours agree about what is left and the criterion falls
     as for a rung of the ladder. A smooth force over several inputs is left to wide wavelets. All that is for
     a force known to be a single one, not for wavelets that stay on the frame, nor where fresh rows judge.
+    Noise that is correlated, and the steps of a force, look like structure and are not.
     """
     coarse = not options.refine or options.selection == "backward" or options.criterion in ON_FRESH_ROWS
     free = single and not coarse and problem.n_channels == 1
@@ -118,6 +120,9 @@ def grow(
     found = _grown(problem, library, start, rung, options, wide=wide)
     settled = wide and _little(problem, problem.rmse(found.solution))
     if not free or settled or len(found.solution.basis) == 0:
+        return found
+    limits = problem.limits
+    if limits.independent < 1.0 or problem.rmse(found.solution) <= WORTH_FINER * limits.force_error:
         return found
     alike = problem.likeness(found.solution) > ALIKE
     if problem.resolved_by <= WITHOUT_NOISE or not (alike or problem.evenness(found.solution) < EVEN):
@@ -157,6 +162,7 @@ def _grown(
     path, grown = [_point(problem, current, rung, options)], [current]
     best, since, stop_reason = path[0].criterion, 0, "max_wavelets"
     while len(current.basis) < options.max_wavelets:
+        report(rung, len(current.basis))
         if enough(options.criterion, path[-1].criterion) or options.selection == "backward":
             stop_reason = options.criterion
             break
@@ -242,8 +248,8 @@ def prune(problem: SeparableProblem, start: Solution, options: IdentifyOptions) 
 def _price(problem: SeparableProblem, solution: Solution, options: IdentifyOptions) -> float:
     """What the criterion charges for one of the solution's wavelets."""
     price, n = CRITERIA[options.criterion], len(solution.basis)
-    return price(problem.samples, problem.n_parameters(n)) - price(
-        problem.samples, problem.n_parameters(n - 1)
+    return price(problem.independent, problem.n_parameters(n)) - price(
+        problem.independent, problem.n_parameters(n - 1)
     )
 
 
@@ -256,7 +262,7 @@ def _with_candidate(
     of them as well, and a few that differ are refined a little before one is taken: what fits best unrefined
     often ends in a worse minimum.
     """
-    if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.samples:
+    if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.independent:
         return None
     measured = residual_gains if options.selection == "residual" else orthogonal_gains
     gains = measured(library, current)

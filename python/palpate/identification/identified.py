@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import _core
 from .._typing import Float1D, Float2D
+from ..verdict import Finding
 from .growth import PathPoint
 from .separable import Solution
 
@@ -60,6 +61,10 @@ class IdentifiedNetwork:
     """Every network that was considered"""
     notes: tuple[str, ...]
     """Sentences: what was refused, left out, or imposed at what price"""
+    independent_rows: float = np.inf
+    """Rows of the identification, fewer where repeats or correlated noise make them depend on each other"""
+    findings: tuple[Finding, ...] = ()
+    """Reservations for the verdict"""
 
 
 @dataclass(frozen=True)

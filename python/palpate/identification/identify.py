@@ -1,62 +1,111 @@
 # SPDX-License-Identifier: Apache-2.0
 """identify: from recordings to a model."""
 
-from collections.abc import Mapping, Sequence
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, replace
 from typing import Any
 
+import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
-from ..recording import Recording, Source
+from ..recording import Source
+from ..recording.given import Given, recordings_from
+from ..verdict import Verdict
 from .environment import VELOCITY_INPUTS, fit_environment
 from .identified import IdentifiedNetwork
 from .inputs import observations
-from .options import IdentifyOptions, options_from
+from .isolated import without_isolated
+from .judgement import verdict_of
+from .options import RESERVED_INPUTS, IdentifyOptions, described_fields, kind_of, options_from
 
 
-def identify(recording: Recording | Sequence[Recording], **options: Any) -> Model:
-    """Identify the environment behind recorded force over position.
+def identify(
+    recording: Given | Iterable[Given] | npt.ArrayLike,
+    force: npt.ArrayLike | None = None,
+    *,
+    time: npt.ArrayLike | None = None,
+    direction: npt.ArrayLike | None = None,
+    **options: Any,
+) -> Model:
+    """Identifies a model of force over position from recordings.
 
-    Climbs the ladder constant, linear, position, hysteresis, as far as each rung earns its place. A recording
-    with further inputs gives a force of them all (constant, linear, network).
+    Tries the model classes constant, linear, position and hysteresis, and takes the simplest that the data
+    supports. A recording with further inputs gives a force over all of them (constant, linear, network).
 
     Parameters
     ----------
-    recording : Recording or sequence of Recording
-        Several recordings of one environment are identified together; their units must agree.
-    **options
-        Fields of :class:`IdentifyOptions`.
-
+    recording : Recording, path, DataFrame, a list of these, or (n,) array_like
+        Several recordings of one object are identified together; their units must agree. With `force` it is
+        the array of positions [m or rad], which grow into the object.
+    force : (n,) array_like, optional
+        Force of the object against the tool [N or N*m].
+    time : (n,) array_like, optional
+        Time of each position in an array [s], strictly increasing.
+    direction : (n,) array_like, optional
+        +1 into the object, -1 out of it, 0 neither, for each position in an array. Where neither time nor
+        direction is known, strokes are taken from the order of rows.
+    {options}
     Returns
     -------
     Model
-        ``model.fit`` says which rung was reached and why growth stopped, ``model.path`` holds every network
-        on the way, ``model.notes["identification"]`` what was refused, left out or imposed at what price.
+        ``model.verdict`` judges it. ``model.fit`` holds its class and why growth stopped, ``model.path``
+        every network that was considered, ``model.notes["identification"]`` what was refused or left out.
 
     Raises
     ------
     palpate.InputError
         For an unknown option or a bad value, and for data that give no force over position.
+
+    Examples
+    --------
+    >>> import numpy as np, palpate
+    >>> position = np.linspace(0.0, 0.01, 200)
+    >>> palpate.identify(position, 500.0 * position).n_wavelets
+    0
     """
     settings = options_from(options)
-    recordings = [recording] if isinstance(recording, Recording) else list(recording)
-    if not recordings:
-        raise InputError("identify was given no recording; give one, or a list of them")
+    inputs = () if settings.inputs == "auto" else settings.inputs
+    further = [name for name in inputs if name not in RESERVED_INPUTS]
+    recordings = recordings_from(recording, force, time, direction, inputs=further)
     units = dict(recordings[0].units)
     for other in recordings[1:]:
         if dict(other.units) != units:
             raise InputError(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify them apart"
             )
+    recordings, isolated = without_isolated(recordings)
     seen = observations(recordings, settings)
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
             seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
         )
+    network = replace(
+        network, notes=seen.notes + network.notes, findings=(*isolated, *seen.findings, *network.findings)
+    )
     source = Source.merged(part.source for part in recordings)
-    return model_of(network, recordings[0].units, source, settings, seen.notes)
+    verdict = verdict_of(network, recordings)
+    return model_of(network, recordings[0].units, source, settings, verdict)
+
+
+def _show_options() -> None:
+    """Writes the fields of `IdentifyOptions` into the signature and the help of :func:`identify`."""
+    signature = inspect.signature(identify)
+    keyword, given = inspect.Parameter.KEYWORD_ONLY, list(signature.parameters.values())[:-1]
+    options = [
+        inspect.Parameter(each.name, keyword, default=each.default, annotation=kind_of(each))
+        for each in fields(IdentifyOptions)
+    ]
+    identify.__signature__ = signature.replace(parameters=given + options)  # type: ignore[attr-defined]
+    identify.__doc__ = inspect.cleandoc(identify.__doc__ or "").replace("{options}", described_fields())
+
+
+_show_options()
 
 
 def model_of(
@@ -64,10 +113,9 @@ def model_of(
     units: Mapping[str, str],
     source: Source,
     options: IdentifyOptions,
-    notes: Sequence[str] = (),
+    verdict: Verdict,
 ) -> Model:
-    """The model of an identified network."""
-    notes = [*notes, *network.notes]
+    """The model of an identified network, with the verdict on it."""
     path: list[PathStep] = [
         {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
         for at in network.path
@@ -101,7 +149,7 @@ def model_of(
             path=path,
         ),
         data=source,
-        notes={"identification": notes} if notes else None,
+        notes={"identification": list(network.notes), "verdict": verdict.record()},
     )
 
 

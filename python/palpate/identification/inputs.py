@@ -11,8 +11,10 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..recording import Recording
 from ..recording.motion import Piece, pieces, velocity
+from ..verdict import Finding
 from .options import IdentifyOptions
 from .paper import paper_target
+from .strokes import strokes_of
 
 
 @dataclass(frozen=True)
@@ -26,12 +28,14 @@ class Observations:
     force: Float1D
     """(n,)"""
     side: Float1D | None
-    """(n,) direction of the stroke, where every recording says it"""
+    """(n,) direction of the stroke: stated by every recording, or taken from the order of its rows"""
     starts: tuple[int, ...] | None
     """Rows at which a recording begins, where every one has time"""
     parts: tuple[Piece, ...]
     """The motion between gaps of time, where every recording has time; rows count over all recordings"""
     notes: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
+    """Reservations for the verdict"""
 
 
 def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> Observations:
@@ -62,16 +66,18 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
             for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
             for piece in pieces(recording)
         )
+    findings: tuple[Finding, ...] = ()
     if side is None and all(part.time is not None for part in recordings):
         starts = _starts(recordings, kept)
-    elif side is None and any(part.direction is not None or part.time is not None for part in recordings):
-        notes += ("hysteresis was not tried: every recording has to have a direction, or every one time",)
+    elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
+        strokes = strokes_of(recordings, named=options.inputs != "auto")
+        side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
     if options.filters == "matched":
         forces = [part.force for part in recordings]
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
-    return Observations(names, np.concatenate(columns), force, side, starts, parts, notes)
+    return Observations(names, np.concatenate(columns), force, side, starts, parts, notes, findings)
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:

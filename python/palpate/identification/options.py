@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The settings of an identification: every default lives here and nowhere else."""
 
+import ast
+import inspect
 import math
+import textwrap
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
+from ..arguments import shown
 from ..errors import InputError
 from .stopping import CRITERIA
 
@@ -94,6 +101,8 @@ class IdentifyOptions:
     """Period of an environment that repeats, such as a knob [position]"""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.inputs, str):
+            _require_names(self.inputs)
         if self.inputs != "auto":
             names = self.inputs.split(",") if isinstance(self.inputs, str) else self.inputs
             object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
@@ -103,15 +112,21 @@ class IdentifyOptions:
                     "depends on: hysteresis, velocity, columns"
                 )
         for name, words in WORDS.items():
-            if getattr(self, name) not in words:
-                raise InputError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(words)}")
+            if not isinstance(value := getattr(self, name), str) or value not in words:
+                raise InputError(f"{name} is {shown(value)}; it must be one of {', '.join(words)}")
+        for name in _TRUE_OR_FALSE:
+            if not isinstance(value := getattr(self, name), (bool, np.bool_)):
+                raise InputError(f"{name} is {shown(value)}; it must be True or False")
         for name, least in _WHOLE_NUMBERS.items():
             value = getattr(self, name)
             if not isinstance(value, int) or isinstance(value, bool) or value < least:
-                raise InputError(f"{name} is {value!r}; it must be a whole number of {least} or more")
+                raise InputError(f"{name} is {shown(value)}; it must be a whole number of {least} or more")
         for name, above in _NUMBERS.items():
             _require_number(name, getattr(self, name), above)
-        for radius in self.play_radius:
+        radii: object = self.play_radius
+        if not isinstance(radii, (tuple, list)) or not radii:
+            raise InputError(f"play_radius is {shown(radii)}; it must be a tuple of shares of the travel")
+        for radius in radii:
             _require_number("play_radius", radius, 0.0)
         self._require_possible_slopes()
 
@@ -127,9 +142,9 @@ class IdentifyOptions:
 
     def _require_possible_slopes(self) -> None:
         bounds: tuple[float, ...] | None = self.slope_bounds
-        if bounds is not None and not (len(bounds) == 2 and bounds[0] < bounds[1]):
+        if bounds is not None and not (_is_pair(bounds) and bounds[0] < bounds[1]):
             raise InputError(
-                f"slope_bounds is {self.slope_bounds!r}; it must be (min, max) with min below max"
+                f"slope_bounds is {shown(self.slope_bounds)}; it must be (min, max) with min below max"
             )
         limits = self.slope_limits
         if limits is not None and not limits[0] < limits[1]:
@@ -138,9 +153,12 @@ class IdentifyOptions:
                 f"but allow no more than {limits[1]:g}"
             )
         fixed: tuple[float, ...] | None = self.fixed_force
-        if fixed is not None and not (len(fixed) == 2 and all(map(math.isfinite, fixed))):
-            raise InputError(f"fixed_force is {self.fixed_force!r}; it must be (position, force)")
+        if fixed is not None and not (_is_pair(fixed) and all(map(math.isfinite, fixed))):
+            raise InputError(f"fixed_force is {shown(self.fixed_force)}; it must be (position, force)")
 
+
+_TRUE_OR_FALSE = ("refine", "hysteresis_nonnegative", "monotone")
+"""Settings that are on or off."""
 
 _WHOLE_NUMBERS = {
     "max_wavelets": 0,
@@ -166,6 +184,35 @@ _NUMBERS = {
 """Real settings and what they must lie above."""
 
 
+def kind_of(field: Field[Any]) -> str:
+    """The type of a field as text."""
+    return field.type if isinstance(field.type, str) else inspect.formatannotation(field.type)
+
+
+def described_fields() -> str:
+    """The fields of :class:`IdentifyOptions` as a list of parameters, from the texts beneath them."""
+    try:
+        tree = ast.parse(inspect.getsource(IdentifyOptions)).body[0]
+    except (OSError, SyntaxError):  # an installation without its source
+        tree = ast.Pass()
+    texts: dict[str, str] = {}
+    for field, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else []):
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
+            texts[ast.unparse(field.target)] = inspect.cleandoc(ast.literal_eval(text.value))
+    return "".join(
+        f"{each.name} : {kind_of(each)}, default {each.default!r}\n"
+        + textwrap.indent(texts.get(each.name, "") + "\n", "    ")
+        for each in fields(IdentifyOptions)
+    )
+
+
+IdentifyOptions.__doc__ = f"""{inspect.cleandoc(IdentifyOptions.__doc__ or "")}
+
+Parameters
+----------
+{described_fields()}"""
+
+
 def options_from(keywords: Mapping[str, Any]) -> IdentifyOptions:
     """Options from keywords; a keyword that does not exist is told in one sentence."""
     known = [field.name for field in fields(IdentifyOptions)]
@@ -181,4 +228,19 @@ def _require_number(name: str, value: Any, above: float) -> None:
     number = math.nan if isinstance(value, bool) or not isinstance(value, (int, float)) else float(value)
     if not math.isfinite(number) or not number > above:
         bound = f" above {above:g}" if math.isfinite(above) else ""
-        raise InputError(f"{name} is {value!r}; it must be a finite number{bound}")
+        raise InputError(f"{name} is {shown(value)}; it must be a finite number{bound}")
+
+
+def _require_names(inputs: object) -> None:
+    if not isinstance(inputs, (tuple, list)) or not all(isinstance(name, str) for name in inputs):
+        raise InputError(f'inputs is {shown(inputs)}; it must be "auto" or a tuple of names')
+
+
+def _is_pair(values: object) -> bool:
+    """True for two real numbers."""
+    is_number = (int, float, np.integer, np.floating)
+    return (
+        isinstance(values, (tuple, list))
+        and len(values) == 2
+        and all(isinstance(value, is_number) and not math.isnan(value) for value in values)
+    )

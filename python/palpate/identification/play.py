@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from .._typing import Float1D
 from .evidence import Evidence
 from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
@@ -38,13 +39,17 @@ class PlaySearch:
     ----------
     evidence : Evidence
         Of one position.
+    path : (n,)
+        Positions as they were moved through, not taken modulo a period.
     starts : sequence of int
         Rows at which a motion starts.
     options : IdentifyOptions
     """
 
-    def __init__(self, evidence: Evidence, starts: Sequence[int], options: IdentifyOptions) -> None:
-        self._evidence, self._starts, self._options = evidence, list(starts), options
+    def __init__(
+        self, evidence: Evidence, path: Float1D, starts: Sequence[int], options: IdentifyOptions
+    ) -> None:
+        self._evidence, self._path, self._starts, self._options = evidence, path, list(starts), options
 
     def best_tried(self, basis: Basis) -> HysteresisInput | None:
         """The hysteresis input of that radius of the options which helps most on given wavelets.
@@ -89,7 +94,7 @@ class PlaySearch:
         return replace(rung, strokes=self._of(rung.play_radius, first.tolist()))
 
     def _of(self, radius: float, first: Sequence[float] | None = None) -> HysteresisInput:
-        motions = np.split(self._evidence.box[:, 0], self._starts[1:])
+        motions = np.split(self._path, self._starts[1:])
         return HysteresisInput.of_play(motions, radius, first)
 
     @cached_property

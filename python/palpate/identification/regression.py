@@ -23,14 +23,20 @@ from .fresh import FreshRows, kept_back
 from .growth import PathPoint, grow
 from .identified import Readings
 from .options import IdentifyOptions
-from .robust import robust_weights
+from .robust import robust_weights, suspects
+from .row_error import RowError
 from .rung import Rung
+from .scaling import ForceScale
 from .selection import Library
 from .separable import Basis, SeparableProblem, Solution, problem_of
 from .stopping import ON_FRESH_ROWS
+from .usable import LARGEST
 
 NARROWEST = 1e-12
 """A column whose range is below this share of its largest value is constant but for rounding."""
+
+MOST_ROWS = 200_000
+"""Rows, evenly spread, that the error is computed on: more change its third digit at most."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,17 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
     if not counted.any():
         raise InputError("the sample weights are all zero; at least one row must count")
     X, y, weight = X[counted], y[counted], weight[counted]
+    largest = max(float(np.abs(X).max()), float(np.abs(y).max()))
+    if largest > LARGEST:
+        raise InputError(f"the data hold {largest:.3g}; the limit is {LARGEST:g}. Use other units")
+    if scale := ForceScale.of(y, options):
+        scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
+        return replace(
+            scaled,
+            readings=scale.unscaled_readings(scaled.readings),
+            rmse=scaled.rmse / scale.factor,
+            path=tuple(replace(point, rmse=point.rmse / scale.factor) for point in scaled.path),
+        )
     reach = np.ptp(X, axis=0)
     varies = reach > NARROWEST * np.abs(X).max(axis=0)
     # a network needs an input: where none varies, the first stands in a box of its own width
@@ -92,6 +109,8 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
         raise InputError(f"criterion {options.criterion!r} keeps rows back; {len(y)} are too few for that")
     with threadpool_limits(limits=1, user_api="blas"):
         found, path = _fitted(_Rows(box, y, fresh), weight, options)
+        rows = slice(None, None, max(1, -(-len(y) // MOST_ROWS)))
+        error = RowError(y[rows] - found.modelled(box[rows]), y[rows], weight[rows])
         readings = Readings.of(found.solution, found.problem.readout, lower, upper - lower)
     margin = _margin(box) * (upper - lower)
     return Regression(
@@ -102,7 +121,7 @@ def fit_regression(X: Float2D, y: Float1D, weight: Float1D | None, options: Iden
         rung=found.name,
         stop_reason=found.stop_reason,
         n_parameters=found.n_parameters,
-        rmse=found.rmse,
+        rmse=error.rmse,
         path=tuple(path),
     )
 
@@ -142,6 +161,10 @@ class _Rows:
 def _fitted(data: _Rows, weight: Float1D, options: IdentifyOptions) -> tuple[Rung, list[PathPoint]]:
     """Climb with cells that are fine enough, again with outliers weighed down where that is asked for."""
     cells = options.max_positions * 2 ** (data.box.shape[1] - 1)
+    given, robust = weight, options.loss == "huber"
+    suspect = suspects(data.box, data.y, None, weight) if robust else np.zeros(len(weight), dtype=bool)
+    if robust:
+        weight = np.where(suspect, 0.0, weight)
     best, path = _climbed(data, weight, cells, options, Basis.empty(data.box.shape[1]))
     for _ in range(MOST_HALVINGS):
         if not best.cells_too_wide():
@@ -149,12 +172,17 @@ def _fitted(data: _Rows, weight: Float1D, options: IdentifyOptions) -> tuple[Run
         cells *= 2
         best, further = _climbed(data, weight, cells, options, best.solution.basis)
         path += further
-    if options.loss == "huber":
+    if robust:
         start = best.solution.basis
-        weight, _ = robust_weights(
-            lambda weights: _climbed(data, weights, cells, options, start)[0], best, data.box, data.y, weight
+        found = robust_weights(
+            lambda weights: _climbed(data, weights, cells, options, start)[0],
+            best,
+            data.box,
+            data.y,
+            given,
+            suspect,
         )
-        best, further = _climbed(data, weight, cells, options, start)
+        best, further = _climbed(data, found.weight, cells, options, start)
         path += further
     return best, path
 

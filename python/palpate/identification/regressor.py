@@ -21,6 +21,7 @@ except ImportError as missing:
     ) from missing
 
 from .._typing import Float1D
+from ..arguments import shown
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
 from ..recording import Source
@@ -135,7 +136,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
             A setting, shape or value is wrong; the message names it.
         """
         options = IdentifyOptions(**{name: _plain(getattr(self, name)) for name in SETTINGS})
-        rows, values = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        rows, values = _validated(self, X, y, dtype=np.float64, y_numeric=True)
         values = np.asarray(values, dtype=np.float64)
         weight = None if sample_weight is None else _weights(sample_weight, len(values))
         found = fit_regression(rows, values, weight, options)
@@ -159,12 +160,26 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         (n,) array
         """
         check_is_fitted(self)
-        rows = validate_data(self, X, dtype=np.float64, reset=False)
+        rows = _validated(self, X, dtype=np.float64, reset=False)
         return self.network_.predict(rows[:, self.columns_])
 
     def _input_names(self, found: Regression) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
         return [f"x{column}" if names is None else str(names[column]) for column in found.columns]
+
+
+def _validated(estimator: WaveletNetworkRegressor, X: object, *y: object, **checks: Any) -> Any:
+    """What scikit-learn makes of X and y; its ValueError becomes an InputError that names them."""
+    for name, values in zip("Xy", (X, *y), strict=False):
+        if np.ma.is_masked(values):
+            raise InputError(f"{name} is a masked array; leave the masked rows out of X, y and sample_weight")
+    try:
+        return validate_data(estimator, X, *y, **checks)
+    except InputError:
+        raise
+    except ValueError as error:
+        told = " ".join(str(error).split())[:300]
+        raise InputError(f"X{' or y' if y else ''} cannot be used: {told}") from None
 
 
 def _plain(value: Any) -> Any:
@@ -173,7 +188,13 @@ def _plain(value: Any) -> Any:
 
 
 def _weights(sample_weight: npt.ArrayLike, n: int) -> Float1D:
-    weight = np.asarray(sample_weight, dtype=np.float64)
+    try:
+        given = np.asarray(sample_weight)
+        if given.dtype.kind == "c" or (hasattr(sample_weight, "mask") and np.ma.is_masked(sample_weight)):
+            raise TypeError
+        weight = given.astype(np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"sample_weight is {shown(sample_weight)}; it must hold real numbers") from None
     if weight.shape != (n,):
         raise InputError(f"sample_weight has shape {weight.shape}; it must be ({n},), one for each row of X")
     if not np.isfinite(weight).all() or (weight < 0).any():

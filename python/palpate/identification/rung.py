@@ -13,10 +13,13 @@ from .growth import fresh_deviance
 from .hysteresis_input import HysteresisInput
 from .options import IdentifyOptions
 from .separable import SeparableProblem, Solution
-from .stopping import ON_FRESH_ROWS, deviance
+from .stopping import ON_FRESH_ROWS
 
 BINNING_SHARE = 0.05
 """Error that cells of positions may add, as a share of the RMS error; above it the cells are halved."""
+
+ALL = slice(None)
+"""Every row."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,7 @@ class Rung:
         fresh = self.problem.fresh
         if fresh is not None and options.criterion in ON_FRESH_ROWS:
             return fresh_deviance(options.criterion, fresh, self.problem.fresh_errors(self.solution, fresh))
-        total = self.problem.total(self.solution.rss)
-        return deviance(options.criterion, total, self.problem.samples, self.n_parameters)
+        return self.problem.deviance(options.criterion, self.solution.rss, self.n_parameters)
 
     def fresh_errors(self, kept: SeparableProblem, fresh: FreshRows) -> Float1D:
         """Errors (k,) on fresh rows once the linear unknowns are those of the kept rows."""
@@ -72,9 +74,9 @@ class Rung:
         curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
         return binning_error(self.rows, curvature) > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
 
-    def modelled(self, positions: Float2D) -> Float1D:
-        """The rung's force at every row (n,), positions in the unit box."""
-        return self._modelled(positions, self.side)
+    def modelled(self, positions: Float2D, rows: slice = ALL) -> Float1D:
+        """The rung's force at every row (n,), or at some, positions (n, d) in the unit box."""
+        return self._modelled(positions[rows], None if self.side is None else self.side[rows])
 
     def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
         """g and h (k,) of a rung with hysteresis at positions (k, d) in the unit box."""

@@ -197,8 +197,9 @@ class SelectionPath:
     def judged(
         problem: SeparableProblem, order: Sequence[int], rss: Sequence[float], criterion: str
     ) -> "SelectionPath":
+        share = problem.limits.independent
         values = [
-            deviance(criterion, total, problem.samples, problem.n_parameters(n))
+            deviance(criterion, share * total, problem.independent, problem.n_parameters(n))
             for n, total in enumerate(rss)
         ]
         return SelectionPath(tuple(order), tuple(rss), tuple(values), int(np.argmin(values)))
@@ -212,7 +213,7 @@ def select_forward(
     selection = OrthogonalSelection(library, start)
     order: list[int] = []
     errors = [problem.total(start.rss)]
-    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.samples:
+    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
         gains = selection.gains()
         if len(gains) == 0 or gains.max() <= 0.0:
             break
@@ -228,7 +229,7 @@ def select_by_residual(
     current = problem.solve(Basis.empty(problem.dimension))
     order: list[int] = []
     errors = [problem.total(current.rss)]
-    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.samples:
+    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
         gains = residual_gains(library, current)
         gains[order] = 0.0
         if len(gains) == 0 or gains.max() <= 0.0:

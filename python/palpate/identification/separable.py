@@ -21,7 +21,9 @@ from .._typing import Float1D, Float2D
 from .compression import Compressed
 from .fresh import FreshRows
 from .gram import half_solved, solve_gram
+from .limits import NO_LIMITS, RowLimits
 from .resolution import Resolution
+from .stopping import deviance
 
 RESOLVED = 2.0**-16
 """Share of the force's range below which no error counts: one step of a 16-bit converter. What was rendered
@@ -29,6 +31,15 @@ and recorded has no noise at all, and a criterion would ask for wavelets down to
 
 CORE = float(np.sqrt(3.0))
 """|u| of a wavelet's side lobe: what lies within is the core that data must resolve."""
+
+NOISE_WIDTHS = 5.0
+"""Standard deviations of the position's noise that half of a wavelet's core holds at least [-]"""
+
+STRUCTURED = 3.0
+"""Standard errors of the correlation of neighbouring residuals above which they are no noise."""
+
+SLIDES = 0.9
+"""Hysteresis input s beyond which a row belongs to its stroke [-]"""
 
 TINY = float(np.finfo(float).tiny)
 
@@ -74,6 +85,17 @@ class Block:
     def n_channels(self) -> int:
         return int(self.channels.shape[1])
 
+    def strokes(self) -> list[Float2D]:
+        """Positions of the rows of each stroke: of those that slide, where a play lies between the strokes.
+
+        A wavelet that only one stroke resolves would leave its two weights undetermined.
+        """
+        if self.n_channels == 1:
+            return [self.positions]
+        side = self.channels[:, 1] / self.channels[:, 0]
+        sliding = [self.positions[sign * side > SLIDES] for sign in (1.0, -1.0)]
+        return [rows if len(rows) else self.positions for rows in sliding]
+
     def design(self, wavelets: Float2D) -> Float2D:
         """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
         first, n = 1 + self.positions.shape[1], wavelets.shape[1]
@@ -118,6 +140,8 @@ class SeparableProblem:
         Distinct positions of every block that a wavelet's core must hold.
     fresh : FreshRows, optional
         Rows kept back, for the criteria that judge on them.
+    limits : RowLimits
+        What limits the information in the samples.
     """
 
     def __init__(
@@ -130,8 +154,10 @@ class SeparableProblem:
         force_range: float,
         resolved_by: int,
         fresh: FreshRows | None = None,
+        limits: RowLimits = NO_LIMITS,
     ) -> None:
         self.fresh = fresh
+        self.limits = limits
         self.blocks = tuple(blocks)
         self.readout = readout
         self.samples = samples
@@ -142,7 +168,7 @@ class SeparableProblem:
         self._rows = [slice(first, end) for first, end in pairwise(ends)]
         self.force_range = force_range
         self.prior = 0.0
-        self._resolutions = [Resolution(block.positions) for block in blocks]
+        self._resolutions = [Resolution(rows) for block in blocks for rows in block.strokes()]
         self.resolved_by = min(resolved_by, *map(len, self._resolutions))
 
     def n_parameters(self, n_wavelets: int) -> int:
@@ -151,7 +177,18 @@ class SeparableProblem:
 
     def total(self, rss: float) -> float:
         """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
-        return max(rss + self.within, (RESOLVED * self.force_range) ** 2 * self.samples, TINY)
+        least = max(RESOLVED * self.force_range, self.limits.force_error)
+        return max(rss + self.within, least**2 * self.samples, TINY)
+
+    @property
+    def independent(self) -> float:
+        """Independent samples, of all samples."""
+        return self.limits.independent * self.samples
+
+    def deviance(self, criterion: str, rss: float, n_parameters: int) -> float:
+        """Value of a criterion on the independent samples."""
+        share = self.limits.independent
+        return deviance(criterion, share * self.total(rss), self.independent, n_parameters)
 
     def rmse(self, solution: Solution) -> float:
         """Root mean square error over all samples [force]."""
@@ -174,6 +211,13 @@ class SeparableProblem:
         alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
         return alike * float(np.sqrt(len(residual)))
 
+    def structured(self, solution: Solution) -> bool:
+        """True if what is left at neighbouring rows of some block is correlated."""
+        return any(
+            float(left[1:] @ left[:-1]) * float(np.sqrt(len(left))) > STRUCTURED * float(left @ left)
+            for left in solution.residuals
+        )
+
     def fresh_errors(self, solution: Solution, fresh: FreshRows) -> Float1D:
         """Force less the solution's at rows that the problem was not made of."""
         return fresh.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
@@ -188,7 +232,8 @@ class SeparableProblem:
     def finest(self, beta: Float2D) -> Float2D:
         """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
         reach = np.max([each.reach(beta, self.resolved_by) for each in self._resolutions], axis=0)
-        return np.asarray(CORE / np.maximum(reach, 1e-9))[:, None]
+        least = max(NOISE_WIDTHS * self.limits.position_noise, 1e-9)
+        return np.asarray(CORE / np.maximum(reach, least))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
         """Weights, slopes and biases of all channels for this basis."""
@@ -296,4 +341,5 @@ def problem_of(rows: Compressed, *, resolved_by: int, fresh: FreshRows | None = 
         force_range=float(np.ptp(rows.force)) or float(np.abs(rows.force).max()) or 1.0,
         resolved_by=resolved_by,
         fresh=fresh,
+        limits=rows.limits,
     )

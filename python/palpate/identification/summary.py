@@ -26,6 +26,9 @@ MOST_CELLS = 8192
 POOLED_CELLS = 4
 """Neighbouring cells that share one slope, when the scatter within them is told apart from it."""
 
+SCATTER_ROWS = 16
+"""Neighbouring cells in which the force of single rows is compared with one line."""
+
 
 @dataclass(frozen=True)
 class Summary:
@@ -63,6 +66,15 @@ class Summary:
         return (between + float(self.yy.sum())) / self.rows
 
     @property
+    def correlation(self) -> float:
+        """Of position and force over all rows; 0 where one of them is constant."""
+        dx = self.position - np.average(self.position, weights=self.count)
+        dy = self.force - np.average(self.force, weights=self.count)
+        xx = float(self.count @ (dx * dx) + self.xx.sum())
+        xy = float(self.count @ (dx * dy) + self.xy.sum())
+        return xy / math.sqrt(xx * self.variance * self.rows) if xx * self.variance > 0.0 else 0.0
+
+    @property
     def within(self) -> float:
         """Sum of squares of the force within cells that no slope across them explains [force^2]."""
         if self.level is None:
@@ -71,6 +83,21 @@ class Summary:
         xx, xy = np.bincount(group, self.xx), np.bincount(group, self.xy)
         explained = np.divide(xy * xy, xx, out=np.zeros_like(xx), where=xx > 0)
         return max(float(self.yy.sum() - explained.sum()), 0.0)
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the force about one line in each interval of SCATTER_ROWS cells [force]."""
+        group = np.argsort(np.argsort(self.position, kind="stable")) // SCATTER_ROWS
+        total = np.bincount(group, self.count)
+        dx, dy = (
+            values - (np.bincount(group, self.count * values) / total)[group]
+            for values in (self.position, self.force)
+        )
+        xx = np.bincount(group, self.xx + self.count * dx * dx)
+        xy = np.bincount(group, self.xy + self.count * dx * dy)
+        yy = np.bincount(group, self.yy + self.count * dy * dy)
+        explained = np.divide(xy * xy, xx, out=np.zeros_like(xx), where=xx > 0)
+        return float(np.sqrt(max(float(yy.sum() - explained.sum()), 0.0) / self.rows))
 
 
 def summarise(

@@ -14,6 +14,9 @@ LEAST_ROWS = 10
 LEAST_POSITIONS = 3
 """Distinct positions below which nothing is identified."""
 
+LARGEST = 1e100
+"""Largest absolute value, and the inverse of the smallest travel and force, that is identified."""
+
 
 def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> None:
     """Refuse what cannot be identified.
@@ -35,7 +38,16 @@ def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> 
             raise InputError(
                 f"{name} in row {bad[0]} is {column[bad[0]]}; every value must be a finite number"
             )
+    for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
+        if (largest := float(np.abs(column).max())) > LARGEST:
+            raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")
+    if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST:
+        raise InputError(
+            f"the largest force is {largest:.3g}; the least is {1.0 / LARGEST:g}, or 0. Use another unit"
+        )
     for name, column in zip(names, positions.T, strict=True):
+        if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST:
+            raise InputError(f"{name} spans {travel:.3g}; the least is {1.0 / LARGEST:g}. Use another unit")
         if column.min() == column.max():
             raise InputError(f"every {name} is {column[0]:g}; identifying needs one that moves")
         if len(np.unique(column)) < LEAST_POSITIONS:

@@ -9,8 +9,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..arguments import shown
 from ..errors import InputError
-from .schema import VERSION, ModelFile
+from .schema import VERSION, ModelFile, Network
 
 _PERIOD_TOLERANCE = 1e-9
 """How far, as a share of the travel, the period may be from upper - lower."""
@@ -28,14 +29,15 @@ def checked(content: Any) -> ModelFile:
         ``network.alpha[0][0] is -1.0: must be > 0`` and the like: field path, value, what would be right.
     """
     if not isinstance(content, dict):
-        raise InputError(f"the file holds {_shown(content)}: must be an object")
+        raise InputError(f"the file holds {shown(content)}: must be an object")
     _require_known_version(content)
     _require_finite(content, "")
     try:
         file = ModelFile.model_validate(content)
     except ValidationError as error:
         raise InputError(_sentence(error.errors()[0])) from None
-    _check_network(file)
+    _check_network(file.network, "network")
+    _check_kind(file)
     _check_domain(file)
     _check_rest(file)
     _check_plan(file)
@@ -103,31 +105,35 @@ def _require_length(values: list[Any], length: int, path: str, meaning: str) -> 
         raise InputError(f"{path} has {len(values)} values: must have {length}, {meaning}")
 
 
-def _check_network(file: ModelFile) -> None:
-    network, d, n = file.network, file.network.dimension, len(file.network.alpha)
+def _check_network(network: Network, path: str) -> None:
+    d, n = network.dimension, len(network.alpha)
     one_each, one_per_input = "one for each wavelet of alpha", "one for each dimension"
     for name, rows in (("alpha", network.alpha), ("beta", network.beta)):
-        _require_length(rows, n, f"network.{name}", one_each)
+        _require_length(rows, n, f"{path}.{name}", one_each)
         for index, row in enumerate(rows):
-            _require_length(row, d, f"network.{name}[{index}]", one_per_input)
-    _require_length(network.weight, n, "network.weight", one_each)
-    _require_length(network.linear, d, "network.linear", one_per_input)
+            _require_length(row, d, f"{path}.{name}[{index}]", one_per_input)
+    _require_length(network.weight, n, f"{path}.weight", one_each)
+    _require_length(network.linear, d, f"{path}.linear", one_per_input)
     hysteretic = network.weight_hysteresis is not None
     for name in ("linear_hysteresis", "bias_hysteresis"):
         value = getattr(network, name)
         right = "given, because weight_hysteresis is" if hysteretic else "null, because weight_hysteresis is"
-        _require((value is not None) == hysteretic, f"network.{name}", value, right)
+        _require((value is not None) == hysteretic, f"{path}.{name}", value, right)
     if network.weight_hysteresis is not None and network.linear_hysteresis is not None:
-        _require(d == 1, "network.dimension", d, "1 in a model with hysteresis")
-        _require_length(network.weight_hysteresis, n, "network.weight_hysteresis", one_each)
-        _require_length(network.linear_hysteresis, d, "network.linear_hysteresis", one_per_input)
+        _require(d == 1, f"{path}.dimension", d, "1 in a model with hysteresis")
+        _require_length(network.weight_hysteresis, n, f"{path}.weight_hysteresis", one_each)
+        _require_length(network.linear_hysteresis, d, f"{path}.linear_hysteresis", one_per_input)
+
+
+def _check_kind(file: ModelFile) -> None:
+    hysteretic = file.network.weight_hysteresis is not None
     _require(
         file.kind != "hysteresis" or hysteretic, "kind", file.kind, "another kind: weight_hysteresis is null"
     )
     _require(
         file.kind != "position" or not hysteretic, "kind", file.kind, "hysteresis: weight_hysteresis is given"
     )
-    _require_length(file.inputs, d, "inputs", one_per_input)
+    _require_length(file.inputs, file.network.dimension, "inputs", "one for each dimension")
     if not hysteretic:
         _require(
             file.play_radius is None, "play_radius", file.play_radius, "null in a model without hysteresis"
@@ -166,6 +172,24 @@ def _check_rest(file: ModelFile) -> None:
     )
 
 
+def _check_planned_network(planned: Network, identified: Network) -> None:
+    """The network of a plan has the inputs and the hysteresis of the identified one."""
+    _check_network(planned, "plan.network")
+    _require(
+        planned.dimension == identified.dimension,
+        "plan.network.dimension",
+        planned.dimension,
+        f"{identified.dimension}, that of network",
+    )
+    hysteretic = identified.weight_hysteresis is not None
+    _require(
+        (planned.weight_hysteresis is not None) == hysteretic,
+        "plan.network.weight_hysteresis",
+        planned.weight_hysteresis,
+        "given, because that of network is" if hysteretic else "null, because that of network is",
+    )
+
+
 def _check_plan(file: ModelFile) -> None:
     plan, certificate = file.plan, file.certificate
     if plan is not None:
@@ -177,6 +201,8 @@ def _check_plan(file: ModelFile) -> None:
             right = f"given: the structure has {name}" if used else f"null: the structure has no {name}"
             found = None if value is None else value.model_dump()
             _require((value is not None) == used, f"plan.{name}", found, right)
+        if plan.network is not None:
+            _check_planned_network(plan.network, file.network)
     if certificate is None:
         return
     if plan is None:

@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from .._core import ForceModel, __version__
 from .._typing import Float1D
+from ..arguments import instance_of, path_of, shown
 from ..errors import InputError
 from ..recording import Source
+from ..verdict import Verdict
 from .certified import checked_certificate
 from .checks import checked
 from .fit import Fit, PathStep
@@ -23,6 +27,12 @@ from .text import describe
 
 _HELD_OUT = "held_out_every"
 """Note under which a file says that every k-th row of the data was not used."""
+
+_NUMBERS = ("bias", "bias_hysteresis", "period", "play_radius")
+"""Arguments that are one number."""
+
+_OPTIONAL = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis", "period", "play_radius")
+"""Arguments that may be None."""
 
 
 class Model(ForceModel):
@@ -107,23 +117,30 @@ class Model(ForceModel):
         notes: Mapping[str, Any] | None = None,
         created_by: str | None = None,
     ) -> None:
-        super().__init__(
-            alpha=alpha,
-            beta=beta,
-            weight=weight,
-            linear=linear,
-            bias=bias,
-            weight_hysteresis=weight_hysteresis,
-            linear_hysteresis=linear_hysteresis,
-            bias_hysteresis=bias_hysteresis,
-            lower=lower,
-            upper=upper,
-            below=below,
-            above=above,
-            period=period,
-            play_radius=play_radius,
-            of_velocity=kind == "position_velocity" and len(inputs) == 2,
-        )
+        network: dict[str, Any] = {
+            "alpha": alpha,
+            "beta": beta,
+            "weight": weight,
+            "linear": linear,
+            "bias": bias,
+            "weight_hysteresis": weight_hysteresis,
+            "linear_hysteresis": linear_hysteresis,
+            "bias_hysteresis": bias_hysteresis,
+            "lower": lower,
+            "upper": upper,
+            "period": period,
+            "play_radius": play_radius,
+        }
+        for name, value in network.items():
+            _require_numbers(name, value)
+        for name, word in (("kind", kind), ("below", below), ("above", above)):
+            instance_of(name, word, str, "one of the words in the documentation of Model")
+        instance_of("inputs", inputs, (list, tuple), "the names of the inputs")
+        instance_of("units", units, Mapping, "the units of position and force")
+        instance_of("fit", fit, Fit, "how the identification ended")
+        instance_of("data", data, Source, "the source of the recordings")
+        of_velocity = kind == "position_velocity" and len(inputs) == 2
+        super().__init__(**network, below=below, above=above, of_velocity=of_velocity)
         self.kind = kind
         self.inputs = tuple(inputs)
         self.units = dict(units)
@@ -139,8 +156,10 @@ class Model(ForceModel):
         self.notes = dict(notes or {})
         self.created_by = created_by or f"palpate {__version__}"
         checked(self.to_dict())
-        if self.plan is not None and self.certificate is not None:
-            checked_certificate(self, self.plan, self.certificate)
+        if self.plan is not None:
+            planned = self.planned
+            if self.certificate is not None:
+                checked_certificate(planned, self.plan, self.certificate)
 
     @property
     def n_parameters(self) -> int:
@@ -153,6 +172,16 @@ class Model(ForceModel):
         return self.fit.stop_reason
 
     @property
+    def verdict(self) -> Verdict:
+        """The verdict of the identification: "good", or "usable" or "no" with the reasons.
+
+        ``model.verdict.level`` is the word, ``model.verdict.reasons`` are sentences with value, likely cause
+        and cure, ``str(model.verdict)`` is both. A model that states none is "good".
+        """
+        record = self.notes.get("verdict", ())
+        return Verdict.from_record(record if isinstance(record, list) else ())
+
+    @property
     def path(self) -> Sequence[PathStep]:
         """What identification considered: number of wavelets against error and criterion."""
         return self.fit.path
@@ -161,6 +190,28 @@ class Model(ForceModel):
     def domain(self) -> tuple[Float1D, Float1D]:
         """(lower, upper), each (d,)."""
         return self.lower, self.upper
+
+    @property
+    def planned(self) -> Model:
+        """The model that the plan renders: this one, or the one with the network of the plan."""
+        network = None if self.plan is None else self.plan["network"]
+        return self if network is None else self.with_network(**network)
+
+    def with_network(self, **network: Any) -> Model:
+        """This model with other numbers in its network, without plan, certificate and slope bounds.
+
+        Parameters
+        ----------
+        **network
+            alpha, beta, weight, ..., as they stand in a model file; what is not given stays.
+        """
+        content = self.to_dict()
+        content["network"].update(network)
+        added = len(content["network"]["weight"]) - content["fit"]["n_wavelets"]
+        content["fit"]["n_wavelets"] += added
+        content["fit"]["n_parameters"] += added * (4 if self.hysteretic else 3)
+        content.update(plan=None, certificate=None, slope_bounds=None)
+        return Model.from_dict(content)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of a model file."""
@@ -251,18 +302,45 @@ class Model(ForceModel):
         InputError
             The folder does not exist or cannot be written, or a field holds what a model file cannot.
         """
+        target = path_of("path", path)
         content = self.to_dict()
         checked(content)
-        return write_json(Path(path), content)
+        return write_json(target, content)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model.from_dict, (self.to_dict(),)
+
+    def __eq__(self, other: object) -> bool:
+        """True if both would give the same model file."""
+        return self._text() == other._text() if isinstance(other, Model) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._text())
+
+    def _text(self) -> str:
+        return json.dumps(self.to_dict(), sort_keys=True)
 
     def __str__(self) -> str:
         return describe(self)
 
     def __repr__(self) -> str:
         return f"<palpate.Model: {self.kind}, {self.n_wavelets} wavelets, {self.n_parameters} parameters>"
+
+
+def _require_numbers(name: str, value: object) -> None:
+    """Refuse an argument of a network that is not made of real numbers."""
+    if value is None and name in _OPTIONAL:
+        return
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "biufO" or value is None or np.ma.is_masked(value):
+            raise TypeError
+        given.astype(np.float64)
+    except (TypeError, ValueError):
+        given = None
+    if given is None or (name in _NUMBERS and given.ndim > 0):
+        right = "a number" if name in _NUMBERS else "an array of numbers"
+        raise InputError(f"{name} is {shown(value)}; it must be {right}")
 
 
 def _fit_record(fit: Fit) -> dict[str, Any]:
@@ -301,7 +379,7 @@ def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model
         The file is not there or not JSON, or a field is missing, unknown or wrong: one sentence with the
         file's name, the field's path and the value.
     """
-    file = Path(path)
+    file = path_of("path", path)
     content = read_json(file)
     if not with_plan and isinstance(content, dict):
         content = {**content, "plan": None, "certificate": None}

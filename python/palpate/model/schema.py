@@ -126,13 +126,6 @@ class InertiaRecord(_Part):
     damping: NotNegative
 
 
-class LossRecord(_Part):
-    """How far the rendered force is from the identified one, by what the device cannot render [force]."""
-
-    largest: NotNegative
-    rms: NotNegative
-
-
 class PlanRecord(_Part):
     """How the model is rendered."""
 
@@ -147,8 +140,10 @@ class PlanRecord(_Part):
     """In place of the model's own"""
     refused: list[str]
     """Why simpler structures were refused"""
-    loss: LossRecord | None
-    """Null where the model is rendered as it was identified"""
+    network: Network | None
+    """Rendered in place of the identified network; null where that is rendered itself"""
+    accepted_force_error: NotNegative
+    """Largest force error that was accepted [share of the range of the identified force]"""
 
 
 class DeviceRecord(_Part):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,19 +11,21 @@ if TYPE_CHECKING:
 
 
 def describe(model: Model) -> str:
-    """Terms, domain, units and history of a model."""
+    """Verdict, terms, domain, units and history of a model."""
     position, force = (model.units[role] or "SI" for role in ("position", "force"))
     fit, data = model.fit, model.data
     lines = [
+        f"verdict: {model.verdict.level}",
+        *(f"  {reason}" for reason in model.verdict.reasons),
         f"{model.kind} model: {model.n_wavelets} wavelets, {model.n_parameters} parameters "
         f"(rung {fit.rung}, stopped by {fit.stop_reason})",
-        f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(data.files) or 'arrays'}",
+        f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {_names(data.files) or 'arrays'}",
     ]
     if data.held_out_every:
         lines.append(f"  every {data.held_out_every}th row was held out")
     for index, name in enumerate(model.inputs):
         unit = f" {position}" if name == "position" else ""
-        lines.append(f"  {name} from {model.lower[index]:.6g} to {model.upper[index]:.6g}{unit}")
+        lines.append(f"  {_names([name])} from {model.lower[index]:.6g} to {model.upper[index]:.6g}{unit}")
     outside = f"below: {model.below}, above: {model.above}"
     lines.append(
         f"  outside: {outside}" if model.period is None else f"  repeats every {model.period:.6g} {position}"
@@ -75,6 +78,11 @@ def _terms(model: Model, force: str) -> list[str]:
     return formula + [
         "  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in table
     ]
+
+
+def _names(names: Iterable[str]) -> str:
+    """Names joined by commas; control characters are escaped, so that no name can control a terminal."""
+    return ", ".join(name if name.isprintable() else repr(name)[1:-1] for name in names)
 
 
 def _numbers(dimension: int) -> list[str]:

@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a model to a force that is rendered: how, on what device, and how far off it is."""
 
-from .._core import Bench, Certificate, Inequality, explicit_slope_limit
+from .. import _core
+from .._core import Bench, Certificate, Hand, Inequality, Scheme, explicit_slope_limit
+from ..arguments import named_arguments
 from .bench import bench_for
 from .comparison import Comparison, compare_structures
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
-from .plan import Plan
-from .simulation import ForceError, describe, force_at, force_error, simulate
-from .slope_limit import Loss
+from .plan import ACCEPTED_FORCE_ERROR, Plan
+from .simulation import ForceError, describe, force_at, force_error, force_range, judge, simulate
+from .static_error import StaticForceError
 
 __all__ = [
+    "ACCEPTED_FORCE_ERROR",
     "EXAMPLES",
     "Bench",
     "Certificate",
     "Comparison",
     "DeviceProfile",
     "ForceError",
+    "Hand",
     "Inequality",
-    "Loss",
     "Plan",
+    "Scheme",
+    "StaticForceError",
     "bench_for",
     "compare_structures",
     "describe",
@@ -26,6 +31,11 @@ __all__ = [
     "explicit_slope_limit",
     "force_at",
     "force_error",
+    "force_range",
+    "judge",
     "profile_file",
     "simulate",
 ]
+
+for _compiled in (Hand, Scheme, _core.DeviceProfile):
+    named_arguments(_compiled)

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from .. import _core
+from ..arguments import path_of
 from ..errors import InputError
 from ..model.certified import device_record
 from ..recording.files import replacing, require_file
@@ -91,7 +93,7 @@ class DeviceProfile(_core.DeviceProfile):
             The file is not there or not TOML, or a field is missing, unknown or impossible: one sentence with
             the file's name, the field and its value.
         """
-        file = Path(path)
+        file = path_of("path", path)
         require_file(file)
         try:
             content = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -99,6 +101,10 @@ class DeviceProfile(_core.DeviceProfile):
             raise InputError(f"{file} is not TOML: {error}") from None
         except UnicodeDecodeError:
             raise InputError(f"{file} is not TOML: it is not text") from None
+        except RecursionError:
+            raise InputError(f"{file}: it is nested too deeply; a profile has no tables") from None
+        except ValueError as error:  # an integer with more digits than Python converts, a date that is none
+            raise InputError(f"{file}: a value cannot be read: {error}") from None
         expected = device_record(_core.DeviceProfile())
         for name in content:
             if name not in expected:
@@ -112,20 +118,39 @@ class DeviceProfile(_core.DeviceProfile):
         except ValueError as error:
             raise InputError(f"{file}: {error}") from None
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the profile as a TOML file; it appears under its name only when it is complete."""
-        with replacing(Path(path)) as temporary:
-            temporary.write_text(tomli_w.dumps(device_record(self)), encoding="utf-8")
-        return Path(path)
+    def save(self, path: str | os.PathLike[str], *, notes: Sequence[str] = ()) -> Path:
+        """Write the profile as a TOML file; it appears under its name only when it is complete.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        notes : sequence of str
+            Where its numbers are from: comments at the top of the file.
+        """
+        file = path_of("path", path)
+        comment = "".join(f"# {note}\n" for note in notes)
+        with replacing(file) as temporary:
+            temporary.write_text(comment + tomli_w.dumps(device_record(self)), encoding="utf-8")
+        return file
 
 
 def _typed(file: Path, name: str, value: Any, example: Any) -> Any:
+    """A value of the profile as the type of its field."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if isinstance(example, str):
         right, fits = "text", isinstance(value, str)
     elif isinstance(example, int):
-        right, fits = "a whole number", isinstance(value, int) and not isinstance(value, bool)
+        right, fits = "a whole number", number and isinstance(value, int) and abs(value) < 2**31
     else:
-        right, fits = "a number", isinstance(value, (int, float)) and not isinstance(value, bool)
+        right, fits = "a number", number and (isinstance(value, float) or abs(value) < 2**1023)
     if not fits:
-        raise InputError(f"{file}: {name} is {value!r}, must be {right}")
+        raise InputError(f"{file}: {name} is {_shown(value)}, must be {right}")
     return float(value) if isinstance(example, float) else value
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, int) and value.bit_length() > 64:
+        return f"an integer of {value.bit_length()} bits"
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."

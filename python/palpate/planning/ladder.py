@@ -3,12 +3,18 @@
 
 from __future__ import annotations
 
+import math
+import os
 from dataclasses import replace
+from pathlib import Path
 
-from .._core import DeviceProfile
+from .. import _core
+from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
-from .plan import Plan
+from .device_profile import DeviceProfile, example_profiles, profile_file
+from .needs import needed
+from .plan import ACCEPTED_FORCE_ERROR, Plan
 from .rungs import RUNGS, Wishes
 
 _FORCE_UNIT = {"rad": "N*m", "m": "N"}
@@ -16,7 +22,7 @@ _FORCE_UNIT = {"rad": "N*m", "m": "N"}
 
 def plan(
     model: Model,
-    device: DeviceProfile,
+    device: _core.DeviceProfile | str | os.PathLike[str],
     *,
     coupling: bool = False,
     coupling_stiffness: float | None = None,
@@ -24,6 +30,7 @@ def plan(
     mass: float | None = None,
     damping: float | None = None,
     play_radius: float | None = None,
+    accept_force_error: float = ACCEPTED_FORCE_ERROR,
 ) -> Plan:
     """Choose the simplest structure that is certified for a model on a device.
 
@@ -35,8 +42,8 @@ def plan(
     ----------
     model : Model
         A model of one position, or of position and velocity; a plan that stands in it is ignored.
-    device : DeviceProfile
-        In the model's unit.
+    device : DeviceProfile, str or path
+        A profile in the model's unit, the name of an example profile, or the path of a TOML file.
     coupling : bool
         Render through a virtual coupling, also where that is not needed.
     coupling_stiffness, coupling_damping : float, optional
@@ -46,18 +53,33 @@ def plan(
         them out.
     play_radius : float, optional
         r of a model with hysteresis [position].
+    accept_force_error : float
+        Largest difference of the felt from the identified force that is accepted, as a share of the range of
+        the identified force.
 
     Returns
     -------
     Plan
-        Its certificate says what was proved. Where no structure holds, it is the last that was tried, and
-        ``plan.certificate.refused`` is true.
+        Read its ``verdict`` first. It is "no" where the force error is larger than accepted, and where no
+        structure holds: the plan is then the last that was tried. Its certificate says what was proved.
 
     Raises
     ------
     InputError
-        The model cannot be rendered at all, or not on a device of this unit.
+        An argument has a wrong type or value, or the model cannot be rendered at all, or not on a device of
+        this unit.
     """
+    instance_of("model", model, Model, "make one with palpate.identify or palpate.load_model")
+    device = find_profile(device)
+    for name, value in {
+        "coupling_stiffness": coupling_stiffness,
+        "coupling_damping": coupling_damping,
+        "mass": mass,
+        "damping": damping,
+        "play_radius": play_radius,
+        "accept_force_error": accept_force_error,
+    }.items():
+        _require_number(name, value)
     unit = model.units["position"]
     if unit not in ("", device.position_unit):
         raise InputError(
@@ -86,16 +108,58 @@ def plan(
             "damping beside it, no bound is known"
         )
     refused: list[str] = []
-    last: Plan | None = None
+    chosen: Plan | None = None
     for name, rung in RUNGS.items():
         outcome = rung(bare, device, wishes)
         if isinstance(outcome, str):
             refused.append(f"{name}: {outcome}")
             continue
-        last = replace(outcome, refused=tuple(refused))
+        chosen = outcome
         assert outcome.certificate is not None
         if not outcome.certificate.refused:
-            return last
+            break
         refused.append(f"{name}: {outcome.certificate.why}")
-    assert last is not None  # the explicit rung always proposes something
-    return replace(last, refused=tuple(refused))
+    assert chosen is not None  # the explicit rung always proposes something
+    chosen = replace(chosen, model=model, refused=tuple(refused), accept_force_error=accept_force_error)
+    assert chosen.certificate is not None
+    stable_only = not (chosen.certificate.certified or chosen.certificate.refused)
+    if stable_only or chosen.verdict.level == "no":
+        needs = needed(bare, device, wishes, accept_force_error, certified=stable_only)
+        chosen = replace(chosen, needs=needs)
+    return chosen
+
+
+def find_profile(device: _core.DeviceProfile | str | os.PathLike[str]) -> _core.DeviceProfile:
+    """A device by object, by the name of an example profile, or by the path of its TOML file.
+
+    Raises
+    ------
+    InputError
+        It is none of these; the message names the argument, or file and field.
+    """
+    if isinstance(device, _core.DeviceProfile):
+        return device
+    if not isinstance(device, (str, os.PathLike)):
+        raise InputError(
+            f"device is a {type(device).__name__}: must be a DeviceProfile, the path of its TOML file, or "
+            f"{_example_names()}"
+        )
+    file = profile_file(os.fspath(device))
+    if not file.exists() and file == Path(file.name) and not file.suffix:
+        raise InputError(
+            f"device is '{device}': there is no such file, and no such example; {_example_names()}"
+        )
+    return DeviceProfile.load(file)
+
+
+def _example_names() -> str:
+    return f"one of the examples {', '.join(example_profiles())}"
+
+
+def _require_number(name: str, value: object) -> None:
+    if value is None and name != "accept_force_error":
+        return
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{name} is {value!r}: must be a number")
+    if not (math.isfinite(value) and value >= 0.0):
+        raise InputError(f"{name} is {float(value):g}: must be a finite number >= 0")

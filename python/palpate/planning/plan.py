@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plan: how a model is rendered, and what is proved of that."""
+"""Plan: how a model is rendered, what is proved of that, and how far the felt force is from the model's."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from .. import _core
 from .._core import Certificate, DeviceProfile, Scheme
+from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
 from ..model.certified import certificate_record, checked_certificate, scheme_of
-from .slope_limit import Loss
+from ..verdict import Finding, Verdict, no, usable
+from ..verification.perception import FLOOR_SHARE
+from .static_error import StaticForceError, static_force_error
+
+ACCEPTED_FORCE_ERROR = 0.1
+"""Force error that is accepted where nothing else is said [share of the range of the identified force]"""
 
 
 @dataclass(frozen=True)
@@ -28,21 +36,32 @@ class Plan:
     """
 
     model: Model
-    """What is rendered: where the device is too weak, the identified model with its slopes limited"""
+    """The identified model, which the plan never changes. Force errors refer to it."""
     scheme: Scheme
     certificate: Certificate | None = None
-    """What was proved, and for which device; None where nothing was looked at"""
+    """What was proved of the rendered model, and for which device; None where nothing was looked at"""
     refused: tuple[str, ...] = ()
     """Simpler structures that were refused, each with the inequality that failed and by how much"""
-    loss: Loss | None = None
-    """How far `model` is from the identified one; None where it is the identified one"""
+    limited: Model | None = None
+    """The model that is rendered in place of `model`, because the device is too weak; None: `model` itself"""
+    accept_force_error: float = ACCEPTED_FORCE_ERROR
+    """Largest force error that is accepted [share of the range of the identified force]"""
+    needs: str = ""
+    """The device property that `model` itself would need; empty where it is rendered, or none helps"""
 
     def __post_init__(self) -> None:
+        instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
+        instance_of("scheme", self.scheme, Scheme, "make one with palpate.Scheme")
         if self.model.units["force"] == "A":
             raise InputError(
                 "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A"
             )
         self._validate(None)
+
+    @property
+    def rendered(self) -> Model:
+        """The model that is rendered: `limited` if there is one, else `model`."""
+        return self.model if self.limited is None else self.limited
 
     @property
     def structure(self) -> str:
@@ -52,7 +71,20 @@ class Plan:
     @property
     def solver(self) -> str | None:
         """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
-        return _core.solver_name(self.model, self.scheme, DeviceProfile().period_s)
+        return _core.solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
+
+    @cached_property
+    def force_error(self) -> StaticForceError:
+        """Felt minus identified force at rest: of a limited network, and of the softness of a coupling."""
+        return static_force_error(self.model, self.rendered, self.scheme)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the plan: on its certificate, and on its force error.
+
+        It is "no" where no structure holds on the device, and where the force error exceeds what is accepted.
+        """
+        return Verdict((*self._certificate_findings(), *self._force_findings()))
 
     @classmethod
     def of(cls, model: Model) -> Plan:
@@ -63,22 +95,32 @@ class Plan:
         InputError
             There is none.
         """
+        instance_of("model", model, Model, "make one with palpate.load_model")
         if model.plan is None:
             raise InputError("the model has no plan; make one with palpate plan")
+        rendered = model.planned
         certificate = None
         if model.certificate is not None:
-            certificate = checked_certificate(model, model.plan, model.certificate)
-        loss = model.plan["loss"]
+            certificate = checked_certificate(rendered, model.plan, model.certificate)
         return cls(
             model,
             scheme_of(model.plan),
             certificate,
             tuple(model.plan["refused"]),
-            None if loss is None else Loss(**loss),
+            None if rendered is model else rendered,
+            model.plan["accepted_force_error"],
         )
 
     def stored(self) -> Model:
-        """The model with this plan and its certificate in it, ready to be saved."""
+        """The identified model with this plan and its certificate in it, ready to be saved.
+
+        Raises
+        ------
+        InputError
+            The verdict on the plan is no.
+        """
+        if self.verdict.level == "no":
+            raise InputError(f"a plan is not stored whose verdict is {self.verdict}")
         content = self.model.to_dict()
         content["plan"] = self.record()
         content["certificate"] = None if self.certificate is None else certificate_record(self.certificate)
@@ -91,6 +133,7 @@ class Plan:
         return {
             "structure": scheme.structure,
             "solver": self.solver,
+            "network": None if self.limited is None else self.limited.to_dict()["network"],
             "coupling": {"stiffness": scheme.coupling_stiffness, "damping": scheme.coupling_damping}
             if coupled
             else None,
@@ -98,12 +141,12 @@ class Plan:
             "compensated": scheme.compensated,
             "play_radius": scheme.play_radius or None,
             "refused": list(self.refused),
-            "loss": None if self.loss is None else {"largest": self.loss.largest, "rms": self.loss.rms},
+            "accepted_force_error": self.accept_force_error,
         }
 
     def certified_for(self, device: DeviceProfile) -> Plan:
         """The same plan with what is proved of it on a device, whatever that is."""
-        return replace(self, certificate=_core.certify(self.model, self.scheme, device))
+        return replace(self, certificate=_core.certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
         """Refuse what is sure to diverge on this device, and a device that the certificate is not for.
@@ -120,10 +163,53 @@ class Plan:
             if wrong:
                 raise InputError(wrong)
 
+    def _certificate_findings(self) -> tuple[Finding, ...]:
+        if self.certificate is None:
+            return (usable("nothing is proved of this plan; palpate plan certifies one for a device"),)
+        if self.certificate.refused:
+            cure = f"the object {self.needs}; " if self.needs else ""
+            reasons = "; ".join(self.refused) or self.certificate.why
+            return (no(f"no structure holds on this device: {cure}{reasons}"),)
+        if not self.certificate.certified:
+            cure = f"; for a certificate the object {self.needs}" if self.needs else ""
+            return (
+                usable(
+                    "the linearised system is stable near each equilibrium; energy is not accounted for, "
+                    f"so passivity is not certified{cure}"
+                ),
+            )
+        return ()
+
+    def _force_findings(self) -> tuple[Finding, ...]:
+        error = self.force_error
+        if error.share <= FLOOR_SHARE:
+            return ()
+        unit = self.model.units["force"] or "in the model's unit"
+        told = (
+            f"the felt force is up to {error.largest:.3g} {unit} away from the identified force, "
+            f"{_percent(error.share)} of its range"
+        )
+        if error.share <= ACCEPTED_FORCE_ERROR:
+            return (usable(told),)
+        if error.share <= self.accept_force_error:
+            return (usable(f"{told}, which was accepted"),)
+        cause = f"; the object {self.needs}" if self.needs else ""
+        share = math.ceil(100.0 * error.share) / 100.0
+        return (
+            no(
+                f"{told}; at most {_percent(self.accept_force_error)} are accepted{cause}; "
+                f"to accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
+            ),
+        )
+
     def _validate(self, period_s: float | None) -> None:
         try:
-            self.scheme.validate(self.model, period_s)
+            self.scheme.validate(self.rendered, period_s)
         except InputError:
             raise
         except ValueError as error:
             raise InputError(str(error)) from None
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

@@ -21,13 +21,19 @@ from .choices import (
     usual_play_radius,
 )
 from .plan import Plan
-from .slope_limit import changed_network, limit_slopes, loss_between, scale_loss, sliding_slopes
+from .slope_limit import limit_slopes, scale_loss, sliding_slopes
+from .static_error import static_force_error
 
 _TAKEN_OUT = 0.9
 """Behind a coupling K_c a force can be compensated while its slope stays below this share of K_c [-]"""
 
 _COUPLING_DAMPING = 0.2
 """Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""
+
+_WIDER_PLAY = 1.02
+"""Play radius that is tried where the one that was computed is just refused, over that [-]"""
+
+_NOT_LIMITED = "the model is to be rendered as it was identified"
 
 _LEAST_LOSS = 1.0 / 64.0
 """Smallest share of the loss h that is still worth rendering [-]"""
@@ -43,6 +49,8 @@ class Wishes:
     mass: float | None = None
     damping: float | None = None
     play_radius: float | None = None
+    limited: bool = True
+    """Whether a limited network may be rendered in place of the identified one"""
 
     @property
     def dynamic(self) -> bool:
@@ -67,7 +75,14 @@ def direct(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         return wishes.why_not_static()
     if wishes.coupling:
         return "a coupling was asked for"
-    return Plan(model, _direct_scheme(model, device, wishes)).certified_for(device)
+    plan = Plan(model, _direct_scheme(model, device, wishes)).certified_for(device)
+    if not (plan.certificate and plan.certificate.refused and _chooses_play(model, wishes)):
+        return plan
+    # Bounds of the sum g' + h / r can be wider than the sum of the bounds, from which r was chosen.
+    longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
+    wider = min(_WIDER_PLAY * plan.scheme.play_radius, longest)
+    again = Plan(model, Scheme(structure="direct", play_radius=wider)).certified_for(device)
+    return plan if again.certificate and again.certificate.refused else again
 
 
 def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
@@ -76,6 +91,8 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
         return wishes.why_not_static()
     if wishes.coupling:
         return "a coupling was asked for"
+    if not wishes.limited:
+        return _NOT_LIMITED
     low, high = renderable_slopes(device)
     if high <= 0.0:
         return _no_slope(device)
@@ -85,8 +102,7 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
     )
     if limited is None:
         return f"no network was found whose slopes lie between {low:.4g} and {high:.4g}"
-    plan = Plan(limited, _direct_scheme(limited, device, wishes), loss=loss_between(model, limited))
-    return plan.certified_for(device)
+    return Plan(model, _direct_scheme(limited, device, wishes), limited=limited).certified_for(device)
 
 
 def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
@@ -115,11 +131,13 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         return Plan(model, scheme).certified_for(device)
     highest = _TAKEN_OUT * stiffness
     balanced = _balanced(model)
-    limited = _within(balanced, low if damping == 0.0 else -math.inf, min(highest, high))
+    low, high = low if damping == 0.0 else -math.inf, min(highest, high)
+    if not wishes.limited and not (balanced is model and _fits(model, low, high)):
+        return _NOT_LIMITED
+    limited = _within(balanced, low, high)
     if limited is None:
         return f"no network was found whose slopes lie below {highest:.4g} = {_TAKEN_OUT} K_c"
-    loss = None if limited is model else loss_between(model, limited)
-    return Plan(limited, scheme, loss=loss).certified_for(device)
+    return Plan(model, scheme, limited=None if limited is model else limited).certified_for(device)
 
 
 def implicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
@@ -179,9 +197,13 @@ def _no_slope(device: DeviceProfile) -> str:
     )
 
 
+def _chooses_play(model: Model, wishes: Wishes) -> bool:
+    return model.hysteretic and not wishes.play_radius and model.play_radius is None
+
+
 def _direct_scheme(model: Model, device: DeviceProfile, wishes: Wishes) -> Scheme:
     radius = wishes.play_radius or 0.0
-    if model.hysteretic and not radius and model.play_radius is None:
+    if _chooses_play(model, wishes):
         travel = float(model.upper[0] - model.lower[0])
         radius = min(play_radius_for(model, device), LONGEST_PLAY * travel)
     return Scheme(structure="direct", play_radius=radius)
@@ -189,8 +211,12 @@ def _direct_scheme(model: Model, device: DeviceProfile, wishes: Wishes) -> Schem
 
 def _within(model: Model, low: float, high: float) -> Model | None:
     """The model itself where its slopes lie within limits, else the nearest that does."""
+    return model if _fits(model, low, high) else limit_slopes(model, low, high)
+
+
+def _fits(model: Model, low: float, high: float) -> bool:
     found = sliding_slopes(model)
-    return model if found[0] >= low and found[1] <= high else limit_slopes(model, low, high)
+    return found[0] >= low and found[1] <= high
 
 
 def _balanced(model: Model) -> Model:
@@ -202,7 +228,7 @@ def _balanced(model: Model) -> Model:
     turn = model.energy(lower + model.period, **side) - model.energy(lower, **side)
     if _core.force_bounds(model, model.period if model.hysteretic else 0.0).mean_force == 0.0:
         return model
-    return changed_network(model, bias=model.bias - turn / model.period)
+    return model.with_network(bias=model.bias - turn / model.period)
 
 
 def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model:
@@ -227,7 +253,8 @@ def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> 
     found = [limited if holds(limited) else as_much_loss_as_holds(limited)]
     if limited is not model and holds(scale_loss(model, _LEAST_LOSS)):
         found.append(as_much_loss_as_holds(model))
-    return min(found, key=lambda candidate: loss_between(model, candidate).rms)
+    exact = Scheme(structure="direct")
+    return min(found, key=lambda candidate: static_force_error(model, candidate, exact).rms)
 
 
 def _with_mass(structure: str, model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,19 +12,36 @@ import numpy as np
 from .. import _core
 from .._core import DeviceProfile, Hand, Scheme, Status
 from .._typing import Float1D
+from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..recording import Recording
 from ..recording.units import COLUMN_SUFFIX
+from ..verdict import Finding, Verdict, no, usable
 from .plan import Plan
 
 START = "handle_start"
 END = "handle_end"
 """Stems of the columns with the true handle position when the encoder was read, and when the force ended."""
 
+_GRID = 1001
+"""Positions at which the force range is looked for."""
+_TOLERATED_ERROR = 0.02
+"""Force error over force range up to which nothing is said."""
+_TOLERATED_TICKS = 0.01
+"""Share of ticks that may be extrapolated, clipped or not solved."""
+_SMALLEST_DOMAIN_SHARE = 0.1
+"""Of the model's domain that the handle should cover."""
+
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
 
 
-def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> Recording:
+def simulate(
+    plan: Plan,
+    device: DeviceProfile,
+    hand: Hand,
+    duration: float,
+    progress: Callable[[int], None] | None = None,
+) -> Recording:
     """Render a plan in closed loop, in virtual time: device, hand and controller are simulated.
 
     The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
@@ -36,7 +55,9 @@ def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> 
     hand : Hand
         The simulated hand that moves it.
     duration : float
-        Simulated time [s].
+        Simulated time [s]; at most 3 600 000 periods of the device.
+    progress : callable, optional
+        Called with the number of ticks about ten times a second.
 
     Returns
     -------
@@ -51,10 +72,16 @@ def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> 
     InputError
         The structure is sure to diverge on this device, or a number is out of range.
     """
+    instance_of("plan", plan, Plan, "make one with palpate.plan")
+    instance_of("device", device, DeviceProfile, "make one with palpate.DeviceProfile")
+    instance_of("hand", hand, Hand, "make one with palpate.Hand")
+    duration = real_of("duration", duration)
     plan.check_for(device)
     start = float(np.clip(0.0, plan.model.lower[0], plan.model.upper[0]))
     try:
-        trace = _core.simulate(plan.model, plan.scheme, device, hand, duration, start_position=start)
+        trace = _core.simulate(
+            plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
+        )
     except InputError:
         raise
     except ValueError as error:
@@ -88,7 +115,7 @@ def simulate(plan: Plan, device: DeviceProfile, hand: Hand, duration: float) -> 
 
 @dataclass(frozen=True)
 class ForceError:
-    """RMS of rendered force minus the model's force at the handle, over all ticks [N*m or N]."""
+    """RMS of rendered minus identified force at the handle, over all ticks [N*m or N]."""
 
     end: float
     """at the end of the tick that holds the force: what is felt, the hold included"""
@@ -97,7 +124,7 @@ class ForceError:
 
 
 def force_error(plan: Plan, rendered: Recording) -> ForceError:
-    """How far a simulated rendering is from the model, felt at the handle's true position.
+    """How far a simulated rendering is from the identified model, felt at the handle's true position.
 
     Parameters
     ----------
@@ -116,8 +143,71 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     return ForceError(end=_rms(rendered.force - at_end), instant=_rms(rendered.force - at_start))
 
 
+def force_range(plan: Plan) -> float:
+    """Largest less smallest force of the model over its domain [N*m or N], both strokes included."""
+    lower, upper = plan.model.domain
+    if plan.model.of_velocity:
+        axes = [np.linspace(low, high, _GRID) for low, high in zip(lower, upper, strict=True)]
+        force = plan.model.predict(np.stack([axis.ravel() for axis in np.meshgrid(*axes)], axis=1))
+    else:
+        sweep = np.linspace(lower[0], upper[0], _GRID)
+        force = force_at(plan, np.concatenate([sweep, sweep[::-1]]))
+    return float(np.ptp(force))
+
+
+def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
+    """Judge a simulated rendering by its force error, its motion and its ticks.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was rendered.
+    rendered : Recording
+        From :func:`simulate`.
+    error : ForceError
+        From :func:`force_error`.
+    """
+    status = Counter(rendered.columns["status"])
+    ticks = len(rendered)
+    if failed := status["NonFinite"]:
+        return Verdict((no(f"the rendering ran away: {failed} of {ticks} ticks had no finite force"),))
+    lower, upper = float(rendered.position.min()), float(rendered.position.max())
+    if not rendered.force.any():
+        still = no(f"every force was zero: the handle stayed between {lower:.4g} and {upper:.4g}")
+        return Verdict((still,))
+    domain = float(plan.model.upper[0]) - float(plan.model.lower[0])
+    covered = (upper - lower) / domain
+    findings: list[Finding] = []
+    if lower == upper:
+        findings.append(no("the handle did not move: simulate a longer time, or a stiffer hand"))
+    elif covered < _SMALLEST_DOMAIN_SHARE:
+        findings.append(
+            usable(f"the handle covered {100 * covered:.3g} % of the model's domain: simulate a longer time")
+        )
+    span = force_range(plan)
+    share = error.end / span if span > 0 else 0.0
+    if share > _TOLERATED_ERROR:
+        level = no if share > plan.accept_force_error else usable
+        findings.append(
+            level(
+                f"the force error is {100 * share:.3g} % of the object's force range: "
+                "choose a structure with palpate plan, or a stiffer coupling"
+            )
+        )
+    outside = int(rendered.columns["extrapolated"].sum())
+    unsolved = status["MaxIterations"] + status["NotUnique"]
+    for count, sentence in (
+        (outside, "lay outside the model's data: identify the model over a larger range"),
+        (unsolved, "did not solve the load line: choose the structure with palpate plan"),
+        (status["Limited"], "clipped the force to the device's limit: a stronger device is needed"),
+    ):
+        if count > _TOLERATED_TICKS * ticks:
+            findings.append(usable(f"{count} of {ticks} ticks ({100 * count / ticks:.3g} %) {sentence}"))
+    return Verdict(tuple(findings))
+
+
 def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Float1D:
-    """The model's own force along a motion, without structure or coupling, play state and velocity included.
+    """The identified force along a motion, without structure or coupling, play state and velocity included.
 
     Parameters
     ----------

@@ -11,7 +11,6 @@ wavelets, so that elsewhere the model stays what it was and the limits are certi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -25,9 +24,7 @@ from ..identification.identified import Readings
 from ..identification.separable import Basis, Block, SeparableProblem
 from ..model import Model
 from .nearest_force import changes_needed
-
-_SAMPLES = 1001
-"""Positions over the domain [-]"""
+from .static_error import SAMPLES, strokes
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 """Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both
@@ -58,14 +55,6 @@ _SCALE_STEP = 0.75
 
 _WIDE = 1e9
 """A play of so many travels adds no slope while it sticks [-]"""
-
-
-@dataclass(frozen=True)
-class Loss:
-    """How far the rendered force is from the identified one, over the domain and both strokes [force]."""
-
-    largest: float
-    rms: float
 
 
 @lru_cache(maxsize=8)
@@ -105,44 +94,19 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
 def scale_loss(model: Model, share: float) -> Model:
     """The model with h multiplied by a share: less of what press and release differ by."""
     network = model.to_dict()["network"]
-    return changed_network(
-        model,
+    return model.with_network(
         weight_hysteresis=[share * weight for weight in network["weight_hysteresis"]],
         linear_hysteresis=[share * slope for slope in network["linear_hysteresis"]],
         bias_hysteresis=share * network["bias_hysteresis"],
     )
 
 
-def loss_between(identified: Model, rendered: Model) -> Loss:
-    """What is lost where `rendered` stands in for `identified`."""
-    x = np.linspace(identified.lower[0], identified.upper[0], _SAMPLES)
-    difference = _strokes(rendered, x) - _strokes(identified, x)
-    return Loss(float(np.abs(difference).max()), float(np.sqrt(np.mean(difference**2))))
-
-
-def changed_network(model: Model, **network: Any) -> Model:
-    """The model with other numbers in its network, and without plan, certificate and slope bounds."""
-    content = model.to_dict()
-    content["network"].update(network)
-    added = len(content["network"]["weight"]) - content["fit"]["n_wavelets"]
-    content["fit"]["n_wavelets"] += added
-    content["fit"]["n_parameters"] += added * (4 if model.hysteretic else 3)
-    content.update(plan=None, certificate=None, slope_bounds=None)
-    return Model.from_dict(content)
-
-
-def _strokes(model: Model, x: Float1D) -> Float2D:
-    """(1, n) the force, or (2, n) pressing and releasing."""
-    sides = (1.0, -1.0) if model.hysteretic else (None,)
-    return np.array([model.force(x, direction=side) for side in sides])
-
-
 def _limited_once(model: Model, low: float, high: float, sigma: float, restoring: bool) -> Model | None:
     """The model with the change fitted; None where its continuations would be steeper than the limit."""
-    x = np.linspace(model.lower[0], model.upper[0], _SAMPLES)
-    strokes = _strokes(model, x)
-    changes = changes_needed(x, strokes, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
-    wanted = strokes + changes
+    x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
+    forces = strokes(model, x)
+    changes = changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
+    wanted = forces + changes
     middle, travel = wanted.mean(axis=0), x[-1] - x[0]
     pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
     if not restoring and pushed_out and np.abs(middle).max() > high * travel:
@@ -150,7 +114,7 @@ def _limited_once(model: Model, low: float, high: float, sigma: float, restoring
     if len(changes) == 2:  # of g and h
         changes = np.array([0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])])
     alpha, beta = _candidates(x, np.any(changes != 0.0, axis=0), sigma)
-    close = min(_CLOSE * float(np.ptp(strokes)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
+    close = min(_CLOSE * float(np.ptp(forces)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
     before = model.alpha[:, 0], model.beta[:, 0]
     chosen = _chosen(x, changes, before, (alpha, beta), sigma, close)
     return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
@@ -184,14 +148,14 @@ def _fitted(
         new[f"bias{suffix}"] = float(found.bias[k])
         new[f"linear{suffix}"] = found.linear[k].tolist()
         new[f"weight{suffix}"] = found.weights[k].tolist()
-    limited = changed_network(model, **new)
+    limited = model.with_network(**new)
     if not lossy:
         return limited
     least = sliding_bounds(limited).loss_min
     if least >= 0.0:
         return limited
     # What is imposed holds but for rounding, and h >= 0 is proved or not: raise it by that much.
-    return changed_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
+    return limited.with_network(bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
 
 
 def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:

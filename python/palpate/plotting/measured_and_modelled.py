@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from .._typing import Float1D
 from ..recording import Recording
-from .look import label, label_force, label_position, strokes, thinned
+from .look import legend_above, scale_for, strokes, thinned
 
 _LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
 
@@ -45,16 +45,25 @@ def draw_measured_and_modelled(
     """
     residual = recording.force - modelled
     told_apart = strokes(recording.direction, len(recording))
+    x = scale_for(recording.units["position"], recording.position)
+    y = scale_for(recording.units["force"], recording.force, modelled)
+    z = scale_for(recording.units["force"], residual)
     for name, rows in told_apart:
         suffix = f", {name}" if name else ""
         position, force, rest = thinned(recording.position[rows], recording.force[rows], residual[rows])
         dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
         if name == "release":
             dots |= {"marker": "o", "markerfacecolor": "none", "markeredgewidth": 0.4}
-        force_axes.plot(position, force, **dots, color="0.65", markersize=2.2, label=f"{seen}{suffix}")
-        residual_axes.plot(
-            position, rest, **dots, color="0.45" if name != "release" else "0.7", markersize=2.0
+        force_axes.plot(
+            position * x.factor,
+            force * y.factor,
+            **dots,
+            color="0.65",
+            markersize=2.2,
+            label=f"{seen}{suffix}",
         )
+        shade = "0.45" if name != "release" else "0.7"
+        residual_axes.plot(position * x.factor, rest * z.factor, **dots, color=shade, markersize=2.0)
     for name, rows in told_apart:
         suffix = f", {name}" if name else ""
         position, curve = recording.position[rows], modelled[rows]
@@ -62,19 +71,20 @@ def draw_measured_and_modelled(
             order = np.argsort(position, kind="stable")
             position, curve = position[order], curve[order]
         force_axes.plot(
-            *thinned(position, curve),
+            *thinned(position * x.factor, curve * y.factor),
             color="black",
             linewidth=1.1,
             linestyle=_LINES[name],
             label=f"model{suffix}",
         )
         if standard_error is not None:
-            _draw_band(residual_axes, recording.position[rows], 2.0 * standard_error[rows], _LINES[name])
-    label_force(force_axes, recording.units)
-    force_axes.legend(frameon=False)
+            half = 2.0 * z.factor * standard_error[rows]
+            _draw_band(residual_axes, recording.position[rows] * x.factor, half, _LINES[name])
+    force_axes.set_ylabel(y.label("force"))
+    legend_above(force_axes)
     residual_axes.axhline(0.0, color="black", linewidth=0.6)
-    label_position(residual_axes, recording.units)
-    residual_axes.set_ylabel(label("residual", recording.units["force"]))
+    residual_axes.set_xlabel(x.label("position"))
+    residual_axes.set_ylabel(z.label("residual"))
     if standard_error is not None:
         residual_axes.set_title("lines: 95 % band of the model", loc="right", color="0.3")
 

@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from .look import grid, label
+from .look import grid, plain_decades, scale_for
 
 _MARKERS = "os^Dv<>p"
 
@@ -28,6 +28,7 @@ def draw_path(
     force_unit : str
         Of rmse.
     """
+    y = scale_for(force_unit, [step["rmse"] for step in path])
     rungs = dict.fromkeys(step["rung"] for step in path)
     least = min((step["criterion"] for step in path if step["criterion"] is not None), default=0.0)
     for marker, rung in zip(_MARKERS, rungs, strict=False):
@@ -41,7 +42,10 @@ def draw_path(
             "markeredgewidth": 0.7,
         }
         error_axes.plot(
-            [step["n_wavelets"] for step in steps], [step["rmse"] for step in steps], **look, label=rung
+            [step["n_wavelets"] for step in steps],
+            [step["rmse"] * y.factor for step in steps],
+            **look,
+            label=rung,
         )
         judged = [step for step in steps if step["criterion"] is not None]
         criterion_axes.plot(
@@ -49,12 +53,13 @@ def draw_path(
         )
     if all(step["rmse"] > 0.0 for step in path):
         error_axes.set_yscale("log")
+        plain_decades(error_axes.yaxis)
     criterion_axes.set_yscale("symlog", linthresh=10.0)
     for axes in (error_axes, criterion_axes):
         grid(axes)
     criterion_axes.set_ylim(bottom=-2.0)
     criterion_axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     criterion_axes.set_xlabel("wavelets")
-    error_axes.set_ylabel(label("RMS error", force_unit))
+    error_axes.set_ylabel(y.label("RMS error"))
     criterion_axes.set_ylabel("criterion above least")
     error_axes.legend(frameon=False)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from matplotlib.axes import Axes
 
 from .._typing import Float1D
-from .look import label_force, label_position, thinned
+from .look import scale_for, thinned
 
 
 def draw_real_against_rendered(
@@ -38,9 +38,11 @@ def draw_real_against_rendered(
     real_name : str
         What the recorded curve is called.
     """
+    x = scale_for(units["position"], real[0], rendered[0])
+    y = scale_for(units["force"], real[1], rendered[1])
     # The dots are wider than the line in front of them: both are seen where the two agree.
     axes.plot(
-        *thinned(*real),
+        *thinned(real[0] * x.factor, real[1] * y.factor),
         color="0.6",
         linestyle="none",
         marker=".",
@@ -48,9 +50,9 @@ def draw_real_against_rendered(
         markeredgewidth=0,
         label=real_name,
     )
-    axes.plot(*thinned(*rendered), color="black", linewidth=0.7, label="rendered")
-    label_position(axes, units)
-    label_force(axes, units)
+    shown = thinned(rendered[0] * x.factor, rendered[1] * y.factor)
+    axes.plot(*shown, color="black", linewidth=0.7, label="rendered")
+    axes.set_xlabel(x.label("position"))
+    axes.set_ylabel(y.label("force"))
     if title:
         axes.set_title(title)
-    axes.legend(frameon=False, markerscale=1.5)

@@ -53,4 +53,4 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit:
     axes.set_ylim(-1.15, 1.15)
     axes.set_xlabel("real part of z")
     axes.set_ylabel("imaginary part of z")
-    axes.figure.legend(frameon=False, loc="outside upper center", ncols=2, columnspacing=1.0)
+    axes.figure.legend(frameon=False, loc="outside lower center", ncols=2, columnspacing=1.0)

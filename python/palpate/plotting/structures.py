@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from .look import grid, label
+from .look import grid, plain_decades, scale_for
 
 
 def draw_structures(
@@ -27,10 +27,18 @@ def draw_structures(
     force_unit : str
         The unit of both.
     """
+    x = scale_for(force_unit, end, instant)
     place = np.arange(len(names), dtype=np.float64)
-    axes.plot(end, place - 0.12, linestyle="none", marker="o", color="black", label="end of tick")
     axes.plot(
-        instant,
+        np.multiply(end, x.factor),
+        place - 0.12,
+        linestyle="none",
+        marker="o",
+        color="black",
+        label="end of tick",
+    )
+    axes.plot(
+        np.multiply(instant, x.factor),
         place + 0.12,
         linestyle="none",
         marker="o",
@@ -39,8 +47,9 @@ def draw_structures(
         label="sampling instant",
     )
     axes.set_xscale("log")
+    plain_decades(axes.xaxis)
     axes.set_yticks(place, [name.replace(", ", ",\n", 1) for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
     grid(axes, "x")
-    axes.set_xlabel(label("force error, RMS", force_unit))
-    axes.figure.legend(frameon=False, loc="outside upper center", ncols=2)
+    axes.set_xlabel(x.label("force error, RMS"))
+    axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)

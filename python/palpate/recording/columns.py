@@ -1,36 +1,71 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which column is the position, which the force: five rules, and a sentence when they do not choose."""
+"""Choice of the columns of a recording by five rules; a refusal names all problems and one cure."""
 
 from __future__ import annotations
 
+import difflib
+import shlex
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..errors import InputError
-from .units import FORCE_UNITS, POSITION_UNITS, TIME_UNITS, UNITS, Unit, split_name, symbols_of
+from .names import listed, shortened
+from .units import (
+    FORCE_UNITS,
+    POSITION_UNITS,
+    TIME_UNITS,
+    UNITS,
+    Unit,
+    split_name,
+    stem_key,
+    symbols_of,
+    unit_of,
+)
 
 
 @dataclass(frozen=True)
 class Role:
-    """What a column can be chosen for."""
+    """A role that a column can have."""
 
     name: str
     si_units: tuple[str, ...]
     preferred_stems: tuple[str, ...]
     """Stems that win, the first first, when several columns could take the role."""
+    example: str
+    """Unit that a cure states where none is known"""
+    words: tuple[str, ...]
+    """Parts of names by which a cure chooses among columns without a unit"""
 
 
 POSITION = Role(
     "position",
     POSITION_UNITS,
     ("position", "displacement", "depth", "angle", "indentation", "tip_position", "height"),
+    "mm",
+    ("pos", "disp", "depth", "angle", "indent", "height", "travel", "stroke", "compr", "exten", "deflec"),
 )
-FORCE = Role("force", FORCE_UNITS, ("force", "torque", "normal_force", "hold_current", "current"))
-TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"))
+FORCE = Role(
+    "force",
+    FORCE_UNITS,
+    ("force", "torque", "normal_force", "hold_current", "current"),
+    "N",
+    ("force", "torque", "load", "current", "moment"),
+)
+TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"), "s", ("time",))
+ROLES = (POSITION, FORCE, TIME)
 
 DIRECTION_NAMES = ("direction", "segment")
 """Columns that are taken for the direction of the stroke when none is named."""
 
+
+_NO_CANDIDATES = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
+"""Stems of columns without a unit that a cure names last."""
+
+_LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
+"""Units that a cure states for columns without one, by a part of the name."""
+
+LONGEST_CURE = 1000
+"""Characters of the options in a message: longer names must be changed in the file."""
 
 _NUMBER_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
@@ -56,6 +91,16 @@ class Choice:
     notes: tuple[str, ...] = field(default=())
 
 
+@dataclass(frozen=True)
+class _Wish:
+    """Columns and units that the caller or a cure states."""
+
+    roles: Mapping[str, str | None]
+    direction: str | None
+    inputs: tuple[str, ...]
+    units: Mapping[str, str]
+
+
 def choose_columns(
     file: str,
     names: Sequence[str],
@@ -67,13 +112,16 @@ def choose_columns(
     inputs: Sequence[str] = (),
     units: Mapping[str, str] | None = None,
     unstated: Collection[str] = (),
+    text: Collection[str] = (),
+    steady: Collection[str] = (),
 ) -> Choice:
     """Choose the columns of a recording by their names alone.
 
     For position and force, in this order: (1) a named column wins; (2) where one stem stands in several
     units, the SI unit wins over a converted one, and both win over counts; (3) exactly one candidate is
     taken; (4) else the first stem of the role's list that is present; (5) else the file is refused, naming
-    the candidates and the option. Time follows the same rules, but a file may have none.
+    all problems and one set of options that solves them. Time follows the same rules, but a file may have
+    none.
 
     Parameters
     ----------
@@ -87,97 +135,132 @@ def choose_columns(
         Units of columns, by column name or by the role ("position", "force", "time"); wins over the name.
     unstated : collection of str
         Columns that the file itself declares to be in SI without saying which unit.
+    text : collection of str
+        Columns that are known to hold text; a cure does not name them.
+    steady : collection of str
+        Columns with one or two values at the start of the file; a cure names them last.
 
     Raises
     ------
     InputError
         A named column or unit does not exist, or no rule chooses.
     """
-    named = {"position": position, "force": force, "time": time}
-    wanted = [(f"--{role}", name) for role, name in (*named.items(), ("direction", direction))]
-    for option, value in (*wanted, *(("inputs", name) for name in inputs)):
-        if value is not None and value not in names:
-            raise InputError(
-                f"{file} has no column {value!r} for {option}; its columns are {', '.join(names)}"
-            )
-    columns = _with_units(file, names, named, dict(units or {}))
+    roles = {"position": position, "force": force, "time": time}
+    wish = _Wish(roles, direction, tuple(inputs), dict(units or {}))
+    choice, problems = _attempt(names, wish, unstated)
+    if choice is not None:
+        silent = None if choice.time is not None else _silent_time(names, wish, text)
+        if silent is None:
+            return choice
+        added = " ".join(_time_options(silent))
+        note = f"column {shortened(silent)} has no unit and is not used; if it is in s, add: {added}"
+        return replace(choice, notes=(*choice.notes, note))
+    told = "; ".join(problems.values())
+    if "no column" in told:
+        told += f"; its columns are {listed(names)}"
+    raise InputError(f"{file}: {told}{_cure(names, wish, unstated, text, steady, problems)}")
+
+
+def _attempt(
+    names: Sequence[str], wish: _Wish, unstated: Collection[str]
+) -> tuple[Choice | None, dict[str, str]]:
+    """The choice, or the problems by the role or option that they concern."""
+    problems: dict[str, str] = {}
+    options = [(f"--{role}", name) for role, name in (*wish.roles.items(), ("direction", wish.direction))]
+    for option, name in (*options, *(("inputs", name) for name in wish.inputs)):
+        if name is not None and name not in names:
+            problems[option.strip("-")] = f"it has no column {shortened(name)!r} for {option}"
+    columns = _with_units(names, wish, problems)
     notes: list[str] = []
-    the_position, the_force, the_time = (
-        _choose(file, role, columns, named[role.name], unstated, notes) for role in (POSITION, FORCE, TIME)
-    )
-    if the_position is None:
-        raise _nothing_found(file, POSITION, columns)
-    if the_force is None:
-        raise _nothing_found(file, FORCE, columns)
-    if the_position.name == the_force.name:
-        raise InputError(f"{file}: column {the_position.name} cannot be both the position and the force")
-    if direction is None:
-        direction = next((name for name in DIRECTION_NAMES if name in names), None)
+    chosen: dict[str, Column | None] = {}
+    for role in ROLES:
+        if role.name not in problems:
+            chosen[role.name] = _choose(role, columns, wish.roles[role.name], unstated, notes, problems)
+    the_position, the_force = chosen.get("position"), chosen.get("force")
+    if the_position is not None and the_force is not None and the_position.name == the_force.name:
+        both = f"column {shortened(the_force.name)} cannot be both the position and the force"
+        problems.setdefault("force", both)
+    if problems or the_position is None or the_force is None:
+        return None, problems
+    direction = wish.direction or next((name for name in DIRECTION_NAMES if name in names), None)
     return Choice(
         position=the_position,
         force=the_force,
-        time=the_time,
+        time=chosen["time"],
         direction=direction,
-        inputs=tuple(next(column for column in columns if column.name == name) for name in inputs),
+        inputs=tuple(next(column for column in columns if column.name == name) for name in wish.inputs),
         notes=tuple(notes),
-    )
+    ), {}
 
 
-def _with_units(
-    file: str, names: Sequence[str], named: Mapping[str, str | None], units: dict[str, str]
-) -> list[Column]:
+def _with_units(names: Sequence[str], wish: _Wish, problems: dict[str, str]) -> list[Column]:
     """Give every column the unit of its name, or the one the caller states."""
-    stated: dict[str, str] = {}
-    for key, symbol in units.items():
-        column = key if key in names else named.get(key)
-        if column is None and key in named:
-            raise InputError(f"--units {key}={symbol} also needs --{key} NAME, which says what column it is")
-        if column is None:
-            raise InputError(f"{file} has no column {key!r} for --units; its columns are {', '.join(names)}")
-        if symbol not in UNITS:
-            raise InputError(f"--units {key}={symbol}: {symbol!r} is no unit; use one of {', '.join(UNITS)}")
-        stated[column] = symbol
+    stated: dict[str, Unit] = {}
+    for key, symbol in wish.units.items():
+        column = key if key in names else wish.roles.get(key)
+        unit = unit_of(symbol)
+        if column is None and key in wish.roles:
+            problems[key] = f"--units {key}={symbol} also needs --{key} NAME, which names its column"
+        elif column is None:
+            problems[f"units {key}"] = (
+                f"it has no column {shortened(key)!r} for --units; leave out this option"
+            )
+        elif unit is None:
+            problems[f"units {key}"] = (
+                f"--units {key}={symbol}: {shortened(symbol)!r} is no unit; use one of {', '.join(UNITS)}"
+            )
+        else:
+            stated[column] = unit
     columns = []
     for name in names:
         stem, unit = split_name(name)
-        columns.append(Column(name, stem, UNITS[stated[name]] if name in stated else unit))
+        if name.endswith("_in") and f"{stem}_out" in names:
+            stem, unit = name, None  # an input beside an output, not inches
+        columns.append(Column(name, stem, stated.get(name, unit)))
     return columns
 
 
 def _choose(
-    file: str,
     role: Role,
     columns: Sequence[Column],
     named: str | None,
     unstated: Collection[str],
     notes: list[str],
+    problems: dict[str, str],
 ) -> Column | None:
     if named is not None:
         column = next(column for column in columns if column.name == named)
         if column.unit is not None or named not in unstated:
-            _require_unit(file, role, column)
+            _require_unit(role, column, problems)
         return column
     candidates = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
-    by_stem: dict[str, list[Column]] = {}
-    for column in candidates:
-        by_stem.setdefault(column.stem, []).append(column)
-    best = [_prefer_si(same_stem, notes) for same_stem in by_stem.values()]
+    if not candidates:
+        if role is not TIME:
+            problems[role.name] = f"no column name has a unit of {role.name} ({symbols_of(role.si_units)})"
+        return None
+    best = _best(candidates, notes)
     if len(best) == 1 and len(best[0]) == 1:
         return best[0][0]
     for stem in role.preferred_stems:
-        alone = [group[0] for group in best if group[0].stem == stem and len(group) == 1]
+        alone = [group[0] for group in best if stem_key(group[0].stem) == stem and len(group) == 1]
         if alone:
-            others = ", ".join(column.name for column in candidates if column.stem != stem)
+            others = listed(column.name for column in candidates if stem_key(column.stem) != stem)
             notes.append(f"{alone[0].name} is preferred by its name to {others}")
             return alone[0]
-    if not candidates:
-        return None
-    found = ", ".join(column.name for group in best for column in group)
-    count = sum(map(len, best))
-    raise InputError(
-        f"{file}: {_NUMBER_WORDS.get(count, count)} columns could be the {role.name} ({found}); "
-        f"choose with --{role.name} NAME"
+    found = [column.name for group in best for column in group]
+    count = len(found)
+    problems[role.name] = (
+        f"{_NUMBER_WORDS.get(count, count)} columns could be the {role.name} ({listed(found)})"
     )
+    return None
+
+
+def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
+    """Candidates of each stem, those in SI alone where a stem stands in several units."""
+    by_stem: dict[str, list[Column]] = {}
+    for column in candidates:
+        by_stem.setdefault(stem_key(column.stem), []).append(column)
+    return [_prefer_si(same_stem, notes) for same_stem in by_stem.values()]
 
 
 def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
@@ -192,28 +275,106 @@ def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
     nearest = min(map(distance_from_si, same_stem))
     kept = [column for column in same_stem if distance_from_si(column) == nearest]
     if len(kept) == 1 < len(same_stem):
-        others = ", ".join(column.name for column in same_stem if column is not kept[0])
+        others = listed(column.name for column in same_stem if column is not kept[0])
         notes.append(f"{kept[0].name} is used in place of {others} (SI wins)")
     return kept
 
 
-def _require_unit(file: str, role: Role, column: Column) -> None:
+def _require_unit(role: Role, column: Column, problems: dict[str, str]) -> None:
     allowed = symbols_of(role.si_units)
     if column.unit is None:
-        raise InputError(
-            f"{file}: column {column.name} has no known unit; "
-            f"state it with --units {column.name}=UNIT (one of {allowed})"
-        )
-    if column.unit.si not in role.si_units:
-        raise InputError(
-            f"{file}: column {column.name} is in {column.unit.symbol}, which is no unit of {role.name} "
-            f"({allowed}); choose another with --{role.name} NAME, or state its unit with --units"
+        problems[role.name] = f"column {shortened(column.name)} has no known unit ({allowed})"
+    elif column.unit.si not in role.si_units:
+        problems[role.name] = (
+            f"column {shortened(column.name)} is in {column.unit.symbol}, "
+            f"which is no unit of {role.name} ({allowed})"
         )
 
 
-def _nothing_found(file: str, role: Role, columns: Sequence[Column]) -> InputError:
-    names = ", ".join(column.name for column in columns)
-    return InputError(
-        f"{file}: no column name ends in a unit of {role.name} ({symbols_of(role.si_units)}) among {names}; "
-        f"name one with --{role.name} NAME and state its unit with --units NAME=UNIT"
-    )
+def _cure(
+    names: Sequence[str],
+    wish: _Wish,
+    unstated: Collection[str],
+    text: Collection[str],
+    steady: Collection[str],
+    problems: Mapping[str, str],
+) -> str:
+    """The options to add, which are tried before they are named."""
+    none = "; a recording needs two columns of numbers, a position and a force"
+    roles, units, direction = dict(wish.roles), dict(wish.units), wish.direction
+    inputs = tuple(name for name in wish.inputs if name in names)
+    assumed: list[str] = []
+    added: list[str] = []
+    for key in list(units):
+        if f"units {key}" in problems and (key in names or key in roles):
+            units[key] = difflib.get_close_matches(units[key], UNITS, 1, 0.0)[0]
+            added.append(f"--units {shlex.quote(f'{key}={units[key]}')}")
+        elif f"units {key}" in problems:
+            del units[key]
+    if "direction" in problems:
+        direction = next(iter(difflib.get_close_matches(str(direction), names, 1, 0.0)), None)
+        added.append(f"--direction {shlex.quote(str(direction))}")
+    columns = _with_units(names, replace(wish, units=units), {})
+    for role in (role for role in ROLES if role.name in problems):
+        others = {name for other, name in roles.items() if other != role.name}
+        wrong = roles[role.name]
+        if (
+            wrong in names
+            and wrong not in others
+            and f"column {wrong} has no known unit" in problems[role.name]
+        ):
+            pick: Column | None = next(column for column in columns if column.name == wrong)
+        else:
+            left_out = {*others, *text, *DIRECTION_NAMES}
+            pick = _suggested(role, [each for each in columns if each.name not in left_out], steady)
+        if pick is None:
+            return none
+        if pick.name != wrong:
+            added.append(f"--{role.name} {shlex.quote(pick.name)}")
+        roles[role.name] = pick.name
+        if role.name not in units and (pick.unit is None or pick.unit.si not in role.si_units):
+            stem = stem_key(pick.stem)
+            unit = next((unit for word, unit in _LIKELY_UNITS.items() if word in stem), role.example)
+            units[pick.name] = unit if UNITS[unit].si in role.si_units else role.example
+            added.append(f"--units {shlex.quote(f'{pick.name}={units[pick.name]}')}")
+            assumed.append(f"{shortened(pick.name)} is in {units[pick.name]}")
+    choice, _ = _attempt(names, _Wish(roles, direction, inputs, units), unstated)
+    if choice is not None and choice.time is None and (silent := _silent_time(names, wish, text)):
+        added += _time_options(silent)
+        assumed.append(f"{shortened(silent)} is in s")
+    options = " ".join(added)
+    if choice is None or not added or len(options) > LONGEST_CURE:
+        return none
+    condition = f"if {' and '.join(assumed)}, " if assumed else "for example "
+    return f"; {condition}add: {options}"
+
+
+def _silent_time(names: Sequence[str], wish: _Wish, text: Collection[str]) -> str | None:
+    """A column that is called time, but states no unit and is not used."""
+    taken = {*wish.roles.values(), *wish.inputs, *text}
+    times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in taken)
+    return next(times, None)
+
+
+def _time_options(name: str) -> list[str]:
+    return [f"--time {shlex.quote(name)}", f"--units {shlex.quote(f'{name}=s')}"]
+
+
+def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:
+    """The column that a cure names: one with a unit of the role, else the likeliest without a unit."""
+    fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
+    if fitting:
+        return _best(fitting, [])[0][0]
+    foreign = [word for other in ROLES if other is not role for word in other.words]
+
+    def rank(column: Column) -> tuple[bool, ...]:
+        stem = stem_key(column.stem)
+        return (
+            stem not in role.preferred_stems,
+            stem in _NO_CANDIDATES,
+            column.name in steady,
+            not any(word in stem for word in role.words),
+            any(word in stem for word in foreign),
+        )
+
+    return min((column for column in columns if column.unit is None), key=rank, default=None)

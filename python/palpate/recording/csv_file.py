@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CSV with `#` lines of metadata and a header: pandas reads it, this adds the line numbers it forgets."""
+"""CSV: the dialect is recognised once, then pandas reads the rows; messages name the line of a row."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
+from .dialect import HEAD_BYTES, not_csv, recognise
 from .file_bytes import FileBytes
-from .table import MISSING, Cells, parse_number, to_numbers
+from .header import refuse_marks
+from .row_count import count_rows
+from .table import MISSING, Cells, parse_with, to_numbers
 
 _CHUNK_ROWS = 1_000_000
 """Rows read at a time: bounds the memory beside the columns themselves."""
@@ -26,6 +29,9 @@ _EXACT: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
 """Numbers to the last bit: what older pandas had to be asked for, newer pandas always does."""
+
+_FURTHER = "\n"
+"""Name of the empty column where each row ends with a separator: no header can hold it."""
 
 _SNIFF_ROWS = 1000
 """Rows looked at to tell text columns from numeric ones before the fast reader starts."""
@@ -44,11 +50,13 @@ class CsvFile:
         self.torn = 0
         if path.suffix == ".part":
             self._leave_out_torn_line()
-        self.metadata: dict[str, str] = {}
-        self._header_line = 0
-        with self._lines() as lines:
-            self.names = self._read_header(lines)
-        self._sniffed_text = self._sniff()
+        with self._bytes() as stream:
+            head = stream.read(HEAD_BYTES)
+        self._dialect = recognise(str(path), head, len(head) == self._size)
+        self.names = self._dialect.names
+        self.metadata = self._dialect.metadata
+        self.notes = self._dialect.notes
+        self.text_names, self.steady_names = self._sniff()
 
     def _leave_out_torn_line(self) -> None:
         with self._path.open("rb") as stream:
@@ -64,69 +72,56 @@ class CsvFile:
         self.torn = int(end < self._size)
         self._size = end
 
-    def _bytes(self) -> io.BufferedReader:
-        return io.BufferedReader(FileBytes(self._path, 0, self._size), 1 << 20)
+    def _bytes(self, start: int = 0, stop: int | None = None) -> io.BufferedReader:
+        return io.BufferedReader(FileBytes(self._path, start, self._size if stop is None else stop), 1 << 20)
 
-    def _not_text(self) -> InputError:
-        return InputError(f"{self._path} is not text in UTF-8; a recording is CSV or Parquet")
+    def _not_decoded(self) -> InputError:
+        encoding = {"latin-1": "Latin-1"}.get(self._dialect.encoding, self._dialect.encoding.upper())
+        return InputError(
+            f"{self._path} begins as {encoding} and later holds bytes that are not; if they are Latin-1, "
+            "convert the file: iconv -f LATIN1 -t UTF-8 OLD.csv > NEW.csv"
+        )
 
     @contextmanager
     def _lines(self) -> Iterator[io.TextIOWrapper]:
-        with io.TextIOWrapper(self._bytes(), encoding="utf-8-sig", newline="") as lines:
+        """The lines of data."""
+        stream = self._bytes(self._dialect.start)
+        with io.TextIOWrapper(stream, encoding=self._dialect.encoding, newline="") as lines:
             try:
                 yield lines
             except UnicodeDecodeError:
-                raise self._not_text() from None
+                raise self._not_decoded() from None
             except csv.Error as error:
-                raise InputError(f"{self._path} is not CSV: {error}") from None
-
-    def _read_header(self, lines: io.TextIOWrapper) -> tuple[str, ...]:
-        while line := lines.readline():
-            self._header_line += 1
-            text = line.strip()
-            if text.startswith("#"):
-                key, _, value = text[1:].partition(":")
-                self.metadata[key.strip()] = value.strip()
-            elif text:
-                names = tuple(name.strip() for name in next(csv.reader([text])))
-                self._check_names(names)
-                return names
-        raise InputError(f"{self._path} holds no header: the first line must name the columns")
-
-    def _check_names(self, names: tuple[str, ...]) -> None:
-        where = f"{self._path}, line {self._header_line}"
-        if any(parse_number(name) is not None for name in names):
-            raise InputError(f"{where}: a header with column names must come first, found {', '.join(names)}")
-        if "" in names:
-            raise InputError(f"{where}: column {names.index('') + 1} has no name")
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"{where}: column name {name} stands {names.count(name)} times")
-        if len(names) == 1:
-            raise InputError(
-                f"{where}: there is one column ({names[0]}); a recording needs a position and a force, "
-                "separated by commas"
-            )
+                raise not_csv(str(self._path), error) from None
 
     def _rows(self, lines: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
         """Line number and cells of each row: slow, for the start of a file and for error messages."""
-        for _ in range(self._header_line):
-            lines.readline()
-        reader = csv.reader(lines)
+        reader = csv.reader(lines, delimiter=self._dialect.separator)
         for cells in reader:
             if len(cells) > 1 or (cells and cells[0].strip()):
-                yield self._header_line + reader.line_num, cells
+                yield self._dialect.lines_before + reader.line_num, cells
 
-    def _sniff(self) -> set[str]:
+    def _sniff(self) -> tuple[set[str], set[str]]:
+        """Names of the columns with text, and of those with one or two values, in the first rows."""
         text: set[str] = set()
+        values: dict[str, set[str]] = {name: set() for name in self.names}
+        columns = len(self.names) + self._dialect.trailing
         with self._lines() as lines:
             for row, (line, cells) in enumerate(self._rows(lines)):
-                if len(cells) > len(self.names):
+                if len(cells) > columns:
                     raise self._too_many_cells(line, len(cells))
-                text |= {name for name, cell in zip(self.names, cells, strict=False) if not _numeric(cell)}
+                for name, cell in zip(self.names, cells, strict=False):
+                    if len(values[name]) < 3:
+                        values[name].add(cell)
+                    if name not in text and not self._numeric(cell):
+                        text.add(name)
                 if row == _SNIFF_ROWS:
                     break
-        return text
+        return text, {name for name, found in values.items() if len(found) < 3}
+
+    def _numeric(self, cell: str) -> bool:
+        text = cell.strip()
+        return text in MISSING or parse_with(text, self._dialect.decimal) is not None
 
     def _too_many_cells(self, line: int, found: int) -> InputError:
         return InputError(
@@ -135,7 +130,7 @@ class CsvFile:
 
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
         """See :class:`palpate.recording.table.TableFile`."""
-        as_text = self._sniffed_text | set(text)
+        as_text = self.text_names | set(text)
         try:
             return self._read(as_text, numbers, text)
         except ValueError as error:
@@ -152,7 +147,7 @@ class CsvFile:
                 if name not in as_text:
                     cells = chunk[name].to_numpy(dtype=np.float64)
                 elif name in numbers and name not in text:
-                    cells = to_numbers(chunk[name].to_numpy(dtype=object))
+                    cells = self._to_numbers(name, chunk[name].to_numpy(dtype=object))
                 else:
                     # Few words, many rows: a categorical keeps one string for each word.
                     cells = chunk[name].astype("category").to_numpy(dtype=object)
@@ -168,69 +163,74 @@ class CsvFile:
         for chunk in self._chunks(dict.fromkeys(self.names, "str")):
             for name in set(self.names) - known - found:
                 cells = chunk[name]
+                if self._dialect.decimal == ",":
+                    cells = cells.str.replace(",", ".")
                 if pd.to_numeric(cells[~cells.isin(MISSING)], errors="coerce").isna().any():
                     found.add(name)
         return found
 
-    def parts(self, rows: int) -> list[tuple[int, int]]:
-        """See :class:`palpate.recording.table.TableFile`: ranges of bytes that end where a line does."""
-        with self._bytes() as stream:
-            for _ in range(self._header_line):
-                stream.readline()
-            start = stream.tell()
+    def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
+        """See :class:`palpate.recording.table.TableFile`: ranges of bytes that end where a row does."""
+        if not self._dialect.single_bytes:
+            encoding = self._dialect.encoding.upper().replace("16-", "16")  # as iconv names it
+            raise InputError(
+                f"{self._path} is {encoding}, which cannot be read part by part; convert it: "
+                f"iconv -f {encoding} -t UTF-8 OLD.csv > NEW.csv"
+            )
+        start = self._dialect.start
+        with self._bytes(start) as stream:
             first = stream.readline()
-            edges = [start]
-            step = max(rows * max(len(first), 1), 1)
-            while (aim := edges[-1] + step) < self._size:
-                stream.seek(aim)
-                stream.readline()
-                edges.append(min(stream.tell(), self._size))
-        if edges[-1] < self._size:
-            edges.append(self._size)
-        return list(pairwise(edges))
+        columns = len(self.names) + self._dialect.trailing
+        step = max(rows * len(first), 1)
+        with self._bytes(start) as stream:
+            found = count_rows(stream, self._dialect.separator, columns=columns, step=step)
+        if found.too_wide is not None:
+            row, cells = found.too_wide
+            raise self._too_many_cells(self._find(row)[0], cells)
+        return found.rows, [(start + begin, start + end) for begin, end in pairwise(found.ends)]
 
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
         """See :class:`palpate.recording.table.TableFile`."""
         wanted = [name for name in self.names if name in numbers or name in text]
-        # Most files hold nothing but numbers in number columns, and are read fast; at the first block that
-        # does not, the rest is read as text and becomes numbers one by one.
-        done = 0
+        # Most files hold only numbers in number columns, and are read fast. If a block does not, the part is
+        # read again as text, without the rows that were given already.
+        given = 0
         for as_text in ({*text}, {*text, *numbers}):
             types = {name: "str" if name in as_text else "float64" for name in wanted}
-            first, skipped = 0, 0
+            first = 0
             try:
                 for chunk in self._chunks(types, part=part, columns=wanted, rows=rows):
-                    if skipped < done:
-                        skipped += 1
-                    else:
-                        yield first, {name: self._block(chunk[name], name in text) for name in wanted}
-                        done += 1
-                    first += len(chunk)
+                    stop = first + len(chunk)
+                    if stop > given:
+                        new = chunk.iloc[max(given - first, 0) :]
+                        begin, given = stop - len(new), stop
+                        yield begin, {name: self._block(name, new[name], name in text) for name in wanted}
+                    first = stop
                 return
             except ValueError as error:
                 if isinstance(error, InputError) or set(numbers) <= as_text:
                     raise
 
-    def _block(self, cells: Any, text: bool) -> Cells:
+    def _block(self, name: str, cells: Any, text: bool) -> Cells:
         if text:
             return np.asarray(cells.astype("category").to_numpy(dtype=object))
         if cells.dtype == np.float64:
             return np.asarray(cells.to_numpy(dtype=np.float64))
-        return to_numbers(cells.to_numpy(dtype=object))
+        return self._to_numbers(name, cells.to_numpy(dtype=object))
+
+    def _to_numbers(self, name: str, cells: Cells) -> Cells:
+        numbers = to_numbers(cells, self._dialect.decimal)
+        others = cells[np.isnan(numbers)]
+        where = f"{self._path}: column {name}"
+        refuse_marks(where, others, self._dialect.decimal, self._dialect.separator)
+        return numbers
 
     def rows_before(self, part: tuple[int, int]) -> int:
-        """See :class:`palpate.recording.table.TableFile`; a file is not expected to have blank lines."""
-        rows, left = 0, part[0]
-        with self._bytes() as stream:
-            for _ in range(self._header_line):
-                left -= len(stream.readline())
-            while left > 0:
-                block = stream.read(min(1 << 20, left))
-                left -= len(block)
-                rows += block.count(b"\n")
-        return rows
+        """See :class:`palpate.recording.table.TableFile`."""
+        with self._bytes(self._dialect.start, part[0]) as stream:
+            return count_rows(stream, self._dialect.separator).rows
 
     def _chunks(
         self,
@@ -241,18 +241,22 @@ class CsvFile:
         rows: int = _CHUNK_ROWS,
     ) -> Iterator[Any]:
         """Frames of so many rows of the whole file or a part of it."""
-        raw = FileBytes(self._path, *(part or (0, self._size)))
+        raw = FileBytes(self._path, *(part or (self._dialect.start, self._size)))
+        trailing = [_FURTHER] if self._dialect.trailing else []
+        before = 0
         try:
             with (
                 io.BufferedReader(raw, 1 << 20) as stream,
                 pd.read_csv(
                     stream,
-                    encoding="utf-8",
+                    encoding=self._dialect.encoding,
+                    sep=self._dialect.separator,
+                    decimal=self._dialect.decimal,
                     header=None,
-                    names=list(self.names),
-                    usecols=None if columns is None else list(columns),
-                    skiprows=self._header_line if part is None else 0,
-                    dtype=dtypes,
+                    names=[*self.names, *trailing],
+                    usecols=None if columns is None else [*columns, *trailing],
+                    index_col=False,
+                    dtype={**dtypes, **dict.fromkeys(trailing, "category")},
                     keep_default_na=False,
                     na_values={name: MISSING for name, dtype in dtypes.items() if dtype == "float64"},
                     **_EXACT,
@@ -260,18 +264,37 @@ class CsvFile:
                     engine="c",
                 ) as reader,
             ):
-                yield from reader
+                for chunk in reader:
+                    if trailing:
+                        self._require_no_more(chunk.pop(_FURTHER), before, part)
+                    before += len(chunk)
+                    yield chunk
         except pd.errors.EmptyDataError:
             return
         except UnicodeDecodeError:
-            raise self._not_text() from None
+            raise self._not_decoded() from None
         except pd.errors.ParserError as error:
             if "source failed" in str(error):
                 # What was raised while pandas read is lost in it: the disk's failure, or else Ctrl-C.
                 raise (raw.failure or KeyboardInterrupt()) from None
             if cells := re.search(r"in line (\d+), saw (\d+)", str(error)):
-                raise self._too_many_cells(int(cells[1]), int(cells[2])) from None
+                raise self._too_many_cells(self._line(int(cells[1]), part), int(cells[2])) from None
             raise InputError(f"{self._path} is not CSV: {str(error).strip()}") from None
+
+    def _require_no_more(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
+        """Refuse a row with more cells than the header has names."""
+        if any(str(word).strip() for word in cells.cat.categories):
+            more = cells.notna() & (cells.astype(str).str.strip() != "")
+            row = before + int(np.flatnonzero(more)[0])
+            line, found = self._find(row + (self.rows_before(part) if part else 0))
+            raise self._too_many_cells(line, len(found))
+
+    def _line(self, line: int, part: tuple[int, int] | None) -> int:
+        """The line of the file that is this line of the data or of a part."""
+        if part is not None:
+            with self._bytes(self._dialect.start, part[0]) as stream:
+                line += sum(1 for _ in stream)
+        return self._dialect.lines_before + line
 
     def place(self, row: int) -> str:
         """See :class:`palpate.recording.table.TableFile`."""
@@ -289,7 +312,3 @@ class CsvFile:
                 if index == row:
                     return found
         raise IndexError(row)
-
-
-def _numeric(cell: str) -> bool:
-    return cell.strip() in MISSING or parse_number(cell) is not None

@@ -11,14 +11,13 @@ from typing import Literal
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .columns import Choice, Column, choose_columns
-from .csv_file import CsvFile
 from .files import require_file, sha256_of_file
 from .layout import Layout
 from .notes import chosen
-from .parquet_file import ParquetFile
 from .recording import UNSTATED, Source
-from .rows import RowCheck
-from .table import TableFile
+from .rows import LeftOut, RowCheck
+from .table import Places, TableFile
+from .tables import open_table
 
 PART_ROWS = 4_000_000
 """Rows of a part: what one worker reads at a time."""
@@ -28,43 +27,68 @@ BLOCK_ROWS = 500_000
 
 
 @dataclass(frozen=True)
+class Block:
+    """Rows of a part that are in memory at a time."""
+
+    position: Float1D
+    """[SI]"""
+    force: Float1D
+    """[SI]"""
+    direction: Int8Vector | None
+    rows: int
+    """Rows of the file, those that are left out included"""
+    left_out: LeftOut
+
+
+@dataclass(frozen=True)
 class LongRecording:
     """How a file is read; from :func:`open_long_recording`, and light enough to be sent to workers."""
 
     path: Path
     choice: Choice
     direction: str | None
+    status: str | None
+    """Column that says of each row whether its force was the model's alone"""
     negate: tuple[str, ...]
     drop: bool
     parts: tuple[tuple[int, int], ...]
     """Places between which the file is read apart"""
+    rows: int
+    """Rows of the file, counted without reading their cells"""
     units: Mapping[str, str]
     source: Source
-    """Without the number of its rows, which nobody has counted yet"""
+    """Without the number of rows that are used"""
     notes: tuple[str, ...]
 
-    def blocks(self, part: tuple[int, int]) -> Iterator[tuple[Float1D, Float1D, Int8Vector | None]]:
-        """Position, force (SI) and direction of the rows of a part, block by block.
+    def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
+        """Position, force and direction of the rows of a part, block by block.
 
         Raises
         ------
         InputError
             A row has no finite number or no known direction, and rows are not to be dropped.
         """
-        table = _table(self.path)
+        table = open_table(self.path)
         columns = (self.choice.position, self.choice.force)
         numbers = [column.name for column in columns]
-        text = [self.direction] if self.direction else []
+        text = [name for name in (self.direction, self.status) if name is not None]
         for first, cells in table.blocks(part, BLOCK_ROWS, numbers=numbers, text=text):
-            check = RowCheck(str(self.path), _Part(table, part), first, len(cells[numbers[0]]), self.drop)
+            rows = len(cells[numbers[0]])
+            check = RowCheck(str(self.path), _Part(table, part), first, rows, self.drop)
+            if self.status is not None:
+                check.as_modelled(cells[self.status])
             for name in numbers:
                 check.finite(name, cells[name])
             words = (
                 None if self.direction is None else check.directions(self.direction, cells[self.direction])
             )
             position, force = (self._read(column, cells[column.name])[check.kept] for column in columns)
-            if len(position):
-                yield position, force, None if words is None else words[check.kept]
+            direction = None if words is None else words[check.kept]
+            yield Block(position, force, direction, rows, check.left_out)
+
+    def places(self) -> Places:
+        """Where the rows of the file stand."""
+        return open_table(self.path)
 
     def _read(self, column: Column, values: Float1D) -> Float1D:
         role = "position" if column is self.choice.position else "force"
@@ -73,7 +97,7 @@ class LongRecording:
 
 
 class _Part:
-    """Where a person finds a row of a part; only when it is asked does anybody count the rows before."""
+    """Where the rows of a part stand. The rows before the part are counted only when a place is needed."""
 
     def __init__(self, table: TableFile, part: tuple[int, int]) -> None:
         self._table, self._part = table, part
@@ -90,6 +114,7 @@ def open_long_recording(
     *,
     position: str | None = None,
     force: str | None = None,
+    time: str | None = None,
     direction: str | None = None,
     units: Mapping[str, str] | None = None,
     negate: tuple[str, ...] = (),
@@ -105,17 +130,19 @@ def open_long_recording(
     """
     file = Path(path)
     require_file(file)
-    table = _table(file)
+    table = open_table(file)
     layout = Layout.taken_from(str(file), dict(table.metadata))
     choice = choose_columns(
         str(file),
         table.names,
         position=position or layout.roles.get("position"),
         force=force or layout.roles.get("force"),
-        time=layout.roles.get("time"),
+        time=time or layout.roles.get("time"),
         direction=direction or layout.roles.get("direction"),
         units=units,
         unstated=layout.roles.values(),
+        text=table.text_names,
+        steady=table.steady_names,
     )
     used = {"position", "force", choice.position.name, choice.force.name}
     for name in negate:
@@ -124,14 +151,22 @@ def open_long_recording(
                 f"{file}: --negate {name} names no column that is used ({', '.join(sorted(used))})"
             )
     stroke = choice.direction
+    if stroke == "segment" and direction is None and stroke not in table.text_names:
+        stroke = None  # numbered segments do not state the stroke
+    status = layout.roles.get("status")
+    if status is not None and status not in table.names:
+        raise InputError(f"{file} has no column {status!r}, which its metadata names as the status")
+    rows, parts = table.parts(part_rows)
     columns = {"position": choice.position.name, "force": choice.force.name}
     return LongRecording(
         path=file,
         choice=choice,
         direction=stroke,
+        status=status,
         negate=tuple(negate),
         drop=invalid == "drop",
-        parts=tuple(table.parts(part_rows)),
+        parts=tuple(parts),
+        rows=rows,
         units={
             "position": choice.position.unit.si if choice.position.unit else UNSTATED,
             "force": choice.force.unit.si if choice.force.unit else UNSTATED,
@@ -142,9 +177,5 @@ def open_long_recording(
             rows=0,
             columns=columns if stroke is None else {**columns, "direction": stroke},
         ),
-        notes=(chosen(choice, stroke, None), *choice.notes),
+        notes=(chosen(choice, stroke, None, table.notes), *choice.notes),
     )
-
-
-def _table(path: Path) -> TableFile:
-    return ParquetFile(path) if path.suffix == ".parquet" else CsvFile(path)

@@ -102,28 +102,38 @@ class LowPass:
 
 
 def pieces(recording: Recording) -> list[Piece]:
-    """The recording between its gaps, each piece on an even grid of the recording's median step of time.
+    """The recording between its gaps, each piece on an even grid of the motion's median step of time.
+
+    The positions are those of the whole motion; the forces are those of the recording's own rows.
 
     Raises
     ------
     InputError
         The recording has no time.
     """
-    period = recording.sample_period
-    if recording.time is None or period is None:
+    motion = recording.motion
+    if recording.time is None or motion.time is None or len(motion.time) < 2:
         raise InputError("velocity needs time: the recording has none (--time NAME)")
-    steps = np.diff(recording.time)
-    edges = [0, *(np.flatnonzero(steps > GAP * period) + 1), len(recording)]
+    steps = np.diff(motion.time)
+    period = float(np.median(steps))
+    edges = [0, *(np.flatnonzero(steps > GAP * period) + 1), len(motion.time)]
     found = []
     for start, stop in pairwise(edges):
-        rows = slice(int(start), int(stop))
-        at, position, force = recording.time[rows], recording.position[rows], recording.force[rows]
+        first, last = np.searchsorted(motion.rows, [start, stop])
+        if first == last:
+            continue
+        rows = slice(int(first), int(last))
+        at, position = motion.time[start:stop], motion.position[start:stop]
+        row_time, force = recording.time[rows], recording.force[rows]
         even = bool(np.all(np.abs(np.diff(at) - period) <= UNEVEN * period))
+        whole = last - first == stop - start
         grid = at
         if not even:
             grid = at[0] + period * np.arange(int((at[-1] - at[0]) / period + 1e-9) + 1)
-            position, force = np.interp(grid, at, position), np.interp(grid, at, force)
-        found.append(Piece(rows, grid, position, force, at, period, even))
+            position = np.interp(grid, at, position)
+        if not (even and whole):
+            force = np.interp(grid, row_time, force)
+        found.append(Piece(rows, grid, position, force, row_time, period, even and whole))
     return found
 
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .._typing import Float1D, Int8Vector
@@ -13,8 +15,10 @@ FALLING = -0.3
 axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction stay between -0.3 and 0.2."""
 
 
-def chosen(choice: Choice, stroke: str | None, torque_constant: float | None) -> str:
-    """Which column plays which part, in one sentence."""
+def chosen(
+    choice: Choice, stroke: str | None, torque_constant: float | None, dialect: Sequence[str] = ()
+) -> str:
+    """The column of each role, and how the file was read, in one sentence."""
     parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
     if torque_constant is not None:
         parts[-1] += f" times {torque_constant:g} N*m/A"
@@ -24,18 +28,24 @@ def chosen(choice: Choice, stroke: str | None, torque_constant: float | None) ->
     parts.append(f"direction is {stroke}" if stroke else "there is no direction")
     if choice.inputs:
         parts.append(f"inputs are {', '.join(column.name for column in choice.inputs)}")
-    return ", ".join(parts)
+    read = f"; read as: {', '.join(dialect)}" if dialect else ""
+    return ", ".join(parts) + read
 
 
 def noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
-    """Say once what looks mirrored; nothing is ever flipped silently."""
+    """Report once what looks mirrored; no sign is turned without an option."""
+    correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
+    against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0
+    return mirrored(correlation, against)
+
+
+def mirrored(correlation: float, against: bool = False) -> list[str]:
+    """The note on a force that falls with position, or on a position that moves against its direction."""
     signs = []
-    if np.ptp(f) > 0 and (correlation := float(np.corrcoef(x, f)[0, 1])) < FALLING:
+    if correlation < FALLING:
         signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
-    if words is not None and len(x) > 1:
-        step = np.diff(x) * words[1:]
-        if step.sum() < 0:
-            signs.append("the position falls where the direction goes into the object")
+    if against:
+        signs.append("the position falls where the direction goes into the object")
     if not signs:
         return []
     return [

@@ -6,22 +6,24 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._typing import Float1D
+from ..arguments import path_of
 from ..errors import InputError
 from .columns import Choice, Column, choose_columns
-from .csv_file import CsvFile
 from .files import require_file, sha256_of_file
 from .layout import Layout
 from .notes import chosen, noticed
-from .parquet_file import ParquetFile
-from .recording import UNSTATED, Recording, Source
+from .recording import UNSTATED, Motion, Recording, Source
 from .rows import RowCheck
-from .table import Cells, TableFile, parse_number, to_numbers
+from .table import Cells, parse_number, to_numbers
+from .tables import open_table
 from .units import COLUMN_SUFFIX
 
 MIN_ROWS = 10
@@ -47,16 +49,18 @@ def read_recording(
     force_late_s: float = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
-    """Read a recording from CSV or Parquet.
+    """Read a recording from a file.
 
-    CSV may begin with ``#`` lines of metadata (``# key: value``), then needs a header of ``stem_unit`` names
-    such as ``displacement_mm``; the unit is looked up in a closed table and values are converted to SI.
+    The name of a column states its unit (``displacement_mm``, ``Force [gf]``, ``Force (mN)``, ``Force / N``),
+    or a second header line does. The unit is looked up in a closed table, and values are converted to SI.
+    Separator, decimal mark, encoding and lines before the header are recognised; the first note reports them.
 
     Parameters
     ----------
     path : path
-        A CSV file, a ``.part`` file (a recording cut off while it grew: a torn last line is left out and
-        counted), or a ``.parquet`` file (needs pyarrow).
+        CSV (separated by commas, semicolons or tabs); a ``.part`` file, a recording cut off while it grew,
+        whose torn last line is left out and counted; ``.parquet`` (needs pyarrow), ``.xlsx`` (openpyxl),
+        ``.npz``, ``.mat``, or ``.mcap`` with JSON messages (mcap).
     position, force, time : str, optional
         Column names. Without them the columns are chosen by name and unit; where that is ambiguous, the error
         names the candidates.
@@ -97,11 +101,11 @@ def read_recording(
     InputError
         One sentence that names the file, the line or column, and the value.
     """
-    file = Path(path)
+    file = path_of("path", path)
     if invalid not in ("refuse", "drop"):
         raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
     require_file(file)
-    table: TableFile = ParquetFile(file) if file.suffix == ".parquet" else CsvFile(file)
+    table = open_table(file)
     metadata = dict(table.metadata)
     layout = Layout.taken_from(str(file), metadata)
     choice = choose_columns(
@@ -114,6 +118,8 @@ def read_recording(
         inputs=tuple(inputs) or layout.inputs,
         units=units,
         unstated=layout.roles.values(),
+        text=table.text_names,
+        steady=table.steady_names,
     )
     numeric = [column for column in (choice.position, choice.force, choice.time, *choice.inputs) if column]
     status = layout.roles.get("status")
@@ -134,6 +140,7 @@ def read_recording(
     notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
     total = len(cells[choice.position.name])
     start, stop = _row_range(file, rows, total)
+    whole = dict(cells)
     if (start, stop) != (0, total):
         notes.append(f"rows {start} to {stop - 1} of 0 to {total - 1} are used")
         cells = {name: column[start:stop] for name, column in cells.items()}
@@ -196,9 +203,24 @@ def read_recording(
             "force": force_unit,
         },
         source=source,
-        notes=(chosen(choice, stroke, torque_constant), *notes, *noticed(x, f, words)),
+        notes=(chosen(choice, stroke, torque_constant, table.notes), *notes, *noticed(x, f, words)),
     )
+    if (start, stop) != (0, total):
+        _negate(file, choice, negate, whole)
+        recording = replace(recording, part_of=_motion(choice, whole, start + np.flatnonzero(check.kept)))
     return recording.with_force_earlier(force_late_s) if force_late_s else recording
+
+
+def _motion(choice: Choice, cells: dict[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
+    """The motion of all rows of a file, of which these are used; None if it has no continuous time."""
+    if choice.time is None:
+        return None
+    position, time = _in_si(choice.position, cells), _in_si(choice.time, cells)
+    usable = np.isfinite(position) & np.isfinite(time)
+    if not usable[rows].all() or np.any(np.diff(time[usable]) <= 0.0):
+        return None
+    number = np.cumsum(usable) - 1
+    return Motion(position[usable], time[usable], number[rows])
 
 
 def _row_range(file: Path, rows: tuple[int | None, int | None] | None, total: int) -> tuple[int, int]:
@@ -251,5 +273,5 @@ def _require_enough(file: Path, position: Column, x: Float1D, left_out: Sequence
         plural = "s" * (distinct > 1)
         raise InputError(
             f"{file}: column {position.name} holds {distinct} distinct value{plural}; "
-            f"force over position needs at least {MIN_POSITIONS}"
+            f"force over position needs at least {MIN_POSITIONS}; choose another column with --position NAME"
         )

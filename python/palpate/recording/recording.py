@@ -5,17 +5,24 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from .._typing import Float1D, Float2D, Int8Vector
+from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
 from .table import Cells
 from .units import FORCE_UNITS, POSITION_UNITS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+T = TypeVar("T")
 
 UNSTATED = ""
 """The unit of an array that was handed over without one: SI, but not said which."""
@@ -50,6 +57,22 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
+class Motion:
+    """All rows of a measured motion, of which a recording holds a part.
+
+    Velocity and play depend on the rows before and after a row. Rows that were held out keep the motion
+    between them, so that both are formed from all rows.
+    """
+
+    position: Float1D
+    """(m,)"""
+    time: Float1D | None
+    """(m,) [s]"""
+    rows: npt.NDArray[np.intp]
+    """(n,) rows that the recording holds"""
+
+
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Measured (or simulated) force over position, in SI units.
 
@@ -76,6 +99,8 @@ class Recording:
     source: Source
     notes: tuple[str, ...] = field(default=())
     """What was chosen, dropped and noticed while reading, in sentences"""
+    part_of: Motion | None = field(default=None, repr=False)
+    """The motion that the rows were taken from; None where the recording holds all of it"""
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -133,22 +158,19 @@ class Recording:
             unit is not one that recordings carry.
         """
         arrays: dict[str, Float1D] = {}
-        given_inputs = dict(inputs or {})
+        given_inputs = _mapping("inputs", inputs)
         named: dict[str, npt.ArrayLike | None] = {"position": position, "force": force, "time": time}
         if clash := sorted({*named, "direction", "hysteresis"} & set(given_inputs)):
             raise InputError(
                 f"an input is called {clash[0]!r}, which a recording has already; name it otherwise"
             )
         for name, values in (*named.items(), *given_inputs.items()):
-            if values is None:
+            if values is None and name == "time":
                 continue
-            array = np.array(values, dtype=np.float64)
-            if array.ndim != 1:
-                raise InputError(f"{name} has shape {array.shape}; it must be one-dimensional")
-            bad = np.flatnonzero(~np.isfinite(array))
-            if bad.size:
-                raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}; it must be a finite number")
-            arrays[name] = array
+            arrays[name] = vector_of(name, values)
+        for name in ("position", "force"):
+            if not len(arrays.get(name, ())):
+                raise InputError(f"{name} holds no value; give one for each row")
         if time is not None:
             stuck = np.flatnonzero(np.diff(arrays["time"]) <= 0)
             if stuck.size:
@@ -157,12 +179,12 @@ class Recording:
                 )
         words: Int8Vector | None = None
         if direction is not None:
-            given = np.asarray(direction)
+            given = vector_of("direction", direction)
             if not np.isin(given, (-1, 0, 1)).all():
                 wrong = given[~np.isin(given, (-1, 0, 1))].flat[0]
-                raise InputError(f"direction holds {wrong}; it must be +1, -1 or 0")
+                raise InputError(f"direction holds {wrong:g}; it must be +1, -1 or 0")
             words = given.astype(np.int8)
-        checked_units = {"position": UNSTATED, "force": UNSTATED, **(units or {})}
+        checked_units = {"position": UNSTATED, "force": UNSTATED, **_mapping("units", units)}
         for role, allowed in (("position", POSITION_UNITS), ("force", FORCE_UNITS)):
             if checked_units[role] not in (*allowed, UNSTATED):
                 raise InputError(
@@ -186,13 +208,69 @@ class Recording:
             inputs=np.array([arrays[name] for name in given_inputs]).reshape(-1, n).T.copy(),
             input_names=tuple(given_inputs),
             columns={},
-            metadata=dict(metadata or {}),
+            metadata=_mapping("metadata", metadata),
             units=checked_units,
             source=Source(files=(), sha256=digest.hexdigest(), rows=n, columns={}),
         )
 
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pd.DataFrame,
+        *,
+        position: str | None = None,
+        force: str | None = None,
+        time: str | None = None,
+        direction: str | None = None,
+        inputs: Sequence[str] = (),
+        units: Mapping[str, str] | None = None,
+        invalid: Literal["refuse", "drop"] = "refuse",
+    ) -> Recording:
+        """Make a recording from a pandas DataFrame whose column names end in a unit, as from a file.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Its ``attrs`` become the metadata. An index with a name is taken as one more column.
+        position, force, time, direction : str, optional
+            Column names; chosen by name and unit where not given, as in :func:`palpate.read_recording`.
+        inputs : sequence of str
+            Further columns that the force depends on.
+        units : mapping of str to str, optional
+            Unit of a column, by its name or by "position", "force" or "time" where that column is named too.
+        invalid : {"refuse", "drop"}
+            Refuse a frame with rows that cannot be used, or drop these rows and count them.
+
+        Raises
+        ------
+        InputError
+            One sentence that names the column, the row and the value.
+        """
+        from .frame import recording_of_frame  # it needs this class
+
+        what: object = invalid
+        if not isinstance(what, str) or what not in ("refuse", "drop"):
+            raise InputError(f"invalid is {shown(what)}; it must be 'refuse' or 'drop'")
+        return recording_of_frame(
+            frame,
+            position=position,
+            force=force,
+            time=time,
+            direction=direction,
+            inputs=inputs,
+            units=units,
+            drop=invalid == "drop",
+        )
+
     def __len__(self) -> int:
         return len(self.position)
+
+    @property
+    def motion(self) -> Motion:
+        """The whole motion, rows that were held out included."""
+        if self.part_of is not None and len(self.part_of.rows) == len(self):
+            return self.part_of
+        return Motion(self.position, self.time, np.arange(len(self)))
 
     @property
     def sample_period(self) -> float | None:
@@ -204,21 +282,29 @@ class Recording:
     def split(self, every: int = 5) -> tuple[Recording, Recording]:
         """Hold out every `every`-th row: (train, test), test being the rows i with i mod every = every - 1.
 
+        Both parts keep the motion of all rows, from which velocity and play are formed.
+
         Raises
         ------
         InputError
             `every` is below 2, or so large that no row would be held out.
         """
-        if not 2 <= every <= len(self):
+        if number_of("every", every) != int(every) or not 2 <= every <= len(self):
             raise InputError(
-                f"every is {every}; to hold out rows of {len(self)} it must be from 2 to {len(self)}"
+                f"every is {shown(every)}; to hold out rows of {len(self)} it must be a whole number from 2 "
+                f"to {len(self)}"
             )
         held_out = np.arange(len(self)) % every == every - 1
         return self._part(~held_out, every, False), self._part(held_out, every, True)
 
     def _part(self, rows: npt.NDArray[np.bool_], every: int, held_out: bool) -> Recording:
         part = self._rows(rows)
-        return replace(part, source=replace(part.source, held_out_every=every, held_out=held_out))
+        whole = self.motion
+        return replace(
+            part,
+            source=replace(part.source, held_out_every=every, held_out=held_out),
+            part_of=replace(whole, rows=whole.rows[rows]),
+        )
 
     def _rows(self, rows: npt.NDArray[np.bool_]) -> Recording:
         return replace(
@@ -231,6 +317,10 @@ class Recording:
             columns={name: cells[rows] for name, cells in self.columns.items()},
             source=replace(self.source, rows=int(np.count_nonzero(rows))),
         )
+
+    def without(self, rows: npt.NDArray[np.bool_]) -> Recording:
+        """The recording without the rows (n,) that are marked."""
+        return self._rows(~rows)
 
     def with_force_earlier(self, late_s: float) -> Recording:
         """The same motion where the force was recorded late_s [s] after the position it belongs to.
@@ -247,6 +337,7 @@ class Recording:
         if self.time is None:
             raise InputError("a force that was recorded late can be brought back only with a column of time")
         time = self.time
+        late_s = real_of("late_s", late_s)
         then = time - late_s
         rows = then >= time[0]
         if not (late_s >= 0.0 and rows.any()):
@@ -261,6 +352,7 @@ class Recording:
             position=before(self.position),
             inputs=np.column_stack([*map(before, self.inputs.T), np.empty((len(self), 0))]),
             notes=(*self.notes, f"each force belongs to the position {late_s:g} s before"),
+            part_of=None,
         )
         return moved._rows(rows)
 
@@ -277,7 +369,15 @@ class Recording:
         """
         from .writing import write_csv  # the writer needs this class
 
-        return write_csv(self, Path(path))
+        return write_csv(self, path_of("path", path))
+
+
+def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:
+    """A copy of an optional mapping."""
+    given: object = {} if value is None else value
+    if not isinstance(given, Mapping):
+        raise InputError(f"{name} is {shown(given)}; it must be a dictionary")
+    return dict(given)
 
 
 def _freeze(array: Cells) -> None:

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass, field
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -11,7 +14,44 @@ from .._core import Status
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .direction import DIRECTION_WORDS, direction_of
+from .names import shortened
 from .table import Cells, Places
+
+
+@dataclass
+class LeftOut:
+    """Counts of the rows that are not used, by reason."""
+
+    status: Counter[str] = field(default_factory=Counter)
+    """Rows whose force was not the model's alone, by the word of their status"""
+    dropped: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Number of rows, and the first one, by the reason for which they were dropped"""
+
+    @property
+    def rows(self) -> int:
+        """Number of all rows that are left out."""
+        return self.status.total() + sum(count for count, _ in self.dropped.values())
+
+    def drop(self, reason: str, count: int, first: int) -> None:
+        """Count dropped rows."""
+        known, before = self.dropped.get(reason, (0, first))
+        self.dropped[reason] = known + count, min(before, first)
+
+    def add(self, other: LeftOut, rows_before: int) -> None:
+        """Count the rows left out of a part that begins after so many rows."""
+        self.status += other.status
+        for reason, (count, first) in other.dropped.items():
+            self.drop(reason, count, rows_before + first)
+
+    def sentences(self, table: Places) -> list[str]:
+        """One sentence for each reason, with the place of the first row."""
+        told = []
+        if count := self.status.total():
+            words = ", ".join(f"{number} {word}" for word, number in sorted(self.status.items()))
+            told.append(f"{_rows(count)} whose force was not the model's alone are left out ({words})")
+        for reason, (count, first) in self.dropped.items():
+            told.append(f"dropped {_rows(count)} {reason} (first: {table.place(first)})")
+        return told
 
 
 class RowCheck:
@@ -34,7 +74,12 @@ class RowCheck:
     def __init__(self, file: str, table: Places, first_row: int, rows: int, drop: bool) -> None:
         self._file, self._table, self._first_row, self._drop = file, table, first_row, drop
         self.kept: NDArray[np.bool_] = np.ones(rows, dtype=bool)
-        self.notes: list[str] = []
+        self.left_out = LeftOut()
+
+    @property
+    def notes(self) -> list[str]:
+        """One sentence for each reason for which rows are left out."""
+        return self.left_out.sentences(self._table)
 
     def as_modelled(self, words: Cells) -> None:
         """Leave out the rows whose status says that the force was not the model's alone: not yet all of it
@@ -42,12 +87,7 @@ class RowCheck:
         """
         others = ~np.isin(words, (Status.Ok.name,)) & self.kept
         if others.any():
-            found, counts = np.unique(words[others].astype(str), return_counts=True)
-            told = ", ".join(f"{count} {word}" for word, count in zip(found, counts, strict=True))
-            count = int(np.count_nonzero(others))
-            self.notes.append(
-                f"{count} row{'s' * (count > 1)} whose force was not the model's alone are left out ({told})"
-            )
+            self.left_out.status += Counter(words[others].astype(str).tolist())
             self.kept &= ~others
 
     def finite(self, name: str, values: Float1D) -> None:
@@ -70,7 +110,8 @@ class RowCheck:
                 known = ", ".join(DIRECTION_WORDS)
                 where = self._where(int(np.flatnonzero(rows)[0]))
                 raise InputError(
-                    f"{where}: column {name} holds {word!r}, which is no direction; known words are {known}"
+                    f"{where}: column {name} holds {shortened(word)!r}, which is no direction; "
+                    f"known words are {known}"
                 )
             else:
                 self._settle(self.kept & rows, name, "says no direction", "without a direction in " + name)
@@ -97,15 +138,18 @@ class RowCheck:
         first = int(np.flatnonzero(bad)[0])
         if not self._drop:
             cell = self._table.cell(self._first_row + first, name)
-            told = sentence.format(cell=repr(cell) if cell else "nothing")
+            told = sentence.format(cell=repr(shortened(cell)) if cell else "nothing")
             others = f" (and {count - 1} more such rows)" if count > 1 else ""
             raise InputError(
                 f"{self._where(first)}: column {name} {told}{others}; correct the file or drop such rows "
                 "with --invalid drop"
             )
-        place = self._table.place(self._first_row + first)
-        self.notes.append(f"dropped {count} row{'s' * (count > 1)} {reason} (first: {place})")
+        self.left_out.drop(reason, count, self._first_row + first)
         self.kept &= ~bad
 
     def _where(self, row: int) -> str:
         return f"{self._file}, {self._table.place(self._first_row + row)}"
+
+
+def _rows(count: int) -> str:
+    return f"{count} row{'s' * (count > 1)}"

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -38,12 +38,31 @@ class TableFile(Places, Protocol):
     def torn(self) -> int:
         """How many torn lines at the end are left out."""
 
+    @property
+    def notes(self) -> Sequence[str]:
+        """How the file was read where it differs from a plain one, in parts of a sentence."""
+
+    @property
+    def text_names(self) -> Collection[str]:
+        """Columns that are known to hold text before the rows are read."""
+
+    @property
+    def steady_names(self) -> Collection[str]:
+        """Columns that have one or two values at the start of the file, as far as they are read by then."""
+
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
         """All columns. Those in `numbers` become float64 whatever they hold, those in `text` become strings;
         any other is numeric if every cell of it is."""
 
-    def parts(self, rows: int) -> list[tuple[int, int]]:
-        """Places (start, stop) that divide the file into parts of about so many rows, or more."""
+    def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
+        """Number of rows of the file, counted without reading cells, and places (start, stop) that divide it
+        into parts of about so many rows, or more.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read part by part.
+        """
 
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
@@ -63,15 +82,22 @@ def parse_number(text: str) -> float | None:
         return None
 
 
+def parse_with(text: str, decimal: str) -> float | None:
+    """The number that a cell holds, written with this decimal mark, or None."""
+    if decimal == ".":
+        return parse_number(text)
+    return None if "." in text or text.count(",") > 1 else parse_number(text.replace(",", "."))
+
+
 MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL", "null", "None")
 """How a cell of a numeric column says that it has no value."""
 
 
-def to_numbers(cells: Cells) -> NDArray[np.float64]:
+def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
     """Turn strings into numbers, with NaN where a cell holds none."""
 
     def number(cell: Any) -> float:
-        value = parse_number(cell) if isinstance(cell, str) else cell
+        value = parse_with(cell, decimal) if isinstance(cell, str) else cell
         return np.nan if value is None else value
 
     return np.fromiter(map(number, cells), dtype=np.float64, count=len(cells))

@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed table of units, and what a column name says about its unit."""
+"""The closed table of units, and the unit that a column name states."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from math import pi
 
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]: turns gram-force into newton."""
 
+POUND = 0.45359237
+"""Avoirdupois pound [kg]."""
+
 
 @dataclass(frozen=True)
 class Unit:
-    """One unit of the table: what it measures, and the factor to the SI unit."""
+    """One unit of the table: its symbol, the SI unit of its quantity, and the factor to it."""
 
     symbol: str
     si: str
@@ -22,13 +26,23 @@ class Unit:
 
 
 _FACTORS: dict[str, dict[str, float]] = {
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "cm": 1e-2},
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "cm": 1e-2, "in": 0.0254},
     "rad": {"rad": 1.0, "deg": pi / 180},
     "count": {"count": 1.0, "counts": 1.0},
-    "N": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "gf": 1e-3 * GRAVITY, "kgf": GRAVITY},
-    "N*m": {"Nm": 1.0, "mNm": 1e-3, "uNm": 1e-6},
+    "N": {
+        "N": 1.0,
+        "mN": 1e-3,
+        "uN": 1e-6,
+        "nN": 1e-9,
+        "kN": 1e3,
+        "gf": 1e-3 * GRAVITY,
+        "kgf": GRAVITY,
+        "lbf": POUND * GRAVITY,
+        "ozf": POUND / 16 * GRAVITY,
+    },
+    "N*m": {"Nm": 1.0, "mNm": 1e-3, "uNm": 1e-6, "kNm": 1e3, "N*mm": 1e-3, "N*cm": 1e-2},
     "A": {"A": 1.0, "mA": 1e-3},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
 }
 
 UNITS: dict[str, Unit] = {
@@ -43,19 +57,60 @@ TIME_UNITS = ("s",)
 COLUMN_SUFFIX = {"m": "m", "rad": "rad", "count": "count", "N": "N", "N*m": "Nm", "A": "A", "s": "s"}
 """How an SI unit is written at the end of a column name."""
 
+MINUTE_STEMS = ("time", "t", "timestamp", "elapsed", "elapsed_time")
+"""Stems after which ``_min`` is the minute. After any other stem it is usually a minimum."""
+
+_SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "∙": "*", ".": "*"})
+
+_BRACKETS = re.compile(r"(?P<stem>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$", re.DOTALL)
+
+
+def unit_of(symbol: str) -> Unit | None:
+    """The unit that a symbol stands for, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are Nm."""
+    text = symbol.strip()
+    if text == "°":
+        return UNITS["deg"]
+    plain = text.translate(_SPELLINGS) if "." not in (text[:1], text[-1:]) else text
+    return UNITS.get(plain) or UNITS.get(plain.replace("N*m", "Nm"))
+
 
 def symbols_of(si_units: tuple[str, ...]) -> str:
-    """The symbols of the table that belong to these SI units, as a person would list them."""
+    """The symbols of the table that belong to these SI units, joined by commas."""
     return ", ".join(symbol for symbol, unit in UNITS.items() if unit.si in si_units)
 
 
 def split_name(column: str) -> tuple[str, Unit | None]:
     """Split a column name into its stem and its unit: ``displacement_mm`` is (``displacement``, mm).
 
-    The unit is the text after the last underscore, case-sensitive. A name without a unit of the table keeps
-    its whole text as stem and gets None: a unit is never guessed.
+    The unit stands after the last underscore (``force_N``), in brackets at the end (``Force [gf]``,
+    ``Force (mN)``), after the last comma (``force, N``) or after one slash (``Force / N``). Symbols are
+    case-sensitive. A name without a unit of the table keeps its whole text as stem and gets None.
     """
-    stem, separator, symbol = column.rpartition("_")
-    if separator and stem and symbol in UNITS:
-        return stem, UNITS[symbol]
+    for stem, symbol in _stated(column):
+        unit = unit_of(symbol)
+        if stem and unit is not None:
+            return stem, unit
     return column, None
+
+
+def _stated(column: str) -> list[tuple[str, str]]:
+    """The stem and the text that stands where a unit is written: one pair or none."""
+    if brackets := _BRACKETS.fullmatch(column):
+        return [(brackets["stem"], brackets["square"] or brackets["round"] or "")]
+    if "," in column:
+        stem, _, symbol = column.rpartition(",")
+        return [(stem.strip(), symbol)]
+    if "/" in column:
+        stem, _, symbol = column.rpartition("/")
+        # `mm/s` and `velocity m/s` are quotients of units, `F/A` may be a quotient of quantities.
+        quotient = "/" in stem or len(stem.strip()) < 2 or unit_of(re.split(r"[\s_]", stem.strip())[-1])
+        return [] if quotient else [(stem.strip(), symbol)]
+    stem, _, symbol = column.rpartition("_")
+    if symbol == "min" and stem_key(stem) not in MINUTE_STEMS:
+        return []
+    return [(stem, symbol)]
+
+
+def stem_key(stem: str) -> str:
+    """A stem as it is compared: ``Tip position`` is ``tip_position``."""
+    return re.sub(r"\W+", "_", stem.strip()).strip("_").lower()

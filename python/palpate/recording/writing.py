@@ -16,13 +16,19 @@ if TYPE_CHECKING:
     from .recording import Recording
 
 
-def write_csv(recording: Recording, path: Path) -> Path:
-    """Write `recording` to `path`; see :meth:`palpate.Recording.write`."""
+def write_csv(recording: Recording, path: Path, *, replace: bool = True) -> Path:
+    """Write `recording` to `path`; see :meth:`palpate.Recording.write`.
+
+    Without `replace`, an existing file is refused.
+    """
     layout = layout_for_writing(recording)
     frame = {name: getattr(recording, role) for role, name in layout.roles.items()}
     frame |= {name: recording.inputs[:, index] for index, name in enumerate(recording.input_names)}
     frame |= recording.columns
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+    with (
+        replacing(path, replace=replace) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as stream,
+    ):
         for key, value in (*recording.metadata.items(), layout.metadata_line()):
             line = f"# {key}: {value}"
             if len(line.splitlines()) != 1 or ":" in key:

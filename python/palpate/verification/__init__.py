@@ -4,13 +4,14 @@
 from .agreement import Stroke, compare
 from .closed_loop import ClosedLoop, force_driven, motion_driven
 from .uncertainty import Uncertainty, uncertainty
-from .verification import Verification, verify
+from .verification import Verification, columns_of, verify
 
 __all__ = [
     "ClosedLoop",
     "Stroke",
     "Uncertainty",
     "Verification",
+    "columns_of",
     "compare",
     "force_driven",
     "motion_driven",

@@ -16,11 +16,8 @@ from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
 from .metrics import normalised, root_mean_square
-from .prediction import require_same_units
+from .prediction import PLAY_SHARE_OF_TRAVEL, require_same_units
 from .timing import even_motion, require_period
-
-PLAY_SHARE_OF_TRAVEL = 0.01
-"""Play radius over travel where neither model nor scheme gives one: recorded strokes do not tell it."""
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,15 @@ from ..identification.hysteresis_input import HysteresisInput
 from ..identification.inputs import input_columns
 from ..model import Model
 from ..recording import Recording
-from ..recording.motion import acceleration, velocity
+from ..recording.motion import GAP, acceleration, velocity
+from ..recording.recording import Motion
+from .flight import FlightRecord, flight_of
+from .strokes import with_strokes
+
+PLAY_SHARE_OF_TRAVEL = 0.01
+"""Play radius over travel where nothing states one: recorded strokes do not tell it."""
+
+NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are left out"
 
 _UNSTATED = ""
 
@@ -31,33 +40,45 @@ class Prediction:
     extrapolated: int
     """How many of them lie outside the model's domain"""
     notes: tuple[str, ...]
+    position: Float1D
+    """(k,) the positions that the force belongs to"""
+    side: Float1D | None = None
+    """(k,) the hysteresis input in [-1, 1], for a model that has one"""
 
 
-def predict(model: Model, recording: Recording) -> Prediction:
+def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
     """The model's force along a recording.
 
-    A hysteresis model takes the recording's direction as s = +-1 and leaves out rows that have none; without
-    a direction its play operator follows the positions in their order, if the model has a play radius.
+    A hysteresis model takes the recording's direction as s = +-1 and leaves out rows that have none. Without
+    direction, time and play radius, the strokes are those of the order of rows. Without a direction, or with
+    a play radius, its play operator follows the positions in their order. The radius is the first of these
+    that is known: `play_radius`, the flight record's, the model's, its plan's, 1 % of the travel.
+    A flight record behind a virtual coupling is compared at the position of the virtual object.
 
     Raises
     ------
     InputError
-        The recording lacks an input or a direction that the model needs, or is in other units.
+        The recording lacks an input that the model needs, or is in other units; the radius is not above 0.
     """
     require_same_units(model, recording.units)
-    if model.mass is not None or model.damping is not None:
-        return _moving(model, recording)
-    return _static(model, recording)
+    if play_radius is not None and not (math.isfinite(play_radius) and play_radius > 0.0):
+        raise InputError(f"play_radius is {play_radius}; it must be a finite number above 0")
+    notes: tuple[str, ...] = ()
+    if play_radius is None:
+        recording, notes = with_strokes(model, recording)
+    moving = model.mass is not None or model.damping is not None
+    found = (_moving if moving else _static)(model, recording, play_radius)
+    return replace(found, notes=notes + found.notes)
 
 
-def _moving(model: Model, recording: Recording) -> Prediction:
+def _moving(model: Model, recording: Recording, play_radius: float | None) -> Prediction:
     """With what mass and damping add: m a + B v, from the recording's own time."""
     if recording.time is None:
         raise InputError(
             "the model has a mass or a damping, which act on acceleration and velocity: "
             "the recording needs time (--time NAME)"
         )
-    static = _static(model, recording)
+    static = _static(model, recording, play_radius)
     total, known = np.zeros(len(recording)), np.ones(len(recording), dtype=bool)
     for value, derivative in ((model.damping, velocity), (model.mass, acceleration)):
         if value is not None:
@@ -66,12 +87,13 @@ def _moving(model: Model, recording: Recording) -> Prediction:
     rows = static.rows & known
     force = (static.force + total[static.rows])[known[static.rows]]
     left_out = int(np.count_nonzero(static.rows & ~known))
-    notes = (f"{left_out} rows at the ends and at gaps of time have no velocity and are left out",)
+    notes = (NO_VELOCITY.format(left_out),) if left_out else ()
     outside = model.extrapolated(recording.position[rows])
-    return Prediction(rows, force, int(np.count_nonzero(outside)), static.notes + notes)
+    outside_rows = int(np.count_nonzero(outside))
+    return Prediction(rows, force, outside_rows, static.notes + notes, recording.position[rows])
 
 
-def _static(model: Model, recording: Recording) -> Prediction:
+def _static(model: Model, recording: Recording, play_radius: float | None) -> Prediction:
     rows = np.ones(len(recording), dtype=bool)
     notes: tuple[str, ...] = ()
     if model.dimension > 1:
@@ -80,32 +102,88 @@ def _static(model: Model, recording: Recording) -> Prediction:
             raise InputError("no row of the recording has the velocity that the model needs")
         X = X[rows]
         outside = ((model.lower > X) | (model.upper < X)).any(axis=1)
-        if left_out := int(np.count_nonzero(~rows)):
-            notes = (f"{left_out} rows at the ends and at gaps of time have no velocity and are left out",)
-        return Prediction(rows, model.predict(X), int(np.count_nonzero(outside)), notes)
+        left_out = int(np.count_nonzero(~rows))
+        notes = (NO_VELOCITY.format(left_out),) if left_out else ()
+        outside_rows = int(np.count_nonzero(outside))
+        return Prediction(rows, model.predict(X), outside_rows, notes, recording.position[rows])
+    flight = flight_of(recording)
+    position: Float1D = recording.position
+    if flight.object_position is not None:
+        position = flight.object_position
+        notes = (
+            "the force is compared at the position of the virtual object: a virtual coupling lies between it "
+            "and the handle",
+        )
+    side = None
     if not model.hysteretic:
-        force = model.force(recording.position)
-    elif recording.direction is not None:
+        force = model.force(position)
+    else:
+        state = _state(model, recording, flight, play_radius)
+        rows, notes, side = state.known, notes + state.notes, state.side[state.known]
+        force = model.force(position[rows], direction=side)
+    outside_rows = int(np.count_nonzero(model.extrapolated(position[rows])))
+    return Prediction(rows, force, outside_rows, notes, position[rows], side)
+
+
+@dataclass(frozen=True)
+class _State:
+    """The hysteresis input of the rows of a recording."""
+
+    side: Float1D
+    """(n,) in [-1, 1]"""
+    known: NDArray[np.bool_]
+    """(n,) rows that have one"""
+    notes: tuple[str, ...]
+
+
+def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius: float | None) -> _State:
+    if recording.direction is not None and play_radius is None:
         rows = recording.direction != 0
         if not rows.any():
-            raise InputError("no row of the recording has a direction, which the model needs")
-        force = model.force(recording.position[rows], direction=recording.direction[rows].astype(float))
-        if left_out := int(np.count_nonzero(~rows)):
-            notes = (f"{left_out} rows without a direction (pause, hold) are left out",)
-    elif model.play_radius is not None:
-        known = HysteresisInput.of_play([recording.position], model.play_radius).known
-        rows = known if known.any() else rows
-        force = model.force(recording.position[rows], play=model.play(recording.position)[rows])
-        notes = ("there is no direction: the play operator follows the positions",)
-        if left_out := int(np.count_nonzero(~rows)):
-            notes += (f"{left_out} rows before the motion has covered the play are left out",)
+            raise InputError(
+                "no row of the recording has a direction, which the model needs; give --play-radius to take "
+                "it from the motion"
+            )
+        left_out = int(np.count_nonzero(~rows))
+        resting = (f"{left_out} rows without a direction (pause, hold) are left out",) if left_out else ()
+        return _State(recording.direction.astype(float), rows, resting)
+    radius, origin = _radius(model, flight, play_radius)
+    if flight.object_position is None:
+        whole = recording.motion
     else:
-        raise InputError(
-            "the model differs between press and release: the recording needs a direction "
-            "(--direction NAME), or the model a play radius"
-        )
-    outside = model.extrapolated(recording.position[rows])
-    return Prediction(rows, force, int(np.count_nonzero(outside)), notes)
+        whole = Motion(flight.object_position, recording.time, np.arange(len(recording)))
+    play = HysteresisInput.of_play(np.split(whole.position, _gaps(whole.time)), radius)
+    known = play.known[whole.rows]
+    unit = f" {model.units['position']}" if model.units["position"] else ""
+    why = "there is no direction" if recording.direction is None else "the direction is not used"
+    notes: tuple[str, ...] = (
+        f"{why}: the play operator follows the positions with a radius of {radius:.4g}{unit}, {origin}",
+    )
+    if left_out := int(np.count_nonzero(~known)):
+        notes += (f"{left_out} rows before the motion has covered the play are left out",)
+    return _State(play.side[whole.rows], known, notes)
+
+
+def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:
+    """The play radius, and where it comes from."""
+    for radius, origin in (
+        (play_radius, "as given"),
+        (flight.play_radius, "that of the flight record"),
+        (model.play_radius, "that of the model"),
+        ((model.plan or {}).get("play_radius"), "that of the plan"),
+    ):
+        if radius:
+            return float(radius), origin
+    travel = float(model.upper[0] - model.lower[0])
+    return PLAY_SHARE_OF_TRAVEL * travel, "1 % of the travel: neither recording nor model states one"
+
+
+def _gaps(time: Float1D | None) -> NDArray[np.intp]:
+    """Rows at which a motion begins anew after a gap of time."""
+    if time is None or len(time) < 2:
+        return np.empty(0, dtype=np.intp)
+    steps = np.diff(time)
+    return np.flatnonzero(steps > GAP * np.median(steps)) + 1
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:

@@ -11,6 +11,9 @@ from .._typing import Float1D
 from ..errors import InputError
 from ..recording import Recording
 
+MOST_SAMPLES = 20_000_000
+"""Samples of a motion on an even grid; more would fill the memory."""
+
 ASSUMED_STROKE_S = 1.0
 """Time in which an assumed motion covers the range of positions once [s]."""
 
@@ -55,19 +58,26 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     if travel == 0:
         raise InputError("the recording does not move, so no time can be assumed for it")
     speed = travel / ASSUMED_STROKE_S if stroke_speed is None else stroke_speed
-    if not speed > 0:
-        raise InputError(f"stroke_speed is {speed}; it must be > 0")
+    if not 0 < speed < np.inf:
+        raise InputError(f"stroke_speed is {speed}; it must be > 0 and finite")
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(recording.position)))])
-    return _sampled(recording, way / speed, period_s, speed)
+    with np.errstate(over="ignore"):  # an endless motion is refused below
+        time = way / speed
+    return _sampled(recording, time, period_s, speed)
 
 
 def require_period(period_s: float) -> None:
     """Refuse a sample time that is not positive."""
-    if not period_s > 0:
-        raise InputError(f"period_s is {period_s}; it must be > 0")
+    if not 0 < period_s < np.inf:
+        raise InputError(f"period_s is {period_s}; it must be > 0 and finite")
 
 
 def _sampled(recording: Recording, time: Float1D, period_s: float, assumed_speed: float | None) -> EvenMotion:
+    if not time[-1] <= MOST_SAMPLES * period_s:
+        raise InputError(
+            f"the motion lasts {time[-1]:.4g} s, more than {MOST_SAMPLES} samples of {period_s:g} s: "
+            + ("choose a larger period" if assumed_speed is None else "choose a higher stroke speed")
+        )
     # Where an assumed motion rests, several rows share one time: the last of them stands for all.
     last = np.append(np.diff(time) > 0, True)
     samples = int(time[-1] / period_s * (1 + 1e-12)) + 1

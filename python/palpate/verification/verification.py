@@ -4,18 +4,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 from numpy.typing import NDArray
 
 from .._typing import Float1D
+from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source
+from ..recording.given import Given, recording_from
+from ..verdict import GOOD, Verdict
+from .judgement import findings_of
 from .metrics import durbin_watson, lag_one_autocorrelation, normalised, root_mean_square
 from .perception import force_floor, share_within_force_jnd, share_within_stiffness_jnd
-from .prediction import predict
+from .prediction import Prediction, predict
 
 
 @dataclass(frozen=True)
@@ -48,35 +53,62 @@ class Verification:
     """Evaluated rows outside the model's domain"""
     units: Mapping[str, str]
     notes: tuple[str, ...] = ()
-    rows: NDArray[np.bool_] = field(repr=False, compare=False, kw_only=True)
-    """(rows of the recording,) which of them were evaluated"""
-    force: Float1D = field(repr=False, compare=False, kw_only=True)
-    """(n,) the model's force at the evaluated rows"""
+    verdict: Verdict = GOOD
+    """Judges the model on the recording, with likely causes of a large error"""
+    prediction: Prediction = field(repr=False, compare=False, kw_only=True)
+    """The model's force at the evaluated rows"""
     residual: Float1D = field(repr=False, compare=False, kw_only=True)
     """(n,) the model's force minus the recorded one"""
 
+    @property
+    def rows(self) -> NDArray[np.bool_]:
+        """(rows of the recording,) which of them were evaluated"""
+        return self.prediction.rows
 
-def verify(model: Model, recording: Recording) -> Verification:
-    """Compare a model with a recording, row by row.
+    @property
+    def force(self) -> Float1D:
+        """(n,) the model's force at the evaluated rows"""
+        return self.prediction.force
+
+
+def verify(
+    model: Model,
+    recording: Given | npt.ArrayLike,
+    force: npt.ArrayLike | None = None,
+    *,
+    time: npt.ArrayLike | None = None,
+    direction: npt.ArrayLike | None = None,
+    play_radius: float | None = None,
+) -> Verification:
+    """Compares a model with a recording, row by row.
 
     Parameters
     ----------
     model : Model
-        What was identified.
-    recording : Recording
-        What it is compared with; ``fresh`` in the result says whether the model has seen it.
+        The identified model.
+    recording : Recording, path, DataFrame or (n,) array_like
+        The recording; ``fresh`` in the result is true if the model was not identified on it. With `force` it
+        is the array of positions.
+    force, time, direction : (n,) array_like, optional
+        As in :func:`palpate.identify`.
+    play_radius : float, optional
+        Play radius of a hysteresis model [m or rad]. With it the play operator follows the positions and a
+        direction in the recording is not used. Without it and without a direction, the radius is that of the
+        flight record, the model or its plan, else 1 % of the model's travel; the notes say which.
 
     Returns
     -------
     Verification
-        Errors, the share that a hand would not feel, residual whiteness, freshness.
+        Errors, the share that a hand would not feel, residual whiteness, freshness, and the verdict.
 
     Raises
     ------
     InputError
         The recording lacks an input or a direction that the model needs, or is in other units.
     """
-    prediction = predict(model, recording)
+    instance_of("model", model, Model, "make one with palpate.identify or palpate.load_model")
+    recording = recording_from(recording, force, time, direction, inputs=columns_of(model))
+    prediction = predict(model, recording, play_radius=play_radius)
     rows = prediction.rows
     reference = recording.force[rows]
     residual = prediction.force - reference
@@ -88,7 +120,7 @@ def verify(model: Model, recording: Recording) -> Verification:
     notes = prediction.notes
     if not fresh:
         notes += ("the model was identified on this data: this is not a fresh recording",)
-    return Verification(
+    found = Verification(
         nrmse=nrmse,
         rmse=rmse,
         mse=rmse**2,
@@ -104,10 +136,16 @@ def verify(model: Model, recording: Recording) -> Verification:
         extrapolated=prediction.extrapolated,
         units=dict(recording.units),
         notes=notes,
-        rows=rows,
-        force=prediction.force,
+        prediction=prediction,
         residual=residual,
     )
+    return replace(found, verdict=Verdict(findings_of(model, recording, found)))
+
+
+def columns_of(model: Model) -> list[str]:
+    """Columns that the model's inputs beside the position have in a file; a velocity may come from time."""
+    known = model.data.columns
+    return [known.get(name, name) for name in model.inputs[1:] if name != "velocity" or name in known]
 
 
 def is_fresh(identified_on: Source, data: Source) -> bool:

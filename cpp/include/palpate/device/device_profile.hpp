@@ -27,6 +27,11 @@ struct DeviceProfile {
     /// What a certificate has to hold for.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
 
+    /// True if the device can make this force. Less than a force step is rounding.
+    [[nodiscard]] bool makes(double force) const noexcept {
+        return force <= force_limit * (1.0 + 1e-9) + force_step;
+    }
+
     [[nodiscard]] bool operator==(const DeviceProfile&) const = default;
 };
 

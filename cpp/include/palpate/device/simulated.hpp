@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "palpate/device/device.hpp"
@@ -14,6 +16,8 @@
 #include "palpate/device/plant.hpp"
 
 namespace palpate {
+
+inline constexpr int most_substeps = 1000;  ///< of one tick of a simulated device
 
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
 /// friction, encoder, force step and limit, hold over the tick, whole samples of delay. `Plant` moves the
@@ -29,6 +33,10 @@ class SimulatedHandle {
                              double start_velocity = 0.0)
         : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start, start_velocity} {
         validate(profile_);
+        if (substeps < 1 || substeps > most_substeps) {
+            throw std::invalid_argument("substeps is " + std::to_string(substeps) + ", must be 1 to " +
+                                        std::to_string(most_substeps));
+        }
     }
 
     /// Puts in what moves the handle, if it has anything to be told.

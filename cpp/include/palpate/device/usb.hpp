@@ -156,7 +156,7 @@ class UsbDevice {
         otherwise.period_s = 1.0 / info().rate_hz;
         otherwise.encoder_step = wire::position_of(1, info().counts_per_rev);
         otherwise.force_step = 1e-6;
-        otherwise.force_limit = 1e-6 * info().max_torque_uNm;
+        otherwise.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 rounds twice
         return otherwise;
     }
 

@@ -30,6 +30,9 @@ struct GuardSettings {
     double encoder_step = 0.0;     ///< [m or rad]
 };
 
+inline constexpr double longest_guard_s =
+    3600.0;  ///< of ramp_s and frozen_s; whole samples must fit an integer
+
 /// Shaking faster than this is no hand's doing.
 inline constexpr double slowest_buzz_hz = 20.0;
 
@@ -44,10 +47,12 @@ inline void validate(const GuardSettings& settings) {
     require(std::isfinite(settings.force_limit) && settings.force_limit > 0.0, "force_limit",
             settings.force_limit, "> 0");
     require(not_negative(settings.slew_s), "slew_s", settings.slew_s, ">= 0");
-    require(not_negative(settings.ramp_s), "ramp_s", settings.ramp_s, ">= 0");
+    require(settings.ramp_s >= 0.0 && settings.ramp_s <= longest_guard_s, "ramp_s", settings.ramp_s,
+            "0 to 3600");
     require(settings.largest_speed > 0.0, "largest_speed", settings.largest_speed, "> 0");
     require(not_negative(settings.frozen_speed), "frozen_speed", settings.frozen_speed, ">= 0");
-    require(not_negative(settings.frozen_s), "frozen_s", settings.frozen_s, ">= 0");
+    require(settings.frozen_s >= 0.0 && settings.frozen_s <= longest_guard_s, "frozen_s", settings.frozen_s,
+            "0 to 3600");
     require(not_negative(settings.buzz_force), "buzz_force", settings.buzz_force, ">= 0");
     require(not_negative(settings.device_damping), "device_damping", settings.device_damping, ">= 0");
     require(not_negative(settings.device_friction), "device_friction", settings.device_friction, ">= 0");

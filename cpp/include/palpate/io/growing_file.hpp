@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -16,9 +18,42 @@
 
 namespace palpate {
 
-/// A text file that grows as NAME.part, whole lines at a time, and gets its name when it is finished. What was
-/// written stays readable whatever happens to the program. When the disk takes no more, the file is cut back to
-/// its last whole line and nothing is written any longer; the reason is kept.
+namespace detail {
+
+/// Renames a file unless the new name is taken (EEXIST). Returns 0 or an errno.
+[[nodiscard]] inline int rename_to_free_name(const std::string& from, const std::string& to) noexcept {
+    if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) {
+        return 0;
+    }
+    if (errno != EINVAL && errno != ENOSYS) {
+        return errno;
+    }
+    // File systems without RENAME_NOREPLACE, such as NFS.
+    if (::link(from.c_str(), to.c_str()) != 0) {
+        return errno;
+    }
+    return ::unlink(from.c_str()) == 0 ? 0 : errno;
+}
+
+/// True if the path names the open file.
+[[nodiscard]] inline bool names(const std::string& path, int descriptor) noexcept {
+    struct stat named{};
+    struct stat open{};
+    return ::lstat(path.c_str(), &named) == 0 && ::fstat(descriptor, &open) == 0 &&
+           named.st_dev == open.st_dev && named.st_ino == open.st_ino;
+}
+
+[[nodiscard]] inline std::string reason_of(int error) {
+    return std::generic_category().message(error);
+}
+
+}  // namespace detail
+
+/// Text file that grows as NAME.part, whole lines at a time, and is renamed to NAME when it is finished.
+///
+/// The writer holds a lock on NAME.part; a second writer of the same name is refused. No existing file is replaced
+/// without `force`. What was written stays readable whatever happens to the program. When the disk is full, the
+/// file is cut back to its last whole line and nothing more is written; the reason is kept.
 class GrowingFile {
   public:
     GrowingFile() = default;
@@ -26,21 +61,42 @@ class GrowingFile {
     GrowingFile(const GrowingFile&) = delete;
     GrowingFile& operator=(const GrowingFile&) = delete;
 
-    /// Opens NAME.part, or gives the reason why that is not possible. A NAME.part that is there already is the
-    /// only copy of a recording that was cut off: it is moved to the first free NAME.1.part, NAME.2.part, ...
-    [[nodiscard]] std::string open(const std::string& name) {
+    /// Opens NAME.part; returns the reason where that is not possible. A NAME.part without a writer is the only copy
+    /// of a recording that was cut off: it is moved to the first free name of NAME.1.part, NAME.2.part, ...
+    /// With `force` an existing NAME is replaced at the end; a symbolic link keeps its place, its target is replaced.
+    [[nodiscard]] std::string open(const std::string& name, bool force = false) {
+        force_ = force;
         name_ = name;
-        struct stat there{};
-        if (stat(name.c_str(), &there) == 0 && !S_ISREG(there.st_mode)) {
-            return name + " cannot be written: it is not an ordinary file";
-        }
-        if (stat(part().c_str(), &there) == 0) {
-            if (std::string reason = set_aside(); !reason.empty()) {
-                return reason;
+        std::error_code none;
+        if (force && std::filesystem::is_symlink(name, none)) {
+            name_ = std::filesystem::canonical(name, none);
+            if (none) {
+                return name + " cannot be written: it is a symbolic link to a file that is not there";
             }
         }
-        descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        return descriptor_ >= 0 ? "" : name + " cannot be written: " + std::generic_category().message(errno);
+        if (std::string reason = taken(); !reason.empty()) {
+            return reason;
+        }
+        // A recording that another run finishes meanwhile makes room for the second try.
+        for (int tries = 2; descriptor_ < 0; --tries) {
+            descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+            if (descriptor_ < 0 && (errno != EEXIST || tries == 0)) {
+                return name_ + " cannot be written: " + detail::reason_of(errno);
+            }
+            if (descriptor_ < 0) {
+                if (std::string reason = set_aside(); !reason.empty()) {
+                    return reason;
+                }
+            }
+        }
+        // Waits at most for another program that just looks at the new file. Without locks (some network file
+        // systems) the recording is still its writer's alone, because O_EXCL created it.
+        (void)::flock(descriptor_, LOCK_EX);
+        std::string reason = taken();
+        if (!reason.empty()) {
+            discard();
+        }
+        return reason;
     }
 
     [[nodiscard]] bool is_open() const noexcept { return descriptor_ >= 0; }
@@ -84,16 +140,31 @@ class GrowingFile {
         }
     }
 
-    /// Gives the file its name. Returns 0 or an errno.
-    [[nodiscard]] int finish() noexcept {
-        close();
-        return std::rename(part().c_str(), name_.c_str()) == 0 ? 0 : errno;
+    /// Writes everything to the disk and renames NAME.part to NAME. Returns a sentence where that is not possible;
+    /// the recording then keeps the name NAME.part.
+    [[nodiscard]] std::string finish() {
+        (void)::fsync(descriptor_);
+        std::string reason;
+        if (!detail::names(part(), descriptor_)) {
+            reason = part() + " was moved or replaced by another program while it was written";
+        } else if (const int error = give_name(); error == EEXIST) {
+            reason = name_ + " appeared while this was recorded and is not replaced; the recording is " +
+                     part() + ": rename it";
+        } else if (error != 0) {
+            reason = "the recording keeps the name " + part() + ": " + detail::reason_of(error);
+        } else {
+            sync_folder();
+        }
+        close();  // last: the lock must hold until the file has its name
+        return reason;
     }
 
     /// Removes NAME.part.
     void discard() noexcept {
+        if (detail::names(part(), descriptor_)) {
+            (void)std::remove(part().c_str());
+        }
         close();
-        (void)std::remove(part().c_str());
     }
 
   private:
@@ -103,28 +174,84 @@ class GrowingFile {
         }
     }
 
+    [[nodiscard]] int give_name() const noexcept {
+        if (!force_) {
+            return detail::rename_to_free_name(part(), name_);
+        }
+        return std::rename(part().c_str(), name_.c_str()) == 0 ? 0 : errno;
+    }
+
+    void sync_folder() const {
+        const std::string folder = std::filesystem::path(name_).parent_path();
+        const int descriptor =
+            ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        if (descriptor >= 0) {
+            (void)::fsync(descriptor);
+            ::close(descriptor);
+        }
+    }
+
+    /// The reason why NAME may not be used; empty if it may.
+    [[nodiscard]] std::string taken() const {
+        struct stat there{};
+        if (::lstat(name_.c_str(), &there) != 0) {
+            return "";
+        }
+        if (!S_ISREG(there.st_mode) && !S_ISLNK(there.st_mode)) {
+            return name_ + " cannot be written: it is not an ordinary file";
+        }
+        return force_ ? ""
+                      : name_ +
+                            " exists already; choose another name, or replace it with --force (Python: "
+                            "force=True)";
+    }
+
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {
         const std::size_t end = written.rfind('\n');
         return end == std::string_view::npos ? 0 : end + 1;
     }
 
+    /// Moves a NAME.part without a writer to a free name; returns the reason where it may not or cannot be moved.
     [[nodiscard]] std::string set_aside() {
-        struct stat there{};
-        for (int k = 1;; ++k) {
-            set_aside_as_ = name_ + "." + std::to_string(k) + ".part";
-            if (stat(set_aside_as_.c_str(), &there) != 0) {
-                break;
+        const int there = ::open(part().c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
+        if (there < 0) {
+            return errno == ENOENT ? "" : part() + " cannot be replaced: " + detail::reason_of(errno);
+        }
+        std::string reason;
+        struct stat about{};
+        if (::flock(there, LOCK_EX | LOCK_NB) != 0) {
+            reason =
+                errno == EWOULDBLOCK
+                    ? part() + " is being written by another run; choose another name, or wait for its end"
+                    : part() +
+                          " may belong to another run, because this file system has no locks; choose "
+                          "another name, or rename it";
+        } else if (detail::names(part(), there)) {  // else its writer has just renamed it
+            if (::fstat(there, &about) == 0 && about.st_size == 0) {
+                reason =
+                    part() + " is empty and may belong to a run that just starts; remove it if none does";
+            } else {
+                reason = move_aside();
             }
         }
-        if (std::rename(part().c_str(), set_aside_as_.c_str()) != 0) {
-            return part() +
-                   " is an earlier recording and cannot be moved: " + std::generic_category().message(errno);
+        ::close(there);
+        return reason;
+    }
+
+    [[nodiscard]] std::string move_aside() {
+        int error = EEXIST;
+        for (int k = 1; error == EEXIST; ++k) {
+            set_aside_as_ = name_ + "." + std::to_string(k) + ".part";
+            error = detail::rename_to_free_name(part(), set_aside_as_);
         }
-        return "";
+        return error == 0
+                   ? ""
+                   : part() + " is an earlier recording and cannot be moved: " + detail::reason_of(error);
     }
 
     std::string name_;
     std::string set_aside_as_;
+    bool force_ = false;
     int descriptor_ = -1;
     std::atomic<int> error_{0};
     off_t size_ = 0;

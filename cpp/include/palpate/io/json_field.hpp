@@ -61,7 +61,9 @@ class JsonField {
                 known = known || item.key() == key;
             }
             if (!known) {
-                throw std::invalid_argument((path_.empty() ? "" : path_ + ".") + item.key() +
+                const std::string key = Json(item.key()).dump();  // without control characters
+                throw std::invalid_argument((path_.empty() ? "" : path_ + ".") +
+                                            key.substr(1, key.size() - 2) +
                                             " is not a key of this format (free keys go under notes)");
             }
         }

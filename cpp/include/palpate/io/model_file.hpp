@@ -3,8 +3,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -14,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/io/json_field.hpp"
+#include "palpate/io/json_text.hpp"
 #include "palpate/io/plan_file.hpp"
 #include "palpate/model/force_model.hpp"
 
@@ -21,14 +20,18 @@ namespace palpate {
 
 /// What a rendering needs of a model file.
 struct ModelFile {
-    ForceModel model;
+    ForceModel model;  ///< as it was identified
     std::string kind;
     std::string position_unit;               ///< rad, m, count or "" (unstated)
     std::string force_unit;                  ///< N*m, N, A or ""
     std::vector<std::string> inputs;         ///< one name for each input
     std::string data_sha256;                 ///< of the recordings it was identified on
     std::optional<Scheme> plan;              ///< how it is to be rendered
+    std::optional<ForceModel> limited;       ///< plan.network: the plan renders it in place of `model`
     std::optional<Certificate> certificate;  ///< of the plan; recomputed, and found the same
+
+    /// The model that the plan renders.
+    [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
 };
 
 namespace detail {
@@ -98,10 +101,10 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     return read;
 }
 
-inline ForceModel read_network(const JsonField& file) {
-    const JsonField network =
-        file["network"].only({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
-                              "linear_hysteresis", "bias_hysteresis"});
+/// The network at `network`, which is the file's own or that of its plan, with the domain and kind of the file.
+inline ForceModel read_network(const JsonField& network, const JsonField& file) {
+    network.only({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
+                  "linear_hysteresis", "bias_hysteresis"});
     NetworkParameters read;
     read.dimension = network["dimension"].count(1);
     const std::size_t d = read.dimension;
@@ -140,6 +143,22 @@ inline ForceModel read_network(const JsonField& file) {
     return {read, {loss.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
 }
 
+/// The network that a plan renders in place of the identified one: of the same inputs, with the same hysteresis.
+inline std::optional<ForceModel> read_limited(const JsonField& file) {
+    if (file["plan"].is_null() || file["plan"]["network"].is_null()) {
+        return std::nullopt;
+    }
+    const JsonField network = file["plan"]["network"];
+    const JsonField identified = file["network"];
+    network["dimension"].require(network["dimension"].value() == identified["dimension"].value(),
+                                 identified["dimension"].value().dump() + ", that of network");
+    const bool hysteresis = !identified["weight_hysteresis"].is_null();
+    network["weight_hysteresis"].require(
+        !network["weight_hysteresis"].is_null() == hysteresis,
+        hysteresis ? "given, because that of network is" : "null, because that of network is");
+    return read_network(network, file);
+}
+
 }  // namespace detail
 
 /// The model in the text of a model file. Throws std::invalid_argument: field path, value, what would be right.
@@ -156,12 +175,13 @@ inline ForceModel read_network(const JsonField& file) {
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].words();
     const detail::JsonField units = file["units"].only({"position", "force"});
-    ModelFile read{detail::read_network(file),
+    ModelFile read{detail::read_network(file["network"], file),
                    file["kind"].words(),
                    units["position"].one_of({"rad", "m", "count", ""}),
                    units["force"].one_of({"N*m", "N", "A", ""}),
                    {},
                    "",
+                   {},
                    {},
                    {}};
     for (const detail::JsonField& input : file["inputs"].items()) {
@@ -179,8 +199,9 @@ inline ForceModel read_network(const JsonField& file) {
     read.data_sha256 = file["data"]["sha256"].words();
     detail::check_fit(file["fit"], read.model.parameters().weight.size());
     read.plan = detail::read_plan(file["plan"]);
+    read.limited = detail::read_limited(file);
     read.certificate =
-        detail::read_certificate(file["certificate"], read.plan, read.model, read.position_unit);
+        detail::read_certificate(file["certificate"], read.plan, read.planned(), read.position_unit);
     if (content.contains("notes")) {
         file["notes"].require_object();
     }
@@ -189,17 +210,7 @@ inline ForceModel read_network(const JsonField& file) {
 
 /// Reads a model file. Throws std::invalid_argument: one sentence that begins with the file's name.
 [[nodiscard]] inline ModelFile load_model_file(const std::string& path) {
-    std::ifstream stream{path};
-    if (!stream || std::filesystem::is_directory(path)) {
-        throw std::invalid_argument(path + ": there is no such file, or it cannot be read");
-    }
-    nlohmann::json content;
-    try {
-        content = nlohmann::json::parse(stream);
-    } catch (const nlohmann::json::exception& error) {
-        const std::string reason = error.what();
-        throw std::invalid_argument(path + ": this is not JSON: " + reason.substr(reason.find("] ") + 2));
-    }
+    const nlohmann::json content = read_json(path);
     try {
         return parse_model(content);
     } catch (const std::invalid_argument& error) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
@@ -23,7 +24,7 @@ struct Range {
     }
 };
 
-/// Where ticks go besides the device: a file, a network, memory, all of them or nowhere.
+/// Where ticks go besides the device: a file, a network, memory, all of them or nowhere. Also keeps their ranges.
 struct Outlets {
     RecordingFile file;
     Telemetry telemetry;
@@ -37,10 +38,13 @@ struct Outlets {
             told_.assign(ticks.begin(), ticks.end());
             for (TickRecord& tick : told_) {
                 tick.force = object_force(tick);
-                positions.add(tick.position);
-                forces.add(tick.force);
             }
             ticks = told_;
+        }
+        for (const TickRecord& tick : ticks) {
+            positions.add(tick.position);
+            forces.add(tick.force);
+            extrapolated += tick.extrapolated ? 1 : 0;
         }
         if (file.is_open()) {
             file.take(ticks);
@@ -51,8 +55,9 @@ struct Outlets {
         }
     }
 
-    Range positions;  ///< of a real object, as told
-    Range forces;
+    Range positions;                 ///< of the ticks taken
+    Range forces;                    ///< of the ticks taken, of a real object where there is one
+    std::uint64_t extrapolated = 0;  ///< ticks outside the model's data
 
   private:
     std::vector<TickRecord> told_;

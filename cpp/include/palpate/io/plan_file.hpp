@@ -41,8 +41,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     if (plan.is_null()) {
         return std::nullopt;
     }
-    plan.only(
-        {"structure", "solver", "coupling", "inertia", "compensated", "play_radius", "refused", "loss"});
+    plan.only({"structure", "solver", "network", "coupling", "inertia", "compensated", "play_radius",
+               "refused", "accepted_force_error"});
     Scheme scheme;
     scheme.structure = read_name<StructureKind>(plan["structure"], structure_names);
     if (const JsonField solver = plan["solver"]; !solver.is_null()) {
@@ -67,11 +67,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     for (const JsonField& sentence : plan["refused"].items()) {
         (void)sentence.words();
     }
-    if (const JsonField loss = plan["loss"]; !loss.is_null()) {
-        loss.only({"largest", "rms"});
-        (void)loss["largest"].not_negative();
-        (void)loss["rms"].not_negative();
-    }
+    (void)plan["accepted_force_error"].not_negative();
     return scheme;
 }
 
@@ -127,7 +123,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     return read;
 }
 
-/// The certificate of a plan, recomputed from model and device: one that says anything else is refused.
+/// The certificate of a plan, recomputed from the rendered model and the device: one that says anything else is
+/// refused.
 [[nodiscard]] inline std::optional<Certificate> read_certificate(const JsonField& file,
                                                                  const std::optional<Scheme>& plan,
                                                                  const ForceModel& model,

@@ -23,10 +23,12 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 /// at the top: room for it is kept there.
 class RecordingFile {
   public:
-    /// Opens NAME.part and writes its head; gives the reason where that is not possible.
-    [[nodiscard]] std::string open(const std::string& name, RecordUnits units, const Metadata& metadata) {
+    /// Opens NAME.part and writes its head; returns the reason where that is not possible. An existing recording is
+    /// refused, or with `force` replaced at the end.
+    [[nodiscard]] std::string open(const std::string& name, RecordUnits units, const Metadata& metadata,
+                                   bool force = false) {
         units_ = std::move(units);
-        if (std::string reason = file_.open(name); !reason.empty()) {
+        if (std::string reason = file_.open(name, force); !reason.empty()) {
             return reason;
         }
         std::string head;
@@ -62,8 +64,8 @@ class RecordingFile {
         refused_ += ticks.size() - whole;
     }
 
-    /// Writes how it ended, and gives the file its name. Returns 0 or an errno.
-    [[nodiscard]] int finish(const std::string& ending, const std::string& timing) {
+    /// Writes how it ended, and renames the file. Returns a sentence where that is not possible.
+    [[nodiscard]] std::string finish(const std::string& ending, const std::string& timing) {
         file_.overwrite(ending_at_, padded(line("ended", ending)));
         file_.overwrite(timing_at_, padded(line("timing", timing)));
         return file_.finish();

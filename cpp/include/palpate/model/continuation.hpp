@@ -38,7 +38,7 @@ struct EdgeLine {
         const double double_integral =
             at_edge.double_integral +
             (at_edge.integral + (0.5 * at_edge.value + at_edge.slope * inside / 6.0) * inside) * inside;
-        if (std::abs(distance) < reach) {
+        if (std::abs(distance) < reach || std::isinf(reach)) {
             return {line, at_edge.slope, integral, double_integral};
         }
         return {0.0, 0.0, integral, double_integral + integral * (distance - inside)};

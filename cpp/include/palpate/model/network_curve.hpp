@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 
 #include "palpate/model/bounds.hpp"
@@ -45,23 +46,21 @@ class NetworkCurve {
         return continued(x, [this](double within) noexcept { return inside(within); });
     }
 
-    /// The curve with `inside` in place of eq. 4 within the domain.
+    /// The curve with `inside` in place of eq. 4 within the domain. A position that is not finite gives NaN.
     template <class Inside>
     [[nodiscard]] Curve continued(double x, Inside inside) const noexcept {
-        if (periodic_) {
-            return wrapped(x, inside);
+        if (!periodic_ && x >= lower_ && x <= upper_) {
+            return inside(x);
         }
-        if (x < lower_) {
-            return below_.at(x);
+        if (!std::isfinite(x)) {
+            constexpr double none = std::numeric_limits<double>::quiet_NaN();
+            return {none, none, none, none};
         }
-        if (x > upper_) {
-            return above_.at(x);
-        }
-        return inside(x);
+        return periodic_ ? wrapped(x, inside) : x < lower_ ? below_.at(x) : above_.at(x);
     }
 
     [[nodiscard]] bool extrapolated(double x) const noexcept {
-        return !periodic_ && (x < lower_ || x > upper_);
+        return periodic_ ? !std::isfinite(x) : !(x >= lower_ && x <= upper_);
     }
 
     /// Eq. 4 and nothing else: value, slope and antiderivatives from one exponential a wavelet.

@@ -10,9 +10,11 @@
 
 namespace palpate {
 
-/// Short small pushes to either side, from which the sign of a device's force is seen and its delay is counted.
+/// Short small pushes to either side. They show the sign of a device's force, its delay and its mechanics. Two sizes
+/// of push separate friction from damping: both take a share of the force, but only damping grows with the speed.
 struct PulseSettings {
     double force = 0.02;    ///< of a push, the sign alternates [N or N*m]
+    double smaller = 0.6;   ///< size of every second three pushes, over `force` [-]
     double push_s = 0.03;   ///< how long it lasts [s]
     double rest_s = 0.17;   ///< how long nothing follows [s]
     double farthest = 0.2;  ///< a handle that got this far from its start is pushed no more [m or rad]
@@ -40,7 +42,8 @@ class Pulses {
         const std::uint64_t cycle = tick_ / (rest_ + push_);
         const bool pushes =
             tick_++ % (rest_ + push_) >= rest_ && std::abs(position - start_) < settings_.farthest;
-        const double force = cycle % 2 == 0 ? settings_.force : -settings_.force;
+        const double size = settings_.force * (cycle / 3 % 2 == 0 ? 1.0 : settings_.smaller);
+        const double force = cycle % 2 == 0 ? size : -size;
         return {pushes ? force : 0.0, position, 0, Status::Ok, false};
     }
 

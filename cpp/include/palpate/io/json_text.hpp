@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace palpate {
+
+inline constexpr int deepest_json = 100;  ///< lists and objects inside each other
+
+/// Parses JSON as RFC 8259 asks for, and refuses what readers of other languages read differently: a byte order mark,
+/// NUL bytes, repeated keys, unpaired surrogates, numbers that no double holds, more than `deepest_json` levels.
+/// Throws std::invalid_argument with one sentence.
+[[nodiscard]] inline nlohmann::json parse_json(std::string_view text) {
+    using Json = nlohmann::json;
+    if (text.starts_with("\xEF\xBB\xBF")) {
+        throw std::invalid_argument("the file begins with a byte order mark: save it as UTF-8 without one");
+    }
+    if (text.find('\0') != std::string_view::npos) {
+        throw std::invalid_argument("the file holds a NUL byte: it is damaged, or not UTF-8");
+    }
+    std::vector<std::set<std::string>> keys;
+    const Json::parser_callback_t check = [&](int depth, Json::parse_event_t event, Json& parsed) {
+        const bool starts =
+            event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start;
+        if (starts && depth >= deepest_json) {
+            throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
+                                        " levels deep");
+        }
+        if (event == Json::parse_event_t::object_start) {
+            keys.emplace_back();
+        } else if (event == Json::parse_event_t::object_end) {
+            keys.pop_back();
+        } else if (event == Json::parse_event_t::key) {
+            if (const auto key = parsed.get<std::string>(); !keys.back().insert(key).second) {
+                throw std::invalid_argument("the key " + Json(key).dump() + " stands twice in one object");
+            }
+        }
+        return true;
+    };
+    try {
+        return Json::parse(text, check);
+    } catch (const Json::exception& error) {
+        const std::string reason = error.what();
+        const std::size_t begin = reason.find("] ") + 2;
+        // What follows quotes raw bytes of the file, which must not reach a terminal.
+        throw std::invalid_argument("this is not JSON: " +
+                                    reason.substr(begin, reason.find("; last read") - begin));
+    }
+}
+
+/// Reads a JSON file. Throws std::invalid_argument: one sentence that begins with the file's name.
+[[nodiscard]] inline nlohmann::json read_json(const std::string& path) {
+    std::error_code none;
+    std::ifstream stream;
+    if (std::filesystem::is_regular_file(path, none)) {  // a pipe without a writer would block
+        stream.open(path, std::ios::binary);
+    }
+    if (!stream.is_open()) {
+        throw std::invalid_argument(path + ": there is no such file, or it cannot be read");
+    }
+    const std::string text{std::istreambuf_iterator<char>{stream}, {}};
+    try {
+        return parse_json(text);
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(path + ": " + error.what());
+    }
+}
+
+}  // namespace palpate

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of arguments: each refuses a wrong type in one sentence that names the argument."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._typing import Float1D
+from .errors import InputError
+
+LONGEST = 60
+"""Characters of a value that a message shows."""
+
+
+def shown(value: object) -> str:
+    """The value as a message shows it: one line, cut where it is long."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} of shape {value.shape}"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def path_of(name: str, value: object) -> Path:
+    """The path that an argument names.
+
+    Raises
+    ------
+    InputError
+        The value is not text or a path, or is empty.
+    """
+    if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
+        raise InputError(f"{name} is {shown(value)}; it must be the name of a file")
+    if not os.fspath(value) or "\0" in str(os.fspath(value)):
+        raise InputError(f"{name} is {shown(value)}; it must be the name of a file")
+    return Path(value)
+
+
+def instance_of(name: str, value: object, kind: type | tuple[type, ...], cure: str) -> None:
+    """Refuses a value that is not of this type.
+
+    Raises
+    ------
+    InputError
+        `cure` says how to get one.
+    """
+    if not isinstance(value, kind):
+        kinds = " or ".join(each.__name__ for each in (kind if isinstance(kind, tuple) else (kind,)))
+        raise InputError(f"{name} is {shown(value)}; it must be a {kinds}: {cure}")
+
+
+def real_of(name: str, value: object) -> float:
+    """The real number that an argument is; NaN and infinity are left to the range check of the caller.
+
+    Raises
+    ------
+    InputError
+        It is not a number.
+    """
+    if not isinstance(value, (int, float, np.integer, np.floating)) or isinstance(value, bool):
+        raise InputError(f"{name} is {shown(value)}; it must be a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(f"{name} is {shown(value)}; it must be below 1e308") from None
+
+
+def number_of(name: str, value: object) -> float:
+    """The finite number that an argument is.
+
+    Raises
+    ------
+    InputError
+        It is not a number, or not finite.
+    """
+    number = real_of(name, value)
+    if not math.isfinite(number):
+        raise InputError(f"{name} is {shown(value)}; it must be a finite number")
+    return number
+
+
+def vector_of(name: str, values: object) -> Float1D:
+    """The finite numbers (n,) of an array, a list, a column of a frame; a copy.
+
+    Raises
+    ------
+    InputError
+        They are not one-dimensional, not real numbers, masked, or not finite.
+    """
+    if np.ma.is_masked(values):
+        raise InputError(f"{name} is a masked array; leave the masked rows out of all arrays")
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind not in "biufO" or isinstance(values, (str, dict)):
+            raise TypeError
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {shown(values)}; it must be a list or an array of numbers") from None
+    if array.ndim != 1:
+        raise InputError(f"{name} has shape {array.shape}; it must be one-dimensional")
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}; it must be a finite number")
+    return array
+
+
+def named_arguments(kind: Any) -> None:
+    """Makes the constructor of a compiled class name an argument of a wrong type, as InputError."""
+    construct = kind.__init__
+    known = re.findall(r"(\w+): ", (construct.__doc__ or "").partition("*, ")[2])
+
+    def named(self: Any, *args: Any, **fields: Any) -> None:
+        try:
+            construct(self, *args, **fields)
+        except TypeError:
+            raise InputError(wrong_argument(args, fields)) from None
+
+    def wrong_argument(args: tuple[Any, ...], fields: dict[str, Any]) -> str:
+        if args:
+            return f"{kind.__name__} takes its values by name, such as {known[0]}=, not {shown(args[0])}"
+        example = kind.__new__(kind)
+        construct(example)
+        words = {bool: "True or False", int: "a whole number", float: "a number", str: "text"}
+        for name, value in fields.items():
+            if name not in known:
+                return f"{kind.__name__} has no argument {name!r}; it has {', '.join(known)}"
+            try:
+                construct(kind.__new__(kind), **{name: value})
+            except TypeError:
+                return f"{name} is {shown(value)}; it must be {words[type(getattr(example, name))]}"
+            except ValueError:
+                continue  # of the right type
+        return f"{kind.__name__} does not take {shown(fields)}"
+
+    named.__doc__ = construct.__doc__
+    kind.__init__ = named

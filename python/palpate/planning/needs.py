@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Device properties that a model needs to be rendered as it was identified: the certificate, inverted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from .._core import DeviceProfile
+from ..model import Model
+from ..model.certified import device_record
+from .rungs import RUNGS, Wishes
+from .slope_limit import sliding_bounds
+
+_AMPLE = (40.0, 14.0, 8.0)
+"""Doublings after which a property is ample. Too much of it can make an explicit structure diverge. [-]"""
+
+_BISECTIONS = 15
+"""Of the doublings: the least sufficient value within 0.1 % [-]"""
+
+Fits = Callable[[DeviceProfile], bool]
+
+
+@dataclass(frozen=True)
+class _Property:
+    """A property of a device that can be improved."""
+
+    improved: Callable[[DeviceProfile, float], DeviceProfile]
+    """The device with this property better by a factor, rounded to three digits"""
+    told: Callable[[DeviceProfile], str]
+    """The requirement that an improved device just meets"""
+
+
+def needed(
+    model: Model, device: DeviceProfile, wishes: Wishes, accept_force_error: float, *, certified: bool
+) -> str:
+    """The device property that a model needs, for instance "needs b >= 6.07 N*s/m (has 0.005)".
+
+    Empty where no property helps.
+
+    Parameters
+    ----------
+    model : Model
+        As it was identified.
+    device : DeviceProfile
+        The device that is too weak.
+    wishes : Wishes
+        What was asked of the plan.
+    accept_force_error : float
+        Largest force error that is accepted [share of the range].
+    certified : bool
+        Whether a plan that is only stable is not enough.
+    """
+    names = _rungs(model, wishes)
+    as_identified = replace(wishes, limited=False)
+
+    def fits(changed: DeviceProfile) -> bool:
+        for name in names:
+            outcome = RUNGS[name](model, changed, as_identified)
+            if isinstance(outcome, str) or outcome.certificate is None or outcome.certificate.refused:
+                continue
+            proved = outcome.certificate.certified or not certified
+            return proved and outcome.force_error.share <= accept_force_error
+        return False
+
+    def least(*properties: _Property) -> str:
+        found = _improved(device, properties, fits)
+        return "" if found is None else " and ".join(each.told(found) for each in properties)
+
+    damping, friction, rate, encoder = _properties(model, device)
+    for short, otherwise in (
+        ((damping,), (rate,)),
+        ((friction,), (encoder,)),
+        ((damping, friction), (rate, encoder)),
+    ):
+        if need := least(*short):
+            other = least(*otherwise)
+            return f"needs {need}" + (f", or {other}" if other else "")
+    if wishes.coupling_stiffness is not None:
+        return f"needs another coupling stiffness than {wishes.coupling_stiffness:.4g}"
+    return ""
+
+
+def _rungs(model: Model, wishes: Wishes) -> tuple[str, ...]:
+    """The structures that render a model as it was identified, for what was asked."""
+    if wishes.dynamic:
+        return ("implicit", "energy-consistent", "explicit")
+    if wishes.coupling:
+        return ("massless", "explicit") if model.hysteretic else ("massless",)
+    return ("direct",)
+
+
+def _properties(model: Model, device: DeviceProfile) -> tuple[_Property, _Property, _Property, _Property]:
+    """Damping, friction, rate and encoder."""
+    force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
+    steepest = max(sliding_bounds(model).steepest, 1e-9)
+    # Where there is none to be multiplied, it begins with far less than the model asks for.
+    b = device.viscous_damping or 1e-3 * device.longest_period_s * steepest
+    f_c = device.coulomb_friction or 1e-3 * (device.encoder_step * steepest + device.force_step) or 1e-9
+
+    def faster(on: DeviceProfile, factor: float) -> DeviceProfile:
+        rate = _rounded(math.ceil, factor / device.period_s)
+        jitter_s = device.jitter_s / (rate * device.period_s)
+        return _changed(on, period_s=1.0 / rate, jitter_s=jitter_s)
+
+    jitter = " with jitter in proportion" if device.jitter_s else ""
+    return (
+        _Property(
+            lambda on, factor: _changed(on, viscous_damping=_rounded(math.ceil, factor * b)),
+            lambda on: (
+                f"b >= {on.viscous_damping:.3g} {force}*s/{position} (has {device.viscous_damping:.3g})"
+            ),
+        ),
+        _Property(
+            lambda on, factor: _changed(on, coulomb_friction=_rounded(math.ceil, factor * f_c)),
+            lambda on: f"f_c >= {on.coulomb_friction:.3g} {force} (has {device.coulomb_friction:.3g})",
+        ),
+        _Property(faster, lambda on: f"a rate of {1.0 / on.period_s:.3g} Hz{jitter}"),
+        _Property(
+            lambda on, factor: _changed(on, encoder_step=_rounded(math.floor, device.encoder_step / factor)),
+            lambda on: f"an encoder step of {on.encoder_step:.3g} {position}",
+        ),
+    )
+
+
+def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits) -> DeviceProfile | None:
+    """The device with the least improvement of these properties that fits; None where no improvement does."""
+
+    def after(doublings: Sequence[float]) -> DeviceProfile:
+        changed = device
+        for each, number in zip(properties, doublings, strict=True):
+            changed = each.improved(changed, 2.0**number)
+        return changed
+
+    found = next(
+        (ample for ample in ([number] * len(properties) for number in _AMPLE) if fits(after(ample))), None
+    )
+    if found is None:
+        return None
+    for k in range(len(properties)):
+        low, high = 0.0, found[k]
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            enough = fits(after([*found[:k], middle, *found[k + 1 :]]))
+            low, high = (low, middle) if enough else (middle, high)
+        found[k] = high
+    return after(found)
+
+
+def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
+    return DeviceProfile(**device_record(device) | fields)
+
+
+def _rounded(towards: Callable[[float], int], value: float) -> float:
+    """Three digits, so that the printed number is enough."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{towards(value / unit) * unit:.3g}")

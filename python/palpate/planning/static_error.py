@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Static force error of a plan: what is felt at rest, minus the identified force."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import _core
+from .._core import ForceModel, Scheme
+from .._typing import Float1D, Float2D
+from ..model import Model
+
+SAMPLES = 1001
+"""Positions over the domain [-]"""
+
+
+@dataclass(frozen=True)
+class StaticForceError:
+    """Felt minus identified force at rest, over the domain and both strokes.
+
+    A limited network and a soft coupling are counted; damping, delay and encoder steps are not.
+    """
+
+    largest: float
+    """Largest absolute value [force]"""
+    rms: float
+    """[force]"""
+    share: float
+    """`largest` over the range of the identified force [-]"""
+    rms_share: float
+    """`rms` over the population standard deviation of the identified force [-]"""
+
+
+def static_force_error(identified: Model, rendered: Model, scheme: Scheme) -> StaticForceError:
+    """Force error at rest where `rendered` is rendered by a scheme in place of `identified`.
+
+    Parameters
+    ----------
+    identified, rendered : Model
+        Of one position, on the same domain; or the same model of position and velocity.
+    scheme : Scheme
+        A coupling makes the rendered force softer: K_c f' / (K_c + f') is felt in place of f'.
+    """
+    exact = scheme.structure == "direct" or scheme.compensated
+    if exact and rendered is identified:
+        return StaticForceError(0.0, 0.0, 0.0, 0.0)
+    x = np.linspace(identified.lower[0], identified.upper[0], SAMPLES)
+    wanted = strokes(identified, x)
+    felt = strokes(rendered, x) if exact else _behind_coupling(rendered, scheme, x)
+    error = felt - wanted
+    largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
+    return StaticForceError(
+        largest, rms, _share(largest, float(np.ptp(wanted)), wanted), _share(rms, float(wanted.std()), wanted)
+    )
+
+
+def strokes(model: Model, x: Float1D) -> Float2D:
+    """(1, n) the force, or (2, n) pressing and releasing."""
+    sides = (1.0, -1.0) if model.hysteretic else (None,)
+    return np.array([model.force(x, direction=side) for side in sides])
+
+
+def _share(error: float, size: float, force: Float2D) -> float:
+    """Error over the size of the force; over the largest |force| where the force is constant."""
+    size = size or float(np.abs(force).max())
+    return 0.0 if error == 0.0 else error / size if size else math.inf
+
+
+def _behind_coupling(model: Model, scheme: Scheme, x: Float1D) -> Float2D:
+    """Force (k, n) of each stroke at a handle that rests at x, from the load line of a massless object."""
+    at_rest = Scheme(structure="massless", coupling_stiffness=scheme.coupling_stiffness, coupling_damping=0.0)
+    return np.array(
+        [_core.motion_driven(stroke, at_rest, x, 1.0)["force"] for stroke in _single_strokes(model)]
+    )
+
+
+def _single_strokes(model: Model) -> list[ForceModel]:
+    """Models without hysteresis, one for each stroke: f, or g + h and g - h."""
+    network = model.to_dict()["network"]
+    loss = {name: network.pop(f"{name}_hysteresis") for name in ("weight", "linear", "bias")}
+    del network["dimension"]
+    sides = (1.0, -1.0) if model.hysteretic else (0.0,)
+    return [
+        ForceModel(
+            **network
+            | {
+                name: np.asarray(network[name]) + side * np.asarray(loss[name])
+                for name in loss
+                if model.hysteretic
+            },
+            lower=model.lower,
+            upper=model.upper,
+            below=model.below,
+            above=model.above,
+            period=model.period,
+        )
+        for side in sides
+    ]

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict on a result: good, usable with reservations, or no."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from .errors import InputError
+
+Level = Literal["good", "usable", "no"]
+"""From best to worst."""
+
+LEVELS: tuple[Level, ...] = get_args(Level)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A reservation about a result: its level, and a sentence with value, likely cause and cure."""
+
+    level: Level
+    sentence: str
+
+    def __post_init__(self) -> None:
+        for name, value in (("level", self.level), ("sentence", self.sentence)):
+            if not isinstance(value, str):
+                raise InputError(f"{name} is a {type(value).__name__}; it must be text")
+        if self.level not in LEVELS:
+            raise InputError(f"level is {self.level[:20]!r}; it must be one of {', '.join(LEVELS)}")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Judges a result by its findings; the most serious one sets the level.
+
+    ``str(verdict)`` is ``"good"``, ``"usable: ..."`` or ``"no: ..."``. Semicolons join the sentences, and the
+    most serious comes first. Every verb prints it first, and ends with exit code 1 where the level is "no".
+    """
+
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        given: object = self.findings
+        if not isinstance(given, tuple) or not all(isinstance(one, Finding) for one in given):
+            raise InputError(f"findings is a {type(given).__name__}; it must be a tuple of Finding")
+
+    @property
+    def level(self) -> Level:
+        """The level of the most serious finding; "good" without findings."""
+        return max((finding.level for finding in self.findings), key=LEVELS.index, default="good")
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """The sentences of the findings, the most serious first, without repetitions."""
+        ordered = sorted(self.findings, key=lambda finding: -LEVELS.index(finding.level))
+        return tuple(dict.fromkeys(finding.sentence for finding in ordered))
+
+    def __str__(self) -> str:
+        return f"{self.level}: {'; '.join(self.reasons)}" if self.findings else self.level
+
+    def __add__(self, other: Verdict) -> Verdict:
+        """The verdict on both results together."""
+        return Verdict(tuple(dict.fromkeys(self.findings + other.findings)))
+
+    def record(self) -> list[dict[str, str]]:
+        """The findings as they stand in a model file."""
+        return [{"level": finding.level, "sentence": finding.sentence} for finding in self.findings]
+
+    @classmethod
+    def from_record(cls, record: Iterable[Mapping[str, Any]]) -> Verdict:
+        """The verdict of a model file; what is not a finding is left out."""
+        return cls(
+            tuple(
+                Finding(item["level"], str(item.get("sentence", "")))
+                for item in record
+                if item.get("level") in LEVELS
+            )
+        )
+
+
+GOOD = Verdict()
+
+
+def usable(sentence: str) -> Finding:
+    """A reservation that leaves the result usable."""
+    return Finding("usable", sentence)
+
+
+def no(sentence: str) -> Finding:
+    """A finding that makes the result unfit for use."""
+    return Finding("no", sentence)

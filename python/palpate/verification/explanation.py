@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Likely causes of a large error: a unit, a sign or an offset between a model and a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Float1D
+from ..model import Model
+from ..recording import Recording
+from ..recording.units import UNITS
+from .metrics import normalised, root_mean_square
+from .prediction import Prediction
+
+WORTH_TELLING = 0.5
+"""NRMSE under an explanation, as a share of the NRMSE without it, below which it is told [-]."""
+
+AS_GOOD = 1.2
+"""Ratio to the least NRMSE up to which a simpler explanation is preferred [-]."""
+
+SAME_FACTOR = 0.02
+"""Relative difference up to which a factor counts as that of a unit [-]."""
+
+SHIFTS = 41
+"""Position offsets on a grid."""
+
+GRIDS = 3
+"""Grids of position offsets, each finer than the one before."""
+
+MOST_ROWS = 2000
+"""Rows that are enough to tell one explanation from another."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A change of the recording under which the model fits it."""
+
+    nrmse: float
+    sentence: str
+    order: int
+    """The simplest has the lowest"""
+
+
+def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
+    """The simplest change of the recording that at least halves the error, or None.
+
+    The changes are: the sign of the force, press and release exchanged, the sign of the position, an offset
+    of the force, another unit of force or position, an offset of the position, and a factor of the force.
+    """
+    index = np.flatnonzero(prediction.rows)
+    few = slice(None, None, max(1, -(-len(index) // MOST_ROWS)))
+    force, modelled = recording.force[index][few], prediction.force[few]
+    if float(np.std(force)) == 0.0:
+        return None
+    nrmse = _share(modelled - force, force)
+    unit = recording.units["force"] or model.units["force"]
+    tried = [*_of_force(force, modelled, unit)]
+    if model.dimension == 1 and model.mass is None and model.damping is None:
+        side = None if prediction.side is None else prediction.side[few]
+        tried += _of_position(model, prediction.position[few], side, force, recording)
+    found = [each for each in tried if each.nrmse < WORTH_TELLING * nrmse]
+    least = min((each.nrmse for each in found), default=0.0)
+    return min(
+        (each for each in found if each.nrmse <= AS_GOOD * least), key=lambda each: each.order, default=None
+    )
+
+
+def _share(error: Float1D, force: Float1D) -> float:
+    return normalised(root_mean_square(error), force)
+
+
+def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanation]:
+    """The sign, an offset and a factor of the force."""
+    yield Explanation(
+        _share(modelled + force, force),
+        "the recording fits with the sign of its force turned; give --negate force",
+        order=0,
+    )
+    offset = float(np.mean(force - modelled))
+    yield Explanation(
+        _share(modelled - (force - offset), force),
+        f"the recording fits with its force less {_with_unit(offset, unit)}, as if the sensor had an offset; "
+        "give --zero START:STOP, the rows without contact",
+        order=2,
+    )
+    factor = float(modelled @ force) / float(force @ force)
+    if factor == 0.0 or float(np.std(modelled)) == 0.0:
+        return
+    known = _unit_of(factor, unit)
+    cause = f"as if {known}; name its unit with --units" if known else "as if the gain were another"
+    yield Explanation(
+        _share(modelled - factor * force, modelled),
+        f"the recording fits with its force x {factor:.4g}, {cause}",
+        order=3 if known else 6,
+    )
+
+
+def _of_position(
+    model: Model, position: Float1D, side: Float1D | None, force: Float1D, recording: Recording
+) -> Iterator[Explanation]:
+    """The direction, and the sign, the unit and an offset of the position."""
+
+    def left(at: Float1D, s: Float1D | None) -> float:
+        modelled = model.force(at) if s is None else model.force(at, direction=s)
+        error = _share(modelled - force, force)
+        return error if np.isfinite(error) else np.inf
+
+    unit = recording.units["position"] or model.units["position"]
+    if side is not None:
+        yield Explanation(
+            left(position, -side),
+            "the recording fits with press and release exchanged; check the words of its direction column",
+            order=0,
+        )
+    yield Explanation(
+        left(-position, None if side is None else -side),
+        "the recording fits with the sign of its position turned; give --negate position",
+        order=1,
+    )
+    for symbol, other in UNITS.items():
+        if other.si == unit and other.factor != 1.0:
+            for factor, cause in (
+                (other.factor, f"it were in {symbol}"),
+                (1.0 / other.factor, f"it were in {unit}, not in {symbol}"),
+            ):
+                yield Explanation(
+                    left(factor * position, side),
+                    f"the recording fits with its position x {factor:.4g}, as if {cause}; name its unit with "
+                    "--units",
+                    order=4,
+                )
+    # The offset is found on a grid over the travel, which is then made finer around the best one.
+    best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (SHIFTS - 1)
+    for _ in range(GRIDS):
+        grid = best + step * (np.arange(SHIFTS) - SHIFTS // 2)
+        best = float(min(grid, key=lambda shift: left(position + shift, side)))
+        step *= 4.0 / (SHIFTS - 1)
+    yield Explanation(
+        left(position + best, side),
+        f"the recording fits with its position {'plus' if best > 0.0 else 'less'} "
+        f"{_with_unit(abs(best), unit)}, as if its zero had moved; correct it in the file",
+        order=5,
+    )
+
+
+def _unit_of(factor: float, unit: str) -> str | None:
+    """The mistaken unit that a factor corrects, in words, or None."""
+    for symbol, other in UNITS.items():
+        if other.si == unit and other.factor != 1.0:
+            if abs(factor / other.factor - 1.0) < SAME_FACTOR:
+                return f"it were in {symbol}"
+            if abs(factor * other.factor - 1.0) < SAME_FACTOR:
+                return f"it were in {unit}, not in {symbol}"
+    return None
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".rstrip()

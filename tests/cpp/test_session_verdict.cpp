@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every way in which a session can be less than good is found, and named with its cure.
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/session_verdict.hpp"
+
+namespace palpate {
+namespace {
+
+/// A session of 1000 punctual ticks that covered its whole domain.
+struct Judged {
+    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // large: not on the stack
+    LoopSettings settings;
+    Outlets outlets;
+    SessionExpectation expected{false, 1e-3, {0.0, 1.0}, "rad", {}};
+
+    Judged() {
+        for (int k = 0; k < 1000; ++k) {
+            tick(k * 1'000'000LL);
+        }
+        count(Status::Ok) = 1000;
+        outlets.positions = {0.0, 1.0};
+        outlets.forces = {-1.0, 2.0};
+    }
+    void tick(Nanoseconds now, std::uint64_t skipped = 0) {
+        report->loop.timing.add({.deadline = now, .now = now, .skipped = skipped});
+    }
+    [[nodiscard]] std::uint64_t& count(Status status) {
+        return report->loop.ticks_by_status[static_cast<std::size_t>(status)];
+    }
+    void spend(Status status, std::uint64_t ticks) {
+        count(Status::Ok) -= ticks;
+        count(status) += ticks;
+    }
+    [[nodiscard]] std::string text() const {
+        return verdict_text(judge_session(*report, settings, outlets, expected));
+    }
+};
+
+void expect(const Judged& judged, const std::string& begin, const std::string& within) {
+    const std::string text = judged.text();
+    EXPECT_EQ(text.rfind(begin, 0), 0U) << text;
+    EXPECT_NE(text.find(within), std::string::npos) << text;
+}
+
+TEST(SessionVerdict, IsGoodWithoutFindings) {
+    EXPECT_EQ(Judged{}.text(), "good");
+}
+
+TEST(SessionVerdict, NamesMissedDeadlinesFromOneInAThousandOn) {
+    Judged one;
+    one.tick(1'001'000'000, 1);
+    EXPECT_EQ(one.text(), "good");
+    Judged two;
+    two.tick(1'002'000'000, 2);
+    expect(two, "usable: 2 of 1003 (0.1994 %) deadlines were missed: close other programs",
+           "real-time priority");
+}
+
+TEST(SessionVerdict, NamesALowRateOfADeviceThatPacesTheLoop) {
+    Judged slow;
+    slow.settings.rate_hz = 1100.0;
+    expect(slow, "usable: the rate was 1000 Hz of 1100 Hz", "choose a lower rate");
+}
+
+TEST(SessionVerdict, NamesLostSamplesAndLostRows) {
+    Judged lost;
+    lost.report->loop.lost_samples = 2;
+    expect(lost, "usable: 2 of 1000 (0.2 %) samples of the device were lost or repeated", "check its cable");
+    Judged rows;
+    rows.report->lost_records = 1;
+    expect(rows, "usable: 1 of 1000 (0.1 %) rows are missing in the recording", "record to a faster disk");
+}
+
+TEST(SessionVerdict, NamesTicksWhoseForceWasNotTheModelsAboveOnePercent) {
+    for (const auto& [status, sentence] :
+         {std::pair{Status::Limited, "clipped the force to its limit: raise the limit"},
+          {Status::Drained, "reduced the force, because the rendering gave energy"},
+          {Status::Softened, "reduced the force, because the rendering gave energy"},
+          {Status::MaxIterations, "did not solve the load line"},
+          {Status::NotUnique, "did not solve the load line"}}) {
+        Judged few;
+        few.spend(status, 10);
+        EXPECT_EQ(few.text(), "good");
+        Judged many;
+        many.spend(status, 11);
+        expect(many, "usable: 11 of 1000 (1.1 %) ticks ", sentence);
+    }
+    Judged outside;
+    outside.outlets.extrapolated = 300;
+    expect(outside, "usable: 300 of 1000 (30 %) ticks lay outside the model's data, from 0 to 1 rad",
+           "stay within");
+    Judged ramp;
+    ramp.spend(Status::Ramp, 1000);
+    expect(ramp, "usable: all 1000 ticks lay within the ramp at the start", "run for a longer time");
+}
+
+TEST(SessionVerdict, RefusesASessionWithoutForce) {
+    Judged none;
+    none.outlets.forces = {0.0, 0.0};
+    expect(none, "no: every force was zero: the handle did not touch the object between 0 and 1 rad",
+           "move it");
+}
+
+TEST(SessionVerdict, RefusesARecordingWithoutMotion) {
+    Judged still;
+    still.outlets.positions = {0.5, 0.5015};  // less than two steps of the encoder
+    expect(still, "usable: the handle covered 0.0015 rad", "move it over the whole object");
+    still.expected.recorded = true;
+    expect(still, "no: ", "so no force over position is known");
+    still.outlets.positions = {0.5, 0.5021};
+    still.expected.recorded = false;
+    expect(still, "usable: the handle covered 0.0021 rad, 0.21 % of the model's domain", "move it");
+}
+
+TEST(SessionVerdict, NamesARealObjectOfWhichFewPositionsAreKnown) {
+    Judged object;
+    object.expected.domain = {};
+    EXPECT_EQ(object.text(), "good");
+    object.outlets.positions = {0.0, 0.049};
+    expect(object, "usable: the handle covered 0.049 rad, 49 steps of the encoder",
+           "move it over the whole object");
+}
+
+TEST(SessionVerdict, RefusesARecordingWithoutUsableRows) {
+    Judged nothing;
+    nothing.expected.recorded = true;
+    expect(nothing, "no: nothing was recorded", "");
+}
+
+TEST(SessionVerdict, RefusesARunThatWasStoppedAndPutsThatFirst) {
+    Judged stopped;
+    stopped.report->lost_records = 5;
+    stopped.report->loop.ending = Ending::DeviceFault;
+    stopped.report->loop.status = Status::Fault;
+    expect(stopped, "no: stopped by a fault of the device: Fault", "; 5 of 1000 (0.5 %) rows are missing");
+}
+
+TEST(SessionVerdict, NamesNoMotionOfARunThatWasStopped) {
+    Judged stopped;
+    stopped.report->loop.ending = Ending::RateTooLow;
+    stopped.outlets.positions = {0.5, 0.5};
+    stopped.outlets.forces = {0.0, 0.0};
+    EXPECT_EQ(stopped.text().find("handle"), std::string::npos) << stopped.text();
+}
+
+TEST(SessionVerdict, RepeatsWhatTheRecordingWarnsOf) {
+    Judged kept;
+    kept.expected.warnings = {"felt.csv appeared while this was recorded"};
+    EXPECT_EQ(kept.text(), "usable: felt.csv appeared while this was recorded");
+}
+
+}  // namespace
+}  // namespace palpate

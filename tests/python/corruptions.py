@@ -1,0 +1,533 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings with a known law, and what goes wrong with recordings: one seed gives one corrupted case.
+
+python tests/python/corruptions.py [--first 0] [--count 300] [--kind KIND] [--each]
+
+PALPATE_DATA names the folder of measured recordings; without it the cases are of synthetic ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+from scipy.signal import lfilter
+
+import palpate
+from conftest import measured_data
+from palpate.recording.sample import sample_recording
+
+Array = NDArray[np.float64]
+
+SEED = 20261122
+
+WORSE = 1.2
+"""Ratio of the true and the reported NRMSE above which a warning is due."""
+
+DATA = measured_data() or Path("without measured data")
+
+MEASURED = (
+    "keyswitches/clicky__cherry_mx_blue.csv",
+    "keyswitches/linear__cherry_mx_red.csv",
+    "keyswitches/tactile__invyr_holy_panda.csv",
+    "rubber_domes/topre_r1_45g__run1.csv",
+    "rubber_domes/astro_domes_shiner_35g__run1.csv",
+    "switch_springs/linear_housing_tx_short_45g.csv",
+    "switch_springs/tactile_housing_sprit_supreme_63p5g.csv",
+    "magnet_attraction/magnet_cylinder_quarter_inch_attract_25C.csv",
+    "vhb4910_viscoelastic/loadunload_rate_0d05_1d5_1.csv",
+)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Columns of one recording while it is corrupted."""
+
+    x: Array
+    f: Array
+    t: Array | None
+    d: NDArray[np.int8] | None
+    units: dict[str, str]
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Rows:
+        return replace(
+            self,
+            x=self.x[rows],
+            f=self.f[rows],
+            t=None if self.t is None else self.t[rows],
+            d=None if self.d is None else self.d[rows],
+        )
+
+    def recording(self) -> palpate.Recording:
+        return palpate.Recording.from_arrays(self.x, self.f, self.t, self.d, units=self.units)
+
+
+@dataclass
+class Case:
+    """One corrupted case: what is identified, and the clean recordings that it is judged on."""
+
+    seed: int
+    base: str
+    kinds: tuple[str, ...]
+    strength: list[str] = field(default_factory=list)
+    corrupted: list[Rows] = field(default_factory=list)
+    clean: list[Rows] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return f"seed {self.seed}, {self.base}, {' and '.join(self.strength)}"
+
+
+# ------------------------------------------------------------------------------------ clean recordings
+
+
+def _hand(random: Generator, n: int, low: float, high: float) -> Array:
+    """A hand at 1 kHz: sweeps of wandering frequency and width with jitter, reflected at the ends."""
+    knots = max(8, n // 1500)
+    at, knot = np.arange(n), np.linspace(0, n, knots)
+    frequency = np.interp(at, knot, random.uniform(0.2, 0.9, knots))
+    width = np.interp(at, knot, random.uniform(0.42, 0.53, knots))
+    jitter = lfilter([1.0], [1.0, -0.995], random.normal(0.0, 4e-4, n))
+    u = np.abs(0.5 - width * np.cos(2.0 * np.pi * np.cumsum(frequency) * 1e-3) + jitter)
+    return low + (high - low) * (1.0 - np.abs(1.0 - u))
+
+
+def _spring_wall(x: Array) -> Array:
+    return 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
+
+
+_SWITCH = CubicHermiteSpline(
+    [0.0, 1.0, 1.2, 1.6, 1.8, 4.2], [0.0, 0.5, 0.6, 0.35, 0.42, 1.62], [0.5, 0.5, 0.0, 0.0, 0.5, 0.5]
+)
+
+
+def _switch(x: Array) -> Array:
+    return _SWITCH(1e3 * x) + 20.0 * 0.01 * np.logaddexp(0.0, (1e3 * x - 3.8) / 0.01)
+
+
+_ANGLE = {"position": "rad", "force": "N*m"}
+_LENGTH = {"position": "m", "force": "N"}
+
+
+def _sample(random: Generator) -> Rows:
+    recording = sample_recording(int(random.integers(1, 10**6)), 5.0)
+    assert recording.time is not None
+    return Rows(recording.position.copy(), recording.force.copy(), recording.time.copy(), None, _ANGLE)
+
+
+def _p1(random: Generator) -> Rows:
+    x = _hand(random, 5000, 0.0, 0.6)
+    f = _spring_wall(x) + random.normal(0.0, 0.02, len(x))
+    return Rows(x, f, None, None, _ANGLE)
+
+
+def _p2(random: Generator) -> Rows:
+    x = _hand(random, 5000, 0.0, 4e-3)
+    return Rows(x, _switch(x) + random.normal(0.0, 5e-3, len(x)), 1e-3 * np.arange(len(x)), None, _LENGTH)
+
+
+def _loop(random: Generator) -> Rows:
+    """Press and release at even positions, as a tester moves."""
+    x = np.linspace(0.0, 4e-3, 800)
+    x, d = np.r_[x, x[::-1]], np.repeat([1, -1], 800).astype(np.int8)
+    h = 0.05 + 0.1 * np.exp(-(((1e3 * x - 1.5) / 0.5) ** 2))
+    f = _switch(x) + d * h + random.normal(0.0, 3e-3, len(x))
+    return Rows(x, f, None, d, _LENGTH)
+
+
+def _sweeps(random: Generator) -> Rows:
+    """Several strokes with time: a spring with friction that the play operator follows."""
+    t = 4e-3 * np.arange(3000)
+    x = 0.01 * (1.0 - np.cos(2 * np.pi * 0.5 * t)) / 2 * (1.0 + 0.05 * np.sin(0.7 * t))
+    d = np.where(np.gradient(x) >= 0, 1, -1)
+    f = 150.0 * x + 2e4 * x**2 + 0.15 * d * (1.0 - np.exp(-x / 1e-3)) + random.normal(0.0, 0.01, len(x))
+    return Rows(x, f, t, None, _LENGTH)
+
+
+SYNTHETIC: dict[str, Callable[[Generator], Rows]] = {
+    "sample": _sample,
+    "P1": _p1,
+    "P2": _p2,
+    "loop": _loop,
+    "sweeps": _sweeps,
+}
+
+
+@cache
+def _measured(name: str) -> Rows:
+    # position has to grow into the object, here towards the magnet
+    negate = ("position",) if name.startswith("magnet") else ()
+    found = palpate.read_recording(DATA / name, negate=negate)
+    time, direction = found.time, found.direction
+    return Rows(
+        found.position.copy(),
+        found.force.copy(),
+        None if time is None else time.copy(),
+        None if direction is None else direction.copy(),
+        dict(found.units),
+    )
+
+
+def base_names() -> list[str]:
+    """Clean recordings by name; measured ones where they are."""
+    return [*SYNTHETIC, *(name for name in MEASURED if (DATA / name).is_file())]
+
+
+def base(name: str, random: Generator) -> Rows:
+    """A clean recording; a synthetic one has its own noise and motion for every generator."""
+    return SYNTHETIC[name](random) if name in SYNTHETIC else _measured(name)
+
+
+# ----------------------------------------------------------------------------------------- corruptions
+
+Corruption = Callable[[Generator, Rows, Case], list[Rows]]
+
+
+def _restarted(rows: Rows, after: float) -> Rows:
+    """The same rows with time that begins later."""
+    return rows if rows.t is None else replace(rows, t=rows.t - rows.t[0] + after)
+
+
+def _spikes(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    x, f = rows.x.copy(), rows.f.copy()
+    if random.random() < 0.5:
+        count = int(random.integers(1, 6))
+        size = 10.0 ** random.uniform(1.0, 6.0)
+        at = random.choice(len(rows), count, replace=False)
+        x[at] += random.choice([-1.0, 1.0], count) * size * np.ptp(rows.x)
+        case.strength.append(f"{count} position spikes of {size:.3g} travels")
+    else:
+        count = max(1, round(len(rows) * 10.0 ** random.uniform(-3.5, -2.0)))
+        size = 10.0 ** random.uniform(0.5, 3.0)
+        at = random.choice(len(rows), count, replace=False)
+        f[at] += random.choice([-1.0, 1.0], count) * size * np.ptp(rows.f)
+        case.strength.append(f"{count} force spikes of {size:.3g} ranges")
+    return [replace(rows, x=x, f=f)]
+
+
+def _repeats(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    times = int(random.integers(2, 11))
+    case.strength.append(f"each row {times} times")
+    many = rows.take(np.repeat(np.arange(len(rows)), times))
+    if rows.t is None:
+        return [many]
+    t = np.interp(np.arange(len(many)) / times, np.arange(len(rows)), rows.t)
+    t[-times:] = rows.t[-1] + np.arange(times) * float(np.median(np.diff(rows.t))) / times
+    return [replace(many, t=t)]
+
+
+def _held(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    times = int(random.integers(2, 16))
+    rows_held = times * (np.arange(len(rows)) // times)
+    what = str(random.choice(["both", "force", "position"]))
+    case.strength.append(f"{what} held for {times} rows")
+    x = rows.x[rows_held] if what != "force" else rows.x
+    f = rows.f[rows_held] if what != "position" else rows.f
+    return [replace(rows, x=x, f=f)]
+
+
+def _thinning(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    left = int(12 * (200 / 12) ** random.random())
+    case.strength.append(f"{left} of {len(rows)} rows left")
+    if random.random() < 0.5:
+        return [rows.take(np.unique(np.linspace(0, len(rows) - 1, left).astype(int)))]
+    return [rows.take(np.sort(random.choice(len(rows), left, replace=False)))]
+
+
+def _reversed(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    what = str(random.choice(["force", "position"] + ["direction"] * (rows.d is not None)))
+    case.strength.append(f"{what} reversed")
+    if what == "force":
+        return [replace(rows, f=-rows.f)]
+    if what == "position":
+        return [replace(rows, x=-rows.x)]
+    assert rows.d is not None
+    return [replace(rows, d=-rows.d)]
+
+
+UNIT_RATIOS = (1e3, 1e6, 9.80665, 25.4, 10.0, 4.4482, 101.97, 57.29578)
+"""Of units that files mix up: milli, micro, kgf, inch, cm, lbf, gf and degree."""
+
+
+def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    """One recording of two in another unit; or a single one by a factor that no object of its kind has."""
+    ratio = float(random.choice(UNIT_RATIOS)) ** float(random.choice([-1, 1]))
+    role = str(random.choice(["position", "force"]))
+    if case.base in SYNTHETIC and random.random() < 0.6:
+        other = base(case.base, random)
+        case.clean.append(other)
+        case.strength.append(f"second recording: {role} times {ratio:.4g}")
+        wrong = replace(other, x=ratio * other.x) if role == "position" else replace(other, f=ratio * other.f)
+        return [rows, wrong]
+    # A factor of 1000 on the force of a key gives the numbers of a press: another object, and no error.
+    role, ratio = "position", float(random.choice([1e-3, 1e3] if rows.units["position"] == "m" else [1e3]))
+    case.strength.append(f"{role} times {ratio:g}")
+    return [replace(rows, x=ratio * rows.x)]
+
+
+def _merged(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    how = str(random.choice(["stiffer", "offset", "shifted", "again"]))
+    part = random.uniform(0.3, 1.0)
+    factor = float(10.0 ** (random.choice([-1.0, 1.0]) * random.uniform(0.15, 0.7)))
+    second = (
+        rows.take(np.arange(len(rows)) < part * len(rows))
+        if how != "again" and random.random() < 0.3
+        else rows
+    )
+    if how == "stiffer":
+        second = replace(second, f=factor * second.f)
+        case.strength.append(f"another object appended, {factor:.3g} times as stiff, {len(second)} rows")
+    elif how == "offset":
+        share = random.uniform(0.1, 1.0) * random.choice([-1, 1])
+        second = replace(second, f=second.f + share * np.ptp(rows.f))
+        case.strength.append(f"appended with a force offset of {share:.2f} ranges, {len(second)} rows")
+    elif how == "shifted":
+        share = random.uniform(0.05, 0.4) * random.choice([-1, 1])
+        second = replace(second, x=second.x + share * np.ptp(rows.x))
+        case.strength.append(f"appended with the position shifted by {share:.2f} travels, {len(second)} rows")
+    else:
+        case.strength.append("appended to itself")
+    t = None
+    if rows.t is not None:
+        goes_on = random.random() < 0.8
+        after = rows.t[-1] + float(np.median(np.diff(rows.t))) if goes_on else 0.0
+        case.strength[-1] += "" if goes_on else ", time restarts"
+        t = np.r_[rows.t, _restarted(second, after).t]
+    d = None if rows.d is None else np.r_[rows.d, second.d]
+    return [replace(rows, x=np.r_[rows.x, second.x], f=np.r_[rows.f, second.f], t=t, d=d)]
+
+
+def _gaps(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    kept = np.ones(len(rows), dtype=bool)
+    if random.random() < 0.5:
+        count, share = int(random.integers(1, 6)), random.uniform(0.02, 0.15)
+        for start in random.uniform(0.0, 1.0 - share, count):
+            kept[int(start * len(rows)) : int((start + share) * len(rows))] = False
+        case.strength.append(f"{count} stretches of {share:.0%} of the rows lost")
+    else:
+        share = random.uniform(0.03, 0.4)
+        start = random.uniform(0.05, 0.95 - share)
+        u = (rows.x - rows.x.min()) / np.ptp(rows.x)
+        kept &= (u < start) | (u > start + share)
+        case.strength.append(f"positions from {start:.0%} to {start + share:.0%} of the travel lost")
+    return [rows.take(kept)]
+
+
+def _saturation(random: Generator, rows: Rows, case: Case) -> list[Rows]:
+    what = str(random.choice(["force", "force", "both", "position", "stuck"]))
+    share = random.uniform(0.6, 0.97)
+    low, reach = rows.f.min(), np.ptp(rows.f)
+    if what == "force":
+        case.strength.append(f"force clipped at {share:.0%} of its range")
+        return [replace(rows, f=np.minimum(rows.f, low + share * reach))]
+    if what == "both":
+        case.strength.append(f"force clipped at {1 - share:.0%} and {share:.0%} of its range")
+        return [replace(rows, f=np.clip(rows.f, low + (1 - share) * reach, low + share * reach))]
+    if what == "position":
+        case.strength.append(f"position clipped at {share:.0%} of its travel")
+        return [replace(rows, x=np.minimum(rows.x, rows.x.min() + share * np.ptp(rows.x)))]
+    x = rows.x.copy()
+    start, length = int(random.uniform(0.0, 0.8) * len(x)), max(5, int(random.uniform(0.02, 0.15) * len(x)))
+    x[start : start + length] = x[start]
+    case.strength.append(f"position stuck in rows {start} to {start + length - 1} of {len(x)}")
+    return [replace(rows, x=x)]
+
+
+KINDS: dict[str, Corruption] = {
+    "spikes": _spikes,
+    "repeats": _repeats,
+    "held samples": _held,
+    "thinning": _thinning,
+    "reversed sign": _reversed,
+    "wrong unit": _unit,
+    "merged files": _merged,
+    "gaps": _gaps,
+    "saturation": _saturation,
+}
+
+CAUSES = {
+    "spikes": r"spike|outlier|outside|single row|stretch|loss huber|far from|few rows",
+    "repeats": r"repeat|identical|held|same row",
+    "held samples": r"held|hold|repeat|resolution|steps|delay|late|hysteresis",
+    "thinning": r"rows|positions|parameters|gap",
+    "reversed sign": r"negate|sign|direction|energy",
+    "wrong unit": r"unit|scale|factor|differ|spike|stretch",
+    "merged files": r"merge|two objects|part|recordings|drift|apart|restart|repeat|time",
+    "gaps": r"gap|without rows|no rows|interval|interpolat",
+    "saturation": r"satur|clip|range of the sensor|stuck|stands still|limit",
+}
+"""Words of a sentence that names a plausible cause."""
+
+PAIR_SHARE = 0.25
+
+
+def case_of(seed: int, kind: str | None = None) -> Case:
+    """The case of a seed: kinds take turns, a quarter of the cases has a second one."""
+    random = np.random.default_rng([SEED, seed])
+    names = list(KINDS)
+    first = kind or names[seed % len(names)]
+    second = str(random.choice([name for name in names if name != first]))
+    kinds = (first, second) if random.random() < PAIR_SHARE else (first,)
+    case = Case(seed, str(random.choice(base_names())), kinds)
+    rows = base(case.base, random)
+    case.clean.append(rows)
+    case.corrupted = [rows]
+    for name in kinds:
+        changed = KINDS[name](random, case.corrupted[0], case)
+        case.corrupted = [*changed, *case.corrupted[1:]]
+    return case
+
+
+# -------------------------------------------------------------------------------------------- outcomes
+
+
+@dataclass
+class Outcome:
+    """What identification says of a case, and what is true."""
+
+    case: Case
+    reported: float = float("nan")
+    true: float = float("nan")
+    level: str = ""
+    reasons: tuple[str, ...] = ()
+    refused: str = ""
+    crashed: str = ""
+    size: str = ""
+    seconds: float = 0.0
+
+    @property
+    def honest(self) -> bool:
+        """The reported error is not far below the true one."""
+        return bool(self.reported >= self.true / WORSE)
+
+    @property
+    def warned(self) -> bool:
+        """The result was refused, or its verdict is not good."""
+        return bool(self.refused) or self.level not in ("", "good")
+
+    @property
+    def names_cause(self) -> bool:
+        """The refusal or a reason names a cause of the kind of corruption."""
+        text = " ".join((self.refused, *self.reasons))
+        return any(re.search(CAUSES[kind], text, re.IGNORECASE) for kind in self.case.kinds)
+
+    @property
+    def silent(self) -> bool:
+        """A wrong result without a warning that names a plausible cause."""
+        return bool(self.crashed) or not (self.honest or (self.warned and self.names_cause))
+
+
+def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
+    """NRMSE of a model on clean rows inside its domain."""
+    errors, forces = [], []
+    for rows in clean:
+        check = palpate.verify(model, rows.recording())
+        x = rows.x[check.rows]
+        inside = (x >= model.lower[0]) & (x <= model.upper[0])
+        errors.append(check.residual[inside])
+        forces.append(rows.f[check.rows][inside])
+    error, force = np.concatenate(errors), np.concatenate(forces)
+    if not len(error):
+        return float("inf")
+    spread = float(np.std(np.concatenate([rows.f for rows in clean])))
+    return float(np.sqrt(np.mean(error**2)) / spread) if len(force) else float("inf")
+
+
+def outcome_of(case: Case) -> Outcome:
+    """Identify the corrupted recordings, and judge the model on the clean ones."""
+    found = Outcome(case)
+    start = time.perf_counter()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            model = palpate.identify([rows.recording() for rows in case.corrupted])
+    except palpate.InputError as error:
+        found.refused = str(error)
+        return found
+    except Exception as error:
+        found.crashed = f"{type(error).__name__}: {error}"
+        return found
+    found.seconds = time.perf_counter() - start
+    found.reported = model.fit.nrmse
+    verdict = model.verdict
+    found.level, found.reasons = verdict.level, verdict.reasons
+    found.size = f"{model.fit.rung}, {model.n_wavelets} wavelets"
+    try:
+        found.true = true_nrmse(model, case.clean)
+    except palpate.InputError as error:
+        found.true, found.size = float("inf"), f"{found.size}; not verifiable: {error}"
+    return found
+
+
+def told(found: Outcome) -> str:
+    """One case in one line."""
+    if found.refused:
+        return f"{found.case}: refused: {found.refused}"
+    if found.crashed:
+        return f"{found.case}: {found.crashed}"
+    reasons = "; ".join(reason[:90] for reason in found.reasons)
+    errors = f"reported {found.reported:.3g}, true {found.true:.3g}"
+    return f"{found.case}: {errors}, {found.size}, {found.level}: {reasons}"
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Counts by kind: a case of two kinds counts for its first."""
+    lines = [f"{'kind':16}{'cases':>7}{'honest':>8}{'warned':>8}{'cause named':>13}{'silent':>8}"]
+    for kind in (*KINDS, "all"):
+        group = [each for each in outcomes if kind in ("all", each.case.kinds[0])]
+        warned = [each for each in group if each.warned]
+        lines.append(
+            f"{kind:16}{len(group):7d}{sum(each.honest for each in group):8d}{len(warned):8d}"
+            f"{sum(each.names_cause for each in warned):13d}{sum(each.silent for each in group):8d}"
+        )
+    return "\n".join(lines)
+
+
+def clean_outcome(name: str) -> Outcome:
+    """A base recording as it is."""
+    rows = base(name, np.random.default_rng([SEED, base_names().index(name)]))
+    return outcome_of(Case(-1, name, (), ["clean"], [rows], [rows]))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--kind", choices=list(KINDS))
+    parser.add_argument("--seeds", type=int, nargs="*")
+    parser.add_argument("--each", action="store_true", help="print every case")
+    parser.add_argument("--no-clean", action="store_true")
+    options = parser.parse_args()
+    if not options.no_clean:
+        print("clean recordings:")
+        for name in base_names():
+            print("   ", told(clean_outcome(name)), flush=True)
+    seeds = options.seeds or range(options.first, options.first + options.count)
+    outcomes = []
+    for seed in seeds:
+        found = outcome_of(case_of(seed, options.kind))
+        outcomes.append(found)
+        if options.each or found.silent or found.seconds > 20:
+            print(
+                "SILENT " if found.silent else "       ", told(found), f"({found.seconds:.1f} s)", flush=True
+            )
+    print(table(outcomes))
+    print(Counter(each.level or "refused" for each in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

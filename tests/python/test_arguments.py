@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every public callable refuses an argument of a wrong type by an InputError that names the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import palpate
+from palpate import (
+    DeviceProfile,
+    Finding,
+    Hand,
+    IdentifyOptions,
+    InputError,
+    Model,
+    Plan,
+    Recording,
+    Scheme,
+    Verdict,
+    WaveletNetworkRegressor,
+    frame_bounds,
+    identify,
+    identify_files,
+    load_model,
+    plan,
+    read_recording,
+    simulate,
+    verify,
+)
+
+X = np.linspace(0.0, 0.4, 60)
+RECORDING = Recording.from_arrays(X, 5.0 * X, units={"position": "rad", "force": "N*m"})
+MODEL = identify(RECORDING)
+DEVICE = DeviceProfile()
+PLAN = plan(MODEL, DEVICE)
+
+WRONG: dict[str, Any] = {
+    "none": None,
+    "int": 3,
+    "nan": float("nan"),
+    "str": "\0",
+    "bytes": b"press.csv",
+    "dict": {"a": 1},
+    "object": object(),
+    "function": len,
+    "empty_list": [],
+    "list_with_none": [None, 1.0],
+    "empty_array": np.array([]),
+    "two_dimensional": np.zeros((2, 2)),
+    "text_array": np.array(["a", "b"]),
+    "complex_array": X * 1j,
+    "masked_array": np.ma.masked_array(X, X > 0.2),
+    "frame": pd.DataFrame({"a": [1, 2]}),
+}
+
+NUMBERS = {"int", "nan", "empty_list", "empty_array", "two_dimensional", "frame"}
+"""Wrong values that are an array of numbers after all."""
+
+REFUSED_AS_TYPE = {"object", "function", "none", "dict"}
+"""Wrong values that scikit-learn asks its estimators to refuse by a TypeError."""
+
+
+def rebuilt(**changes: Any) -> Model:
+    """The model made again by hand, with some arguments changed."""
+    names = ("kind", "inputs", "units", "alpha", "beta", "weight", "linear", "bias", "lower", "upper")
+    same = {name: getattr(MODEL, name) for name in (*names, "fit", "data")}
+    return Model(**{**same, **changes})
+
+
+Call = Callable[[Any], object]
+
+# Where an argument may be what stands among the wrong values.
+TAKES: dict[str, tuple[Call, str, set[str]]] = {
+    # name: (call, argument that the message names, values that are right there)
+    "identify": (identify, "recording|frame", set()),
+    "identify in a list": (lambda v: identify([RECORDING, v]), "recording|frame", set()),
+    "identify position": (lambda v: identify(v, X), "position|force", set()),
+    "identify force": (lambda v: identify(X, v), "force|recording", set()),
+    "identify time": (lambda v: identify(X, X, time=v), "time", {"none"}),
+    "identify direction": (lambda v: identify(X, X, direction=v), "direction", {"none"}),
+    "identify max_wavelets": (lambda v: identify(RECORDING, max_wavelets=v), "max_wavelets", {"int"}),
+    "verify model": (lambda v: verify(v, RECORDING), "model", set()),
+    "verify recording": (lambda v: verify(MODEL, v), "recording|frame", set()),
+    "verify position": (lambda v: verify(MODEL, v, X), "position|force", set()),
+    "verify force": (lambda v: verify(MODEL, X, v), "force|recording", set()),
+    "from_arrays position": (lambda v: Recording.from_arrays(v, X), "position|force", set()),
+    "from_arrays force": (lambda v: Recording.from_arrays(X, v), "force", set()),
+    "from_arrays inputs": (
+        lambda v: Recording.from_arrays(X, X, inputs=v),
+        "inputs|a has",
+        {"none", "frame"},
+    ),
+    "from_arrays units": (lambda v: Recording.from_arrays(X, X, units=v), "units", {"none", "dict"}),
+    "from_frame": (Recording.from_frame, "frame", set()),
+    "from_frame invalid": (lambda v: Recording.from_frame(pd.DataFrame(), invalid=v), "invalid", set()),
+    "split": (RECORDING.split, "every", {"int"}),
+    "with_force_earlier": (
+        lambda v: Recording.from_arrays(X, X, time=X).with_force_earlier(v),
+        "late_s|late by",
+        set(),
+    ),
+    "write": (RECORDING.write, "path", set()),
+    "read_recording": (read_recording, "path", set()),
+    "load_model": (load_model, "path", set()),
+    "save": (MODEL.save, "path", set()),
+    "identify_files": (identify_files, "file", set()),
+    "profile load": (DeviceProfile.load, "path", set()),
+    "profile save": (DEVICE.save, "path", set()),
+    "plan model": (lambda v: plan(v, DEVICE), "model", set()),
+    "simulate plan": (lambda v: simulate(v, DEVICE, Hand(), 0.1), "plan", set()),
+    "simulate device": (lambda v: simulate(PLAN, v, Hand(), 0.1), "device", set()),
+    "simulate hand": (lambda v: simulate(PLAN, DEVICE, v, 0.1), "hand", set()),
+    "simulate duration": (lambda v: simulate(PLAN, DEVICE, Hand(), v), "duration", {"int"}),
+    "Plan model": (lambda v: Plan(v, Scheme()), "model", set()),
+    "Plan scheme": (lambda v: Plan(MODEL, v), "scheme", set()),
+    "Plan.of": (Plan.of, "model", set()),
+    "frame_bounds a0": (lambda v: frame_bounds(v, 0.5), "a0", {"int"}),
+    "frame_bounds b0": (lambda v: frame_bounds(2.0, v), "b0", {"int"}),
+    "frame_bounds voices": (lambda v: frame_bounds(2.0, 0.5, v), "voices", {"int"}),
+    "Hand": (lambda v: Hand(stiffness=v), "stiffness", {"int", "nan"}),
+    "Hand by position": (Hand, "Hand", set()),
+    "Scheme number": (lambda v: Scheme(coupling_stiffness=v), "coupling_stiffness", {"int", "nan"}),
+    "Scheme structure": (lambda v: Scheme(structure=v), "structure", set()),
+    "Scheme compensated": (lambda v: Scheme(compensated=v), "compensated", {"none", "int", "nan"}),
+    "DeviceProfile id": (lambda v: DeviceProfile(id=v), "id", {"str", "bytes"}),
+    "DeviceProfile number": (lambda v: DeviceProfile(inertia=v), "inertia", {"int"}),
+    "DeviceProfile whole number": (lambda v: DeviceProfile(delay_samples=v), "delay_samples", {"int"}),
+    "Finding level": (lambda v: Finding(v, "sentence"), "level", set()),
+    "Finding sentence": (lambda v: Finding("usable", v), "sentence", {"str"}),
+    "Verdict": (Verdict, "findings", set()),
+    "Model alpha": (lambda v: rebuilt(alpha=v), "alpha", {"empty_list", "empty_array"}),
+    "Model bias": (lambda v: rebuilt(bias=v), "bias", {"int"}),
+    "Model period": (lambda v: rebuilt(period=v), "period", {"none", "int"}),
+    "Model fit": (lambda v: rebuilt(fit=v), "fit", set()),
+    "Model data": (lambda v: rebuilt(data=v), "data", set()),
+    "Model units": (lambda v: rebuilt(units=v), "units|position", set()),
+    "Model kind": (lambda v: rebuilt(kind=v), "kind", set()),
+    "Model inputs": (lambda v: rebuilt(inputs=v), "inputs", set()),
+    "Model": (lambda v: Model.from_dict(v), "", set()),
+    "force position": (
+        MODEL.force,
+        "position",
+        NUMBERS,
+    ),
+    "force direction": (lambda v: MODEL.force(0.1, direction=v), "direction", {"none", "int", "nan"}),
+    "slope": (MODEL.slope, "position", NUMBERS),
+    "energy": (MODEL.energy, "position", NUMBERS),
+    "predict": (MODEL.predict, "X", {"frame"}),
+    "extrapolated": (
+        MODEL.extrapolated,
+        "position",
+        NUMBERS,
+    ),
+    "regressor X": (lambda v: WaveletNetworkRegressor().fit(v, X), "X", REFUSED_AS_TYPE),
+    "regressor y": (
+        lambda v: WaveletNetworkRegressor().fit(X[:, None], v),
+        "y",
+        {"object", "function", "frame"},
+    ),
+    "regressor weight": (
+        lambda v: WaveletNetworkRegressor().fit(X[:, None], X, sample_weight=v),
+        "sample_weight",
+        {"none"},
+    ),
+}
+
+OPTIONS: dict[str, set[str]] = {
+    name: {"int"} if isinstance(default, (int, float)) and not isinstance(default, bool) else set()
+    for name, default in (
+        (each, getattr(IdentifyOptions(), each)) for each in IdentifyOptions.__annotations__
+    )
+}
+"""Fields of IdentifyOptions, and the wrong values that are right for them."""
+
+OPTIONAL = ("slope_bounds", "fixed_force", "coupling_stiffness", "period")
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("call", TAKES)
+def test_a_wrong_type_is_an_input_error_that_names_the_argument(
+    call: str, wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    function, names, right = TAKES[call]
+    if wrong in right:
+        return
+    with pytest.raises(InputError) as error:
+        function(WRONG[wrong])
+    told = str(error.value)
+    assert any(name in told for name in names.split("|")), told
+    assert "\n" not in told
+    assert len(told) < 500
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("field", OPTIONS)
+def test_an_option_of_a_wrong_type_is_refused_by_its_name(field: str, wrong: str) -> None:
+    right = OPTIONS[field] | ({"none", "int"} if field in OPTIONAL[2:] else set())
+    right |= {"none"} if field in OPTIONAL else set()
+    if wrong in right:
+        return
+    with pytest.raises(InputError, match=field):
+        IdentifyOptions(**{field: WRONG[wrong]})
+
+
+def test_every_public_callable_is_in_the_table() -> None:
+    """Verification and InputError are results, which nobody makes by hand."""
+    called = {name.split()[0].split(".")[0] for name in TAKES}
+    public = {name for name in palpate.__all__ if callable(getattr(palpate, name))}
+    missing = public - called - {"Verification", "InputError", "Recording", "IdentifyOptions"}
+    assert missing == {"WaveletNetworkRegressor"}, "it stands in the table as regressor"

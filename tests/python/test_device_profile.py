@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The TOML file of a device profile: every refusal is one sentence with the file's name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from conftest import ROOT
+from palpate import DeviceProfile, InputError
+from palpate.cli.main import main
+
+MODEL = ROOT / "tests" / "models" / "good" / "position.json"
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("inertia", "1" + "0" * 400, "inertia is an integer of 1329 bits, must be a number"),
+        ("inertia", "0x" + "f" * 6000, "inertia is an integer of 24000 bits, must be a number"),
+        ("inertia", "9" * 5000, "a value cannot be read: Exceeds the limit"),
+        ("inertia", "1e400", "inertia is inf, must be > 0"),
+        ("inertia", "nan", "inertia is nan, must be > 0"),
+        ("inertia", "true", "inertia is True, must be a number"),
+        ("inertia", '"heavy"', "inertia is 'heavy', must be a number"),
+        ("inertia", "[1.0]", "inertia is [1.0], must be a number"),
+        ("inertia", "[" * 5000 + "]" * 5000, "it is nested too deeply; a profile has no tables"),
+        ("inertia", "{a = " * 5000 + "1" + "}" * 5000, "it is nested too deeply; a profile has no tables"),
+        ("inertia", "1979-05-27", "inertia is datetime.date(1979, 5, 27), must be a number"),
+        ("inertia", '"' + "x" * 10_000 + '"', "inertia is 'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx..., must be"),
+        ("delay_samples", str(2**70), "delay_samples is an integer of 71 bits, must be a whole number"),
+        ("delay_samples", str(2**31), "delay_samples is 2147483648, must be a whole number"),
+        ("delay_samples", "1.0", "delay_samples is 1.0, must be a whole number"),
+        ("delay_samples", "false", "delay_samples is False, must be a whole number"),
+        ("delay_samples", "99", "delay_samples is 99, must be 0 to 16"),
+        ("id", "7", "id is 7, must be text"),
+        ("position_unit", "[]", "position_unit is [], must be text"),
+    ],
+    ids=lambda value: value[:24],
+)
+def test_a_value_of_a_profile_that_does_not_fit_is_one_sentence(
+    tmp_path: Path, field: str, value: str, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = DeviceProfile(id="knob").save(tmp_path / "p.toml")
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(rf"(?m)^{field} = .*$", f"{field} = {value}", text), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(sentence)) as refused:
+        DeviceProfile.load(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert main(["plan", str(MODEL), "--device", str(path)]) == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert told.startswith(f"error: {path}: ")
+    assert "defect" not in told

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Single wrong readings are left out and reported; sparse recordings and brief contacts stay whole."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import palpate
+from imperfect import TRAVEL, Array, noise, recorded, strokes, sweep, true_nrmse, wall
+from palpate.identification.identify_files import identify_files
+from palpate.identification.isolated import without_isolated
+
+N = 10_000
+
+
+def changed(values: Array, at: dict[int, float]) -> Array:
+    changed_values = values.copy()
+    changed_values[list(at)] = list(at.values())
+    return changed_values
+
+
+@pytest.mark.parametrize(
+    "at",
+    [{5000: 6e5}, {100: 6e5, 2000: -1e3, 5000: 20.0, 7000: 1e12}],
+    ids=["one", "several"],
+)
+def test_position_spikes_are_left_out_and_counted(at: dict[int, float]) -> None:
+    x = strokes(N)
+    y = wall(x) + noise(N)
+    clean = palpate.identify(recorded(x, y))
+    model = palpate.identify(recorded(changed(x, at), y))
+    assert true_nrmse(model, wall) < 1.5 * true_nrmse(clean, wall) < 0.002
+    assert model.fit.nrmse == pytest.approx(clean.fit.nrmse, rel=0.01)
+    assert model.domain[1][0] == pytest.approx(TRAVEL, rel=1e-3)
+    assert f"{len(at)} of {N} rows" in str(model.verdict)
+    assert "left out as wrong readings" in str(model.verdict)
+
+
+def test_force_spikes_are_left_out_and_counted() -> None:
+    x = strokes(N)
+    y = wall(x) + noise(N)
+    model = palpate.identify(recorded(x, changed(y, {5100: 1.4e7, 100: -1e9, 999: 500.0})))
+    assert true_nrmse(model, wall) < 0.001
+    assert f"3 of {N} rows (row 100 at -1e+09" in str(model.verdict)
+
+
+def test_one_spike_in_few_rows_is_left_out() -> None:
+    x = sweep(50)
+    model = palpate.identify(recorded(changed(x, {25: 6e5}), wall(x)))
+    assert true_nrmse(model, wall) < 0.02
+    assert "1 of 50 rows" in str(model.verdict)
+
+
+def test_rows_that_stretch_the_domain_are_reported() -> None:
+    x = strokes(N)
+    model = palpate.identify(recorded(changed(x, {5000: 3.0}), wall(x) + noise(N)))
+    assert "row 5000 at 3" in str(model.verdict)
+    assert "stretch the range of position" in str(model.verdict)
+
+
+def test_too_many_spikes_give_no_good_error() -> None:
+    x = strokes(N)
+    x[::50] = 6e5
+    model = palpate.identify(recorded(x, wall(strokes(N)) + noise(N)))
+    assert model.fit.nrmse > 0.5
+    assert model.verdict.level == "no"
+
+
+@pytest.mark.parametrize(
+    "x",
+    [
+        np.geomspace(1e-6, 1.0, 12),
+        np.geomspace(1e-12, 1.0, 12),
+        np.geomspace(1e-12, 1.0, 200),
+        np.arange(12.0),
+    ],
+    ids=["12-log", "12-wide-log", "200-log", "12-even"],
+)
+def test_sparse_recordings_stay_whole(x: Array) -> None:
+    model = palpate.identify(recorded(x, 3.0 * x))
+    assert not any("left out" in reason for reason in model.verdict.reasons)
+    assert model.domain[1][0] == x.max()
+
+
+@pytest.mark.parametrize("stiffness", [1e5, 1e8])
+def test_wall_that_is_touched_briefly_stays(stiffness: float) -> None:
+    x = 0.5 - 0.5 * np.cos(6.0 * np.pi * np.linspace(0.0, 1.0, 1001))
+    y = x + stiffness * np.maximum(x - 0.99999, 0.0)
+    assert 0 < np.count_nonzero(x > 0.99999) < 10
+    kept, findings = without_isolated([recorded(x, y)])
+    assert len(kept[0]) == len(x)
+    assert not any("left out" in finding.sentence for finding in findings)
+
+
+def test_short_fast_motion_after_a_long_rest_stays() -> None:
+    random = np.random.default_rng(1)
+    x = np.concatenate([random.normal(0.0, 1e-6, 2000), np.linspace(0.1, 1.0, 10)])
+    kept, _ = without_isolated([recorded(x, 2.0 * x)])
+    assert len(kept[0]) == len(x)
+
+
+def test_sums_over_files_refuse_a_spike(tmp_path: pytest.TempPathFactory) -> None:
+    x = strokes(N)
+    y = wall(x) + noise(N)
+    path = f"{tmp_path}/press.csv"
+    pd.DataFrame({"position_rad": changed(x, {5000: 6e5}), "torque_Nm": y}).to_csv(path, index=False)
+    with pytest.raises(palpate.InputError, match=r"1 of 10000 rows have a position \(6e\+05\)"):
+        identify_files(path)
+    # the cure, applied literally
+    pd.DataFrame({"position_rad": np.delete(x, 5000), "torque_Nm": np.delete(y, 5000)}).to_csv(
+        path, index=False
+    )
+    model = identify_files(path)
+    recording = palpate.read_recording(path)
+    assert model.fit.nrmse == pytest.approx(palpate.verify(model, recording).nrmse, rel=1e-6)

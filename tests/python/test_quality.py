@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of a recording: each finding names value, cause and cure; clean recordings have no finding."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate
+from corruptions import SEED, SYNTHETIC, Rows, base, base_names
+from palpate.cli.main import main
+from palpate.recording.quality import findings_of, quality_findings
+from palpate.recording.scales import UNIT_RATIOS
+
+
+def rows_of(name: str, draw: int = 0) -> Rows:
+    return base(name, np.random.default_rng([SEED, draw]))
+
+
+def sentences(*rows: Rows) -> list[str]:
+    return [finding.sentence for finding in findings_of([each.recording() for each in rows])]
+
+
+def only(*rows: Rows) -> str:
+    """The one sentence on the recordings."""
+    (sentence,) = sentences(*rows)
+    return sentence
+
+
+@pytest.mark.parametrize("name", base_names())
+def test_a_clean_recording_has_no_finding(name: str) -> None:
+    assert sentences(rows_of(name)) == []
+
+
+@pytest.mark.parametrize("folder", ["keyswitches", "rubber_domes", "switch_springs"])
+def test_clean_measured_files_have_no_finding(data: Path, folder: str) -> None:
+    found = {}
+    for path in sorted((data / folder).glob("*.csv")):
+        if "latch" not in path.name and "lock" not in path.name:
+            found[path.name] = quality_findings(palpate.read_recording(path))
+    assert not any(found.values()), found
+
+
+def test_a_clipped_force_is_reported_with_value_rows_and_cure() -> None:
+    rows = rows_of("P1")
+    limit = 5.0
+    sentence = only(replace(rows, f=np.minimum(rows.f, limit)))
+    assert f"the largest force, 5 N*m, stands in {np.count_nonzero(rows.f >= limit)} rows" in sentence
+    assert "clipped" in sentence
+    assert sentence.endswith("record with a larger force range or press less far")
+
+
+def test_a_force_clipped_at_its_lower_end_is_reported() -> None:
+    rows = rows_of("P1")
+    both = replace(rows, f=np.clip(rows.f - 6.0, -5.0, 1e9))
+    assert "the least force, -5 N*m, stands in" in only(both)
+
+
+def test_a_coarse_force_with_a_flat_maximum_is_not_clipped() -> None:
+    x = np.linspace(0.0, 1e-2, 2000)
+    f = np.round(50.0 * (1.0 - (x / 1e-2 - 0.5) ** 2) / 0.1) * 0.1
+    assert sentences(Rows(x, f, None, None, {"position": "m", "force": "N"})) == []
+
+
+def test_a_force_of_zero_before_the_contact_is_not_clipped() -> None:
+    x = np.linspace(0.0, 1e-2, 2000)
+    f = np.round(np.maximum(0.0, 1e4 * (x - 4e-3)), 2)
+    assert sentences(Rows(x, f, None, None, {"position": "m", "force": "N"})) == []
+
+
+def test_a_clipped_position_is_reported() -> None:
+    rows = rows_of("P1")
+    found = sentences(replace(rows, x=np.minimum(rows.x, 0.5)))
+    assert any("the largest position, 0.5 rad, stands in" in sentence for sentence in found)
+
+
+def test_a_stuck_position_is_reported_with_its_rows_and_the_rest_of_the_file_is_clean() -> None:
+    rows = rows_of("loop")
+    x = rows.x.copy()
+    x[300:400] = x[300]
+    found = sentences(replace(rows, x=x))
+    (stuck,) = [sentence for sentence in found if "stands still" in sentence]
+    assert "stands still in rows 300 to 399, then jumps by" in stuck
+    assert "--rows 0:300 or --rows 400:1600" in stuck
+
+
+def test_a_pause_before_the_motion_turns_is_not_a_clipped_position() -> None:
+    t = np.linspace(0.0, 1.0, 500)
+    x = np.r_[t**0.5, np.ones(60), 1.0 - t**2]
+    relaxing = np.linspace(1.0, 0.7, 60)
+    f = np.r_[1.0 * t**0.5 + 0.1, relaxing, 0.8 * (1.0 - t**2) - 0.1]
+    assert sentences(Rows(1e-2 * x, f, None, None, {"position": "m", "force": "N"})) == []
+
+
+@pytest.mark.parametrize("name", ["P1", "P2", "loop", "sweeps", "sample"])
+@pytest.mark.parametrize("turned", ["force", "position", "direction"])
+def test_a_turned_sign_is_reported_and_turning_it_back_is_clean(name: str, turned: str) -> None:
+    rows = rows_of(name)
+    if turned == "force":
+        wrong, right = replace(rows, f=-rows.f), rows
+    elif turned == "position":
+        wrong, right = replace(rows, x=-rows.x), rows
+    elif rows.d is None:
+        pytest.skip("has no direction")
+    else:
+        wrong, right = replace(rows, d=-rows.d), rows
+    assert any("--negate" in sentence for sentence in sentences(wrong))
+    assert sentences(right) == []
+
+
+def test_a_delay_is_offered_as_a_cause_only_with_time() -> None:
+    with_time = rows_of("sweeps")
+    turned = replace(with_time, f=-with_time.f)
+    assert any("--force-late-s" in sentence for sentence in sentences(turned))
+    assert not any("--force-late-s" in sentence for sentence in sentences(replace(turned, t=None)))
+
+
+@pytest.mark.parametrize(("name", "factor"), [("P2", 1e3), ("P2", 1e-3), ("P1", 1e3), ("loop", 1e3)])
+def test_an_implausible_travel_names_the_unit(name: str, factor: float) -> None:
+    rows = rows_of(name)
+    found = sentences(replace(rows, x=factor * rows.x))
+    assert any("the unit of position or force is probably wrong" in sentence for sentence in found)
+
+
+def test_a_microscopes_recording_is_plausible() -> None:
+    x = np.linspace(0.0, 3e-6, 500)
+    assert sentences(Rows(x, 0.01 * x, None, None, {"position": "m", "force": "N"})) == []
+
+
+@pytest.mark.parametrize("ratio", [*UNIT_RATIOS, *(1.0 / ratio for ratio in UNIT_RATIOS)])
+@pytest.mark.parametrize("role", ["position", "force"])
+def test_a_recording_in_another_unit_than_the_others_is_reported_with_the_ratio(
+    ratio: float, role: str
+) -> None:
+    first, second, third = (rows_of("P2", draw) for draw in range(3))
+    assert sentences(first, second, third) == []
+    wrong = replace(second, x=second.x / ratio) if role == "position" else replace(second, f=second.f / ratio)
+    recordings = [each.recording() for each in (first, wrong, third)]
+    (finding,) = [each for each in findings_of(recordings) if "agrees with" in each.sentence]
+    assert finding.level == "no"
+    assert finding.sentence.startswith("recording 2 agrees with recording 1 only if")
+    assert f"its {role} is multiplied by {ratio:.4g}" in finding.sentence
+
+
+def test_recordings_of_two_objects_are_reported() -> None:
+    first, second = rows_of("P2", 0), rows_of("P2", 1)
+    sentence = only(first, replace(second, f=3.0 * second.f))
+    assert "recording 2 and recording 1 differ by" in sentence or "recording 1 and recording 2" in sentence
+    assert sentence.endswith("identify them one by one")
+
+
+@pytest.mark.parametrize("name", SYNTHETIC)
+def test_two_objects_in_one_file_are_reported_and_each_part_alone_is_clean(name: str) -> None:
+    rows = rows_of(name)
+    n = len(rows)
+    t = None if rows.t is None else np.r_[rows.t, rows.t + rows.t[-1] + rows.t[1]]
+    d = None if rows.d is None else np.r_[rows.d, rows.d]
+    both = Rows(np.r_[rows.x, rows.x], np.r_[rows.f, 2.0 * rows.f], t, d, rows.units)
+    sentence = only(both)
+    assert f"before and after about row {n} " in sentence
+    assert f"--rows 0:{n} and --rows {n}:{2 * n}" in sentence
+    assert sentences(both.take(np.arange(n))) == sentences(both.take(np.arange(n, 2 * n))) == []
+
+
+def test_a_file_appended_to_itself_is_reported_with_the_row() -> None:
+    rows = rows_of("P1")
+    twice = Rows(np.r_[rows.x, rows.x], np.r_[rows.f, rows.f], None, None, rows.units)
+    assert only(twice).endswith("give --rows 0:5000")
+
+
+def test_positions_without_rows_are_reported_for_the_whole_recording_and_for_one_stroke() -> None:
+    rows = rows_of("loop")
+    hole = (rows.x > 1e-3) & (rows.x < 1.5e-3)
+    assert "the recording has no rows from 0.00" in only(rows.take(~hole))
+    one = only(rows.take(~hole | (rows.d == -1)))
+    assert "the press stroke has no rows from 0.00" in one
+    assert "13% of the travel" in one or "12% of the travel" in one
+
+
+def test_a_stroke_that_ends_early_is_reported() -> None:
+    rows = rows_of("loop")
+    assert "the release stroke has no rows from 0 to 0.0005" in only(
+        rows.take((rows.d == 1) | (rows.x > 5e-4))
+    )
+
+
+def test_samples_missing_in_time_are_reported_with_count_and_longest_gap() -> None:
+    rows = rows_of("sample")
+    kept = np.ones(len(rows), dtype=bool)
+    kept[1000:1200], kept[3000:3400] = False, False
+    assert "time has 2 gaps, the longest 0.401 s" in only(rows.take(kept))
+
+
+@pytest.mark.parametrize("held", ["the force changes", "the position changes", "position and force change"])
+def test_held_columns_are_reported_with_their_period(held: str) -> None:
+    rows = rows_of("P2")
+    at = 8 * (np.arange(len(rows)) // 8)
+    wrong = replace(
+        rows,
+        f=rows.f[at] if "force" in held else rows.f,
+        x=rows.x[at] if "position" in held else rows.x,
+    )
+    (found,) = [sentence for sentence in sentences(wrong) if "only once" in sentence]
+    assert found.startswith(f"{held} only once in 8 rows")
+    assert ("--force-late-s 0.0035" in found) == (held == "the force changes")
+
+
+def test_too_few_rows_for_the_parameters_are_reported_and_repetitions_do_not_count() -> None:
+    rows = rows_of("P1").take(np.arange(0, 5000, 60))
+    model = palpate.identify(rows.recording())
+    assert f"{len(rows)} rows determine {model.n_parameters} parameters" in str(model.verdict)
+    repeated = rows.take(np.repeat(np.arange(len(rows)), 4))
+    told = str(palpate.identify(repeated.recording()).verdict)
+    assert f"{len(rows)} independent of {4 * len(rows)} rows (the others repeat them, " in told
+    assert "correlated noise) determine" in told
+
+
+def test_findings_on_several_recordings_name_the_recording() -> None:
+    first, second = rows_of("P1", 0), rows_of("P1", 1)
+    assert only(first, replace(second, f=np.minimum(second.f, 8.0))).startswith(
+        "recording 2: the largest force"
+    )
+
+
+def test_a_clipped_file_gets_the_verdict_usable_on_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = rows_of("P1")
+    path = replace(rows, f=np.minimum(rows.f, 5.0)).recording().write(tmp_path / "press.csv")
+    assert main(["identify", str(path), "-o", str(tmp_path / "press.json"), "--json"]) == 0
+    verdict = json.loads(capsys.readouterr().out)["verdict"]
+    assert verdict.startswith("usable: the largest force, 5 N*m, stands in")

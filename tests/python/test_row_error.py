@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reported error is that of the rows through the final model, whatever the numbers' size."""
+
+import numpy as np
+import pytest
+
+import palpate
+from imperfect import Array, line, noise, recorded, strokes, sweep, wall
+from palpate import WaveletNetworkRegressor
+from palpate.identification.row_error import RowError, disagreement
+
+N = 4000
+X = strokes(N)
+Y = wall(X) + noise(N)
+PLAIN = palpate.identify(recorded(X, Y))
+
+
+def test_reported_nrmse_is_that_of_the_rows() -> None:
+    residual = Y - PLAIN.force(X)
+    assert PLAIN.fit.nrmse == pytest.approx(np.sqrt(np.mean(residual**2)) / np.std(Y), rel=1e-9)
+    assert PLAIN.fit.nrmse == pytest.approx(palpate.verify(PLAIN, recorded(X, Y)).nrmse, rel=1e-9)
+
+
+@pytest.mark.parametrize("scale", [2.0**170, 2.0**300, 2.0**-170, 2.0**-300])
+def test_force_of_any_size_gives_the_same_model(scale: float) -> None:
+    model = palpate.identify(recorded(X, scale * Y))
+    assert model.n_wavelets == PLAIN.n_wavelets
+    assert model.fit.nrmse == pytest.approx(PLAIN.fit.nrmse, rel=1e-6)
+    np.testing.assert_allclose(model.force(X) / scale, PLAIN.force(X), atol=1e-6)
+    regressor = WaveletNetworkRegressor().fit(X[:, None], scale * Y)
+    assert regressor.n_wavelets_ >= 3
+    assert regressor.score(X[:, None], scale * Y) > 0.9999
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e9, -1e12])
+def test_offset_of_the_force_does_not_hide_the_wall(offset: float) -> None:
+    model = palpate.identify(recorded(X, Y + offset))
+    assert model.n_wavelets == PLAIN.n_wavelets
+    assert model.fit.nrmse == pytest.approx(PLAIN.fit.nrmse, rel=0.01)
+    assert model.below == "linear"
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e9])
+def test_offset_of_the_position_does_not_hide_the_wall(offset: float) -> None:
+    model = palpate.identify(recorded(X + offset, Y))
+    assert model.n_wavelets >= 3
+    assert model.fit.nrmse == pytest.approx(PLAIN.fit.nrmse, rel=0.01)
+
+
+def test_ordinary_forces_are_not_touched() -> None:
+    scaled = palpate.identify(recorded(X, 2.0**-20 * Y))
+    np.testing.assert_array_equal(scaled.alpha, PLAIN.alpha)
+    assert not any("multiplied" in note for note in scaled.notes["identification"])
+
+
+def test_slope_bounds_hold_for_huge_forces() -> None:
+    scale = 2.0**170
+    model = palpate.identify(recorded(X, scale * Y), slope_bounds=(0.0, 30.0 * scale))
+    plain = palpate.identify(recorded(X, Y), slope_bounds=(0.0, 30.0))
+    assert model.slope_bounds is not None
+    assert plain.slope_bounds is not None
+    assert model.slope_bounds[1] == pytest.approx(plain.slope_bounds[1] * scale, rel=1e-3)
+    assert model.fit.nrmse == pytest.approx(plain.fit.nrmse, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "words"),
+    [
+        (X, Y * 1e150, "force reaches"),
+        (X, Y * 1e-150, "the largest force is"),
+        (X * 1e200, Y, "position reaches"),
+        (X * 1e-200, Y, "position spans"),
+    ],
+)
+def test_numbers_beyond_the_bound_are_refused_with_it(x: Array, y: Array, words: str) -> None:
+    with pytest.raises(palpate.InputError, match=rf"{words} .*e[+-]\d+; .*Use another unit"):
+        palpate.identify(recorded(x, y))
+
+
+def test_few_extreme_forces_do_not_hide_the_error_of_the_others() -> None:
+    force = np.concatenate([noise(990), [1e3] * 10])
+    residual = np.concatenate([noise(990), np.zeros(10)])
+    error = RowError(residual, force, np.ones(1000))
+    assert error.nrmse < 1e-3
+    (finding,) = error.findings()
+    assert finding.level == "no"
+    assert "without the 1% of most extreme force" in finding.sentence
+    assert RowError(0.01 * residual, force, np.ones(1000)).findings() == []
+
+
+def test_error_on_rows_far_above_that_on_cells_is_a_no() -> None:
+    error = RowError(noise(1000), line(sweep(1000)), np.ones(1000))
+    (finding,) = disagreement(error, 0.1 * error.rmse, 0.6, 1024)
+    assert finding.level == "no"
+    assert "raise max_positions" in finding.sentence
+    assert disagreement(error, 0.9 * error.rmse, 0.6, 1024) == []
+
+
+def test_few_rows_for_many_numbers_are_reported() -> None:
+    rows = 30
+    model = palpate.identify(recorded(sweep(rows), wall(sweep(rows)) + noise(rows)))
+    assert model.n_parameters > rows / 3
+    assert f"{rows} rows determine {model.n_parameters} parameters" in str(model.verdict)
+
+
+def test_constant_force_is_a_constant() -> None:
+    model = palpate.identify(recorded(X, np.full(N, 3.0)))
+    assert (model.n_wavelets, model.fit.nrmse) == (0, 0.0)
+    assert model.force(0.3) == pytest.approx(3.0)
+
+
+def test_noise_alone_gives_no_wavelet() -> None:
+    model = palpate.identify(recorded(X, np.random.default_rng(3).normal(size=N)))
+    assert model.n_wavelets == 0
+    assert model.verdict.level == "no"
+
+
+def test_a_force_far_beyond_the_recorded_ones_between_the_rows_is_no_good_model() -> None:
+    """A motion that turns where the play begins: the rows hold no pressed force there."""
+    time = 1e-3 * np.arange(8000)
+    x = 2.0 * np.pi * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
+    force = (
+        np.sin(3.0 * x) + 0.2 * np.sign(np.gradient(x)) + 0.01 * np.random.default_rng(2).normal(size=8000)
+    )
+    model = palpate.identify(palpate.Recording.from_arrays(x, force, time), period=2.0 * np.pi)
+    q = np.linspace(0.0, 0.02, 200)
+    largest = max(np.abs(model.force(q, direction=np.full(200, side))).max() for side in (1.0, -1.0))
+    told = any("between the rows the model's force reaches" in reason for reason in model.verdict.reasons)
+    assert told == (largest > 1.25 * float(np.ptp(force)))
+    assert model.verdict.level == "no" or largest < 2.0 * float(np.ptp(force))
+
+
+def test_a_force_within_the_recorded_ones_gives_no_finding() -> None:
+    rows = sweep(400)
+    model = palpate.identify(recorded(rows, wall(rows) + noise(400)))
+    assert not any("between the rows" in reason for reason in model.verdict.reasons)
