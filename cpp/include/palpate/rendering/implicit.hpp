@@ -28,9 +28,13 @@ namespace palpate {
 template <Environment E, class Solver = LoadLineSolver>
 class Implicit {
   public:
-    /// `solver` is for the load line behind the coupling, `alone` for that of the object alone.
     Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver = {},
-             double force_limit = std::numeric_limits<double>::infinity(), Solver alone = {})
+             double force_limit = std::numeric_limits<double>::infinity())
+        : Implicit{std::move(environment), inertia, coupling, period, solver, force_limit, solver} {}
+
+    /// `solver` is for the load line behind the coupling, `alone` for that of the object alone.
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver,
+             double force_limit, Solver alone)
         : environment_{std::move(environment)},
           coupling_{coupling},
           period_{period},
@@ -71,8 +75,8 @@ class Implicit {
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
-        const double force = coupling_.force(device - solution.position,
-                                             velocity - (solution.position - position_) / period_);
+        const double force =
+            coupling_.force(device - solution.position, velocity - (solution.position - position_) / period_);
         if (std::abs(force) > force_limit_) {
             Rendered rendered =
                 drive_from(solution.position, std::copysign(force_limit_, force), solution.evaluations);
