@@ -54,7 +54,7 @@ template <class Need>
 /// for a sample and n + tau samples late, whatever object stands behind it whose force falls with a slope of at most
 /// s. With beta = B_c / T, H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)),
 ///
-///     s / 2 + max over theta of |H_n - s|^2 / (2 (K_c + 2 beta - s)),   s < K_c + beta.
+///     s / 2 + max over theta of |H_n - s|^2 / (2 (K_c + 2 beta - s)),   s <= K_c + beta.
 ///
 /// Without delay that is K_c / 2 + beta for each s. Infinite where nothing is proved.
 [[nodiscard]] inline double coupling_need(VirtualCoupling coupling, double period_s, int whole,
@@ -65,7 +65,7 @@ template <class Need>
     if (!(held > 0.0)) {
         return 0.0;
     }
-    if (!(falling < stiffness + damping)) {
+    if (!(falling <= stiffness + damping)) {
         return std::numeric_limits<double>::infinity();
     }
     return std::max(held, detail::need_up_to(whole, fraction, [&](int n, double phi) {
