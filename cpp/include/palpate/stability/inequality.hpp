@@ -44,8 +44,8 @@ struct Inequality {
     }
 };
 
-/// "viscous damping: b >= T M / 2 + n_d T L needs 0.075, there is 0.06, short by 0.015". A line beyond which nothing is
-/// known has its cure as source.
+/// "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a known bound has its
+/// cure as source.
 [[nodiscard]] inline std::string shortfall(const Inequality& line) {
     if (line.rests_on == Basis::None) {
         return line.name + ": " + line.formula + (line.left != 0.0 ? " = " + readable(line.left) : "") +
