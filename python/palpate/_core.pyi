@@ -683,10 +683,6 @@ def certify_bounds(bounds: ForceBounds, scheme: Scheme, device: DeviceProfile) -
     """
     The same for any force within bounds.
     """
-def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
-    """
-    Device damping over the longest period that a coupling of K_c and B_c needs for any passive object.
-    """
 def device_difference(certified: DeviceProfile, device: DeviceProfile) -> str:
     """
     The first field in which a device is not the certified one, as a sentence; empty where it is.

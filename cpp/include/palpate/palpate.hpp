@@ -72,6 +72,7 @@
 #include "palpate/session_text.hpp"
 #include "palpate/session_verdict.hpp"
 #include "palpate/simulation.hpp"
+#include "palpate/solver/certified_solver.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/one_newton_step.hpp"

@@ -49,23 +49,12 @@ def renderable_slopes(
     )
 
 
-def coupling_for(device: DeviceProfile, damping: float) -> float:
-    """Stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
+def coupling_for(device: DeviceProfile, damping: float, *, mass: bool, falling: float = 0.0) -> float:
+    """Returns the stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
 
-    0 where the damping alone is too much.
+    `falling` is the steepest fall of an object's force. 0 if the damping alone is too much.
     """
-    available = SPARE * device.viscous_damping / device.longest_period_s
-
-    def fits(stiffness: float) -> bool:
-        return _core.coupling_need(stiffness, damping, device.period_s, device.late_samples) <= available
-
-    low, high = 0.0, 2.0 * available
-    if high <= 0.0 or not fits(1e-9 * high):
-        return 0.0
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low
+    return _core.stiffest_coupling(mass=mass, damping=damping, falling=falling, device=device, share=SPARE)
 
 
 def play_radius_for(model: Model, device: DeviceProfile) -> float:
@@ -104,7 +93,7 @@ def explicit_scheme(
     Where none of those tried is stable, the last of them.
     """
     T = device.period_s
-    stiffest = coupling_for(device, 0.0)
+    stiffest = coupling_for(device, 0.0, mass=False)
     scheme = Scheme(structure="explicit")
     for share in _STABLE_SHARES if coupling_stiffness is None else (1.0,):
         K_c = coupling_stiffness if coupling_stiffness is not None else max(share * stiffest, 1e-9)

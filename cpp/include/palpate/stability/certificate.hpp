@@ -121,7 +121,7 @@ namespace detail {
     std::vector<Inequality> lines = detail::inequalities_behind_a_coupling(bounds, scheme, device);
     if (bounds.drag > 0.0) {
         lines.push_back({"velocity-coupling", "force of velocity behind a coupling", "B_v = 0", 0.0,
-                         bounds.drag, Basis::None, "docs/certificate.md"});
+                         bounds.drag, Basis::None, "use direct rendering"});
     }
     return lines;
 }
