@@ -196,12 +196,11 @@ void bind_stability(py::module_& module) {
         },
         "bounds"_a, "scheme"_a, "device"_a, "The same for any force within bounds.");
     module.def(
-        "stiffest_coupling", &stiffest_coupling, py::kw_only(), "mass"_a, "damping"_a, "falling"_a,
-        "device"_a, "share"_a = 1.0,
+        "stiffest_coupling", &stiffest_coupling, py::kw_only(), "damping"_a, "falling"_a, "device"_a,
+        "share"_a = 1.0,
         "Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is "
         "none.\n"
-        "`damping` is B_c; `falling` the steepest fall of the object's force. With mass the force limit "
-        "counts.");
+        "`damping` is B_c; `falling` the steepest fall of the object's force.");
     module.def(
         "felt_slope", &felt_slope, "slope"_a, "coupling_stiffness"_a,
         "K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.");

@@ -49,12 +49,12 @@ def renderable_slopes(
     )
 
 
-def coupling_for(device: DeviceProfile, damping: float, *, mass: bool, falling: float = 0.0) -> float:
+def coupling_for(device: DeviceProfile, damping: float, falling: float = 0.0) -> float:
     """Returns the stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
 
     `falling` is the steepest fall of an object's force. 0 if the damping alone is too much.
     """
-    return _core.stiffest_coupling(mass=mass, damping=damping, falling=falling, device=device, share=SPARE)
+    return _core.stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
 
 
 def play_radius_for(model: Model, device: DeviceProfile) -> float:
@@ -93,7 +93,7 @@ def explicit_scheme(
     Where none of those tried is stable, the last of them.
     """
     T = device.period_s
-    stiffest = coupling_for(device, 0.0, mass=False)
+    stiffest = coupling_for(device, 0.0)
     scheme = Scheme(structure="explicit")
     for share in _STABLE_SHARES if coupling_stiffness is None else (1.0,):
         K_c = coupling_stiffness if coupling_stiffness is not None else max(share * stiffest, 1e-9)

@@ -118,7 +118,7 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     if stiffness is None:
         static = damping == 0.0 and not model.hysteretic
         falling = 0.0 if static else max(0.0, -_core.force_bounds(model, radius).slope_min)
-        stiffness = coupling_for(device, damping, mass=False, falling=falling)
+        stiffness = coupling_for(device, damping, falling)
         if static:
             stiffness = min(stiffness, SPARE * high)
     if stiffness <= 0.0:
@@ -266,7 +266,7 @@ def _with_mass(structure: str, model: Model, device: DeviceProfile, wishes: Wish
         damping = _COUPLING_DAMPING * device.viscous_damping
     stiffness = wishes.coupling_stiffness
     if stiffness is None:
-        stiffness = coupling_for(device, damping, mass=True)
+        stiffness = coupling_for(device, damping)
     if stiffness <= 0.0:
         return f"the device's damping {device.viscous_damping:.4g} holds no coupling"
     scheme = Scheme(

@@ -30,7 +30,8 @@ namespace detail {
     return {id, name, formula, known, value, Basis::None, cure};
 }
 
-/// Damping for a coupling without a force limit, and an object behind it whose force falls with `falling` at most.
+/// Damping for a coupling and an object behind it whose force falls with a slope of at most `falling`; for 0 with or
+/// without a force limit.
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
                                                     const DeviceProfile& device) {
     return {"damping-coupling",
@@ -43,22 +44,6 @@ namespace detail {
                                                       device.delay_fraction(), falling),
             Basis::Proved,
             "Colgate, Stanley and Brown 1995; docs/certificate.md"};
-}
-
-/// Damping for a coupling with the force limit inside the solution, and a passive object with mass behind it.
-[[nodiscard]] inline Inequality limited_coupling_inequality(VirtualCoupling coupling,
-                                                            const DeviceProfile& device) {
-    return {"damping-coupling",
-            late(device) ? "viscous damping against the held, late, limited coupling"
-                         : "viscous damping against the held, limited coupling",
-            late(device) ? "b >= T max sin^2((n + 1) theta / 2) (K_c / (2 sin^2(theta / 2)) + B_c / T)"
-                         : "b >= K_c T / 2 + B_c",
-            device.viscous_damping,
-            device.longest_period_s() * limited_coupling_need(coupling, device.period_s,
-                                                              device.whole_delay_samples(),
-                                                              device.delay_fraction()),
-            Basis::Proved,
-            "docs/certificate.md"};
 }
 
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
@@ -103,19 +88,16 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 }  // namespace detail
 
 /// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
-/// object whose force falls with a slope of at most `falling`; 0 if there is none. With mass the force limit counts.
-[[nodiscard]] inline double stiffest_coupling(bool mass, double damping, double falling,
-                                              const DeviceProfile& device, double share) {
+/// object whose force falls with a slope of at most `falling`; 0 if there is none.
+[[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
+                                              double share) {
     constexpr double finer = 0.97;
     constexpr double softest = 1e-9;
     constexpr int halvings = 40;
     DeviceProfile spared = device;
     spared.viscous_damping *= share;
     const auto fits = [&](double stiffness) {
-        return (mass && detail::limit_acts(device)
-                    ? detail::limited_coupling_inequality({stiffness, damping}, spared)
-                    : detail::coupling_inequality({stiffness, damping}, falling, spared))
-            .holds();
+        return detail::coupling_inequality({stiffness, damping}, falling, spared).holds();
     };
     const double most = 2.0 * spared.viscous_damping / device.longest_period_s();
     double low = most;
@@ -184,7 +166,7 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
     if (detail::limit_acts(device)) {
-        lines.push_back(detail::limited_coupling_inequality(coupling, device));
+        lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
         lines.push_back(detail::unknown(
             "falling-slope-limit", "falling force of an object with mass, with a force limit",
             "known for s_ <= 2 B_o / T", damped, bounds.falling(), "use the energy-consistent structure"));
@@ -219,8 +201,7 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     const double coupled = coupling.stiffness + coupling.damping / T;
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
-    lines.push_back(limited ? detail::limited_coupling_inequality(coupling, device)
-                            : detail::coupling_inequality(coupling, 0.0, device));
+    lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
     lines.push_back({"solution-exists", "a solution of every step",
                      limited ? "2 m / T^2 + B_o / T > s_ / 2" : "p > s_ / 2",
                      limited ? alone : alone + coupled, 0.5 * bounds.falling(), Basis::Proved,
