@@ -41,7 +41,7 @@ constexpr std::array<StructureKind, 3> coupled{StructureKind::Massless, Structur
                                                StructureKind::EnergyConsistent};
 
 TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
-    // b >= T M / 2 + n_d T L: 62 N*m/rad at 1 ms needs 0.031, and 0.062 more for a sample of delay.
+    // 62 N*m/rad at 1 ms needs 0.031, and 0.062 more for a sample of delay; slopes of -15 cost nothing.
     EXPECT_TRUE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.031)).certified());
     EXPECT_FALSE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0309)).certified());
     EXPECT_TRUE(
@@ -52,7 +52,10 @@ TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
 
 TEST(Certificate, AFallingForceNeedsDampingOnlyWithDelay) {
     EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0)).certified());
-    EXPECT_FALSE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.05, 1)).certified());
+    // A sample late, half a period of the slope.
+    EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0311, 1)).certified());
+    EXPECT_FALSE(
+        certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0309, 1)).certified());
 }
 
 TEST(Certificate, FrictionSwallowsHalfAStepOfEncoderAndForce) {
@@ -80,9 +83,9 @@ TEST(Certificate, MasslessWithoutDampingIsAStaticForceOfTheFeltSlope) {
     const Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
     EXPECT_TRUE(certify(slopes(0.0, 300.0), scheme, smooth(0.0376)).certified());
     EXPECT_FALSE(certify(slopes(0.0, 300.0), scheme, smooth(0.0374)).certified());
-    // Falling parts become steeper: -50 is felt as -100, which counts with delay.
-    EXPECT_TRUE(certify(slopes(-50.0, 0.0), scheme, smooth(0.1001, 1)).certified());
-    EXPECT_FALSE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0999, 1)).certified());
+    // Falling parts become steeper: -50 is felt as -100, which needs half a period of it with a sample of delay.
+    EXPECT_TRUE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0501, 1)).certified());
+    EXPECT_FALSE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0499, 1)).certified());
     EXPECT_FALSE(certify(slopes(-100.0, 0.0), scheme, smooth(10.0)).certified());
 }
 

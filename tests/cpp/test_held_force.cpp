@@ -115,12 +115,38 @@ TEST(HeldForce, NeedIsContinuousAndRisesWithTheDelay) {
 
 TEST(HeldForce, NeverBelowTheTrueMaximumOverFrequency) {
     const std::vector<double> taps{0.9, -0.3, 0.4, 0.1};
-    const detail::FilterGain few{taps, 8};
-    const detail::FilterGain many{taps, 4096};
+    const detail::FilterGain few{taps, detail::Maximum::Proved, 8};
+    const detail::FilterGain many{taps, detail::Maximum::Proved, 4096};
+    const detail::FilterGain likely{taps, detail::Maximum::Likely, 64};
     for (const double l : {-1.0, -0.2, 0.0, 0.5, 2.0}) {
         for (const double gamma : {0.1, 1.0, 3.0}) {
             EXPECT_GE(few.most(l, gamma), many.most(l, gamma) - 1e-6);
+            EXPECT_NEAR(likely.most(l, gamma), many.most(l, gamma), 2e-6 * (1.0 + gamma + std::abs(l)));
             EXPECT_GE(many.most(l, gamma), l * 1.1 + gamma * 1.21);  // theta = 0
+        }
+    }
+}
+
+TEST(HeldForce, AFilterWithAFractionOfASampleIsContinuousInTheDelay) {
+    for (const int m : {1, 4}) {
+        for (const SlopeRange slopes : {SlopeRange{1.0, 0.0}, {1.0, 1.0}, {0.2, 1.0}}) {
+            const std::vector<double> taps = prediction(m);
+            std::vector<double> late = taps;  // 1 + (prediction - 1) a sample later
+            late.insert(late.begin(), 1.0);
+            EXPECT_NEAR(filtered_need(taps, 1e-9, slopes), filtered_need(taps, slopes), 1e-3);
+            EXPECT_NEAR(filtered_need(taps, 1.0 - 1e-9, slopes), filtered_need(late, slopes), 1e-3);
+        }
+    }
+}
+
+TEST(HeldForce, WithoutAFilterBothLinesOfAFractionAreClose) {
+    for (const double tau : {0.25, 0.5, 0.75}) {
+        for (int n = 0; n <= 2; ++n) {
+            const std::vector<double> taps(static_cast<std::size_t>(n), 1.0);
+            const double delayed = delayed_need(n, tau, {1.0, 1.0});
+            const double filtered = filtered_need(taps, tau, {1.0, 1.0});
+            EXPECT_GE(filtered, delayed * (1.0 - 1e-5));
+            EXPECT_LE(filtered, 1.04 * delayed);
         }
     }
 }

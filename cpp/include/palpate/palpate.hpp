@@ -80,4 +80,5 @@
 #include "palpate/solver/resolvent.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
+#include "palpate/stability/renderable_slopes.hpp"
 #include "palpate/status.hpp"

@@ -44,7 +44,7 @@ struct Inequality {
     }
 };
 
-/// "viscous damping: b >= T M / 2 + n_d T L needs 0.075, there is 0.06, short by 0.015"
+/// "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015"
 [[nodiscard]] inline std::string shortfall(const Inequality& line) {
     if (line.rests_on == Basis::None) {
         return line.name + ": " + line.formula + ", and it is " + readable(line.right);
