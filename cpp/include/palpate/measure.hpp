@@ -32,9 +32,12 @@ template <Device D, Structure S, class Watch>
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
-    Controller controller{device, std::move(moves),
-                          Guards{force_limit(guards), slew_limit(guards, period_s),
-                                 force_ramp(guards, period_s), reading_guard(guards, period_s)}};
+    Guards few;
+    few.reading = reading_guard(guards, period_s);
+    few.limit = force_limit(guards);
+    few.ramp = force_ramp(guards, period_s);
+    few.slew = slew_limit(guards, period_s);
+    Controller controller{device, std::move(moves), few};
     return run_session(controller, settings, outlets, asked, watch);
 }
 
