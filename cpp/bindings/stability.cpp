@@ -196,13 +196,11 @@ void bind_stability(py::module_& module) {
         },
         "bounds"_a, "scheme"_a, "device"_a, "The same for any force within bounds.");
     module.def(
-        "coupling_need",
-        [](double stiffness, double damping, double period_s, int delay_samples) {
-            return coupling_need({stiffness, damping}, period_s, delay_samples);
-        },
-        "stiffness"_a, "damping"_a, "period_s"_a, "delay_samples"_a = 0,
-        "Device damping over the longest period that a coupling of K_c and B_c needs for any passive "
-        "object.");
+        "stiffest_coupling", &stiffest_coupling, py::kw_only(), "damping"_a, "falling"_a, "device"_a,
+        "share"_a = 1.0,
+        "Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is "
+        "none.\n"
+        "`damping` is B_c; `falling` the steepest fall of the object's force.");
     module.def(
         "felt_slope", &felt_slope, "slope"_a, "coupling_stiffness"_a,
         "K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.");

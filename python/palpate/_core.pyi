@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'balancing_shift', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'narrowest_play', 'paper_sample_time_s', 'play', 'render', 'renderable_slopes', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'steepest_stick', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'balancing_shift', 'bench_for', 'certify', 'certify_bounds', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'narrowest_play', 'paper_sample_time_s', 'play', 'render', 'renderable_slopes', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'steepest_stick', 'stiffest_coupling', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -139,6 +139,10 @@ class ForceModel:
         """
         Force at X (n, d), (n,); a hysteresis model takes the direction as one more column. A row with a
         value that is not finite gives NaN.
+        """
+    def require_slopes_within(self, least: typing.SupportsFloat | typing.SupportsIndex, largest: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        ValueError if stored slope bounds are narrower than the slopes of this model.
         """
     @typing.overload
     def slope(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -683,10 +687,6 @@ def certify_bounds(bounds: ForceBounds, scheme: Scheme, device: DeviceProfile) -
     """
     The same for any force within bounds.
     """
-def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
-    """
-    Device damping over the longest period that a coupling of K_c and B_c needs for any passive object.
-    """
 def device_difference(certified: DeviceProfile, device: DeviceProfile) -> str:
     """
     The first field in which a device is not the certified one, as a sentence; empty where it is.
@@ -826,6 +826,11 @@ def solver_name(model: ForceModel, scheme: Scheme, period_s: typing.SupportsFloa
 def steepest_stick(device: DeviceProfile) -> float:
     """
     Slope h / r that leaves half of what the device holds to sliding.
+    """
+def stiffest_coupling(*, mass: bool, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
+    `damping` is B_c; `falling` the steepest fall of the object's force. With mass the force limit counts.
     """
 def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """

@@ -49,23 +49,12 @@ def renderable_slopes(
     )
 
 
-def coupling_for(device: DeviceProfile, damping: float) -> float:
-    """Stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
+def coupling_for(device: DeviceProfile, damping: float, falling: float = 0.0) -> float:
+    """Returns the stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
 
-    0 where the damping alone is too much.
+    `falling` is the steepest fall of an object's force. 0 if the damping alone is too much.
     """
-    available = SPARE * device.viscous_damping / device.longest_period_s
-
-    def fits(stiffness: float) -> bool:
-        return _core.coupling_need(stiffness, damping, device.period_s, device.late_samples) <= available
-
-    low, high = 0.0, 2.0 * available
-    if high <= 0.0 or not fits(1e-9 * high):
-        return 0.0
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low
+    return _core.stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
 
 
 def play_radius_for(model: Model, device: DeviceProfile) -> float:

@@ -113,10 +113,13 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         return "no coupling was asked for, and none makes a steeper slope possible"
     damping = wishes.coupling_damping or 0.0
     stiffness = wishes.coupling_stiffness
+    radius = wishes.play_radius or usual_play_radius(model, device)
     low, high = renderable_slopes(device)
     if stiffness is None:
-        stiffness = coupling_for(device, damping)
-        if damping == 0.0 and not model.hysteretic:
+        static = damping == 0.0 and not model.hysteretic
+        falling = 0.0 if static else max(0.0, -_core.force_bounds(model, radius).slope_min)
+        stiffness = coupling_for(device, damping, falling)
+        if static:
             stiffness = min(stiffness, SPARE * high)
     if stiffness <= 0.0:
         return _no_slope(device)
@@ -125,7 +128,7 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         coupling_stiffness=stiffness,
         coupling_damping=damping,
         compensated=not model.hysteretic,
-        play_radius=wishes.play_radius or usual_play_radius(model, device),
+        play_radius=radius,
     )
     if model.hysteretic:
         return Plan(model, scheme).certified_for(device)
