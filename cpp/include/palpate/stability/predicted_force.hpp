@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "palpate/device/device_profile.hpp"
+#include "palpate/rendering/predicted.hpp"
+#include "palpate/stability/held_force.hpp"
+
+namespace palpate {
+
+/// Q of a force that is held n samples late at a position predicted from m samples, as taps of z^-1, z^-2, ...:
+///
+///     Q = z^-1 + ... + z^-n - z^-n sum of w_j z^-j.
+[[nodiscard]] inline std::vector<double> prediction_taps(int whole, int predict) {
+    std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
+    for (int j = 1; j <= predict; ++j) {
+        taps.push_back(-prediction_weight(predict, j));
+    }
+    return taps;
+}
+
+/// b / T that a force held at a predicted position needs, static or with a play that follows the measured position.
+/// The advance changes the force by at most L |sum of w_j d_{k-j}|, which costs L / 2 and no more.
+[[nodiscard]] inline double predicted_path_need(const DeviceProfile& device, SlopeRange slopes) {
+    return device_need(device, slopes) + 0.5 * slopes.steepest();
+}
+
+/// Largest error of a predicted position over that of the encoder, (m + 3) / (m + 1): the last sample counts
+/// (m + 2) / (m + 1) times, the m before it 1 / (m + 1) together.
+[[nodiscard]] constexpr double predicted_encoder_gain(int predict) noexcept {
+    return predict > 0 ? (predict + 3.0) / (predict + 1.0) : 1.0;
+}
+
+/// b / T that a static force held at a predicted position needs: R(1/2) or less without delay; with delay often less
+/// than without prediction.
+///
+/// With jitter the instant at which a command begins to act moves by up to the jitter within its sample. Where it can
+/// leave the sample, the delay counts as the nearest whole samples and the rest as unknown motion.
+[[nodiscard]] inline double predicted_need(const DeviceProfile& device, int predict, SlopeRange slopes) {
+    const double simple = predicted_path_need(device, slopes);
+    if (!(slopes.steepest() > 0.0) || !std::isfinite(simple)) {
+        return simple;
+    }
+    const double P = device.period_s;
+    const double T = device.longest_period_s();
+    const double fraction = device.delay_fraction();
+    const double moves = device.late_samples() > 0 ? device.jitter_s : 0.0;
+    const int whole = device.whole_delay_samples();
+    if (fraction == 0.0 && moves == 0.0) {
+        return std::min(simple, filtered_need(prediction_taps(whole, predict), slopes));
+    }
+    if (whole == 0 ? device.delay_s <= P - moves : moves <= std::min(fraction, 1.0 - fraction) * P) {
+        const double uncertain = whole == 0 ? 0.0 : moves;
+        const std::vector<double> taps = prediction_taps(whole, predict);
+        const double split =
+            filtered_need(taps, (fraction * P + uncertain) / T, slopes, ((1.0 - fraction) * P + moves) / T);
+        return std::min(simple, std::max(filtered_need(taps, slopes), split));  // a delay may be shorter
+    }
+    if (moves >= P) {
+        return simple;
+    }
+    const int nearest = static_cast<int>(std::lround(device.delay_s / P));
+    const double nu = detail::uncertain_time(device.delay_s, P, moves, nearest);
+    return std::min(simple, detail::roughly_filtered_need(prediction_taps(nearest, predict),
+                                                          predicted_encoder_gain(predict), nu, slopes));
+}
+
+}  // namespace palpate
