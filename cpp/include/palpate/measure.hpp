@@ -32,12 +32,11 @@ template <Device D, Structure S, class Watch>
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
-    Guards few;
-    few.reading = reading_guard(guards, period_s);
-    few.limit = force_limit(guards);
-    few.ramp = force_ramp(guards, period_s);
-    few.slew = slew_limit(guards, period_s);
-    Controller controller{device, std::move(moves), few};
+    Controller controller{device, std::move(moves),
+                          Guards{.reading = reading_guard(guards, period_s),
+                                 .limit = force_limit(guards),
+                                 .ramp = force_ramp(guards, period_s),
+                                 .slew = slew_limit(guards, period_s)}};
     return run_session(controller, settings, outlets, asked, watch);
 }
 
