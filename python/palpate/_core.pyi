@@ -862,7 +862,7 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
     (n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.
     """
 __version__: str = '0.1.0'
-failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'limit', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
+failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
 most_prediction_taps: int = 16
 most_simulated_ticks: int = 3600000
 paper_sample_time_s: float = 0.001
