@@ -22,7 +22,7 @@ struct NamedFailureMap {
 };
 
 /// Every map that can be measured.
-inline constexpr std::array<NamedFailureMap, 13> failure_maps{{{"explicit", explicit_map},
+inline constexpr std::array<NamedFailureMap, 14> failure_maps{{{"explicit", explicit_map},
                                                                {"damping", damping_map},
                                                                {"prediction", prediction_map},
                                                                {"period", period_map},
