@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "../support.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/network_curve.hpp"
 #include "palpate/stability/force_bounds.hpp"
-#include "support.hpp"
 
 namespace palpate::energy_search {
 

@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "../support.hpp"
 #include "force_laws.hpp"
 #include "held_scenes.hpp"
 #include "line.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate.hpp"
-#include "support.hpp"
 
 namespace palpate::energy_search {
 

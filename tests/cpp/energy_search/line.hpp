@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "../support.hpp"
 #include "palpate/stability/certificate.hpp"
-#include "support.hpp"
 
 namespace palpate::energy_search {
 

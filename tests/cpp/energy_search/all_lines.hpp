@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "../support.hpp"
+#include "coupled_lines.hpp"
+#include "guard_lines.hpp"
+#include "held_lines.hpp"
+#include "line.hpp"
+
+namespace palpate::energy_search {
+
+/// Every line of the certificate that asks for damping or friction, with the scenes that try it.
+[[nodiscard]] inline std::vector<Line> all_lines() {
+    std::vector<Line> lines;
+    for (int n = 0; n < 3; ++n) {
+        const auto damping = [&](const char* name, bool tight, auto draw) {
+            lines.push_back(
+                {name, n, Part::Damping, tight, [draw, n](test::Random& random) { return draw(random, n); }});
+        };
+        const auto friction = [&](const char* name, bool tight, auto draw) {
+            lines.push_back({name, n, Part::Friction, tight,
+                             [draw, n](test::Random& random) { return draw(random, n); }});
+        };
+        using R = test::Random;
+        const auto behind = [](StructureKind kind, bool firm) {
+            return [kind, firm](R& random, int delay) { return draw_coupled(random, kind, delay, firm); };
+        };
+        damping("direct", n <= 1, draw_direct);
+        damping("hysteresis", n <= 1, draw_hysteresis);
+        damping("velocity", false, draw_velocity);
+        damping("wheel", false, [](R& random, int delay) { return draw_wheel(random, delay, false); });
+        damping("wheel of wavelets", false,
+                [](R& random, int delay) { return draw_network_wheel(random, delay, false); });
+        damping("softening", false, draw_softening);
+        damping("ramp", false, draw_ramp);
+        damping("massless, no damper", false, draw_spring_behind_coupling);
+        damping("massless", false, behind(StructureKind::Massless, false));
+        damping("implicit", false, behind(StructureKind::Implicit, false));
+        damping("energy-consistent", false, behind(StructureKind::EnergyConsistent, false));
+        damping("massless, firm object", n == 0, behind(StructureKind::Massless, true));
+        damping("implicit, firm object", n == 0, behind(StructureKind::Implicit, true));
+        damping("energy-consistent, firm object", n == 0, behind(StructureKind::EnergyConsistent, true));
+        friction("wheel, mean", false, [](R& random, int delay) { return draw_wheel(random, delay, true); });
+        friction("wheel of wavelets, mean", false,
+                 [](R& random, int delay) { return draw_network_wheel(random, delay, true); });
+        friction("encoder", false, [](R& random, int delay) { return draw_encoder(random, delay, false); });
+        friction("encoder, hysteresis", false,
+                 [](R& random, int delay) { return draw_encoder(random, delay, true); });
+        friction("force step", false, draw_force_step);
+    }
+    return lines;
+}
+
+/// Scene number `index` of a line. The same number gives the same scene.
+[[nodiscard]] inline Trial scene_of(const Line& line, std::size_t index) {
+    test::Random random{1000003 * (index + 1) + static_cast<std::size_t>(line.delay)};
+    for (;;) {
+        if (std::optional<Trial> trial = line.draw(random)) {
+            return *trial;
+        }
+    }
+}
+
+}  // namespace palpate::energy_search

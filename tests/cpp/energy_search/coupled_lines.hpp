@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "held_lines.hpp"
+#include "motions.hpp"
+
+namespace palpate::energy_search {
+
+/// The least of V = integral of `force` over [low, high], and where it is.
+struct Least {
+    double place = 0.0;
+    double energy = 0.0;
+};
+
+template <class Force>
+[[nodiscard]] Least least_energy(double low, double high, const Force& force) {
+    constexpr int parts = 40000;
+    const double step = (high - low) / parts;
+    Least least{low, 0.0};
+    double sum = 0.0;
+    double before = force(low);
+    for (int k = 1; k <= parts; ++k) {
+        const double after = force(low + step * k);
+        sum += 0.5 * (before + after) * step;
+        before = after;
+        if (sum < least.energy) {
+            least = {low + step * k, sum};
+        }
+    }
+    return least;
+}
+
+/// An object behind a coupling, its scheme and its device.
+struct CoupledScene {
+    Scheme scheme;
+    DeviceProfile device;
+    Places places;
+};
+
+/// A coupling and an inertia about the size of the object's slopes. A `firm` object hardly moves: it is much stiffer
+/// than the coupling, or heavy.
+[[nodiscard]] inline Scheme random_coupling(test::Random& random, StructureKind structure, double slope,
+                                            double period, bool firm) {
+    Scheme scheme;
+    scheme.structure = structure;
+    scheme.coupling.stiffness =
+        slope * std::exp(firm && !has_mass(structure) ? test::uniform(random, -8.0, -4.0)
+                                                      : test::uniform(random, -2.5, 1.5));
+    scheme.coupling.damping =
+        random() % 2 == 0 ? 0.0
+                          : scheme.coupling.stiffness * period * std::exp(test::uniform(random, -3.0, 1.0));
+    scheme.inertia.mass =
+        scheme.coupling.stiffness * period * period *
+        std::exp(firm ? test::uniform(random, 9.0, 14.0) : test::uniform(random, -3.0, 7.0));
+    scheme.inertia.damping =
+        random() % 2 == 0 ? 0.0
+                          : scheme.coupling.stiffness * period * std::exp(test::uniform(random, -3.0, 1.0));
+    return scheme;
+}
+
+/// A trial that optimises the motion once and compares the damping below which energy is taken out.
+template <class Structure>
+[[nodiscard]] Trial motion_trial(test::Random& random, Structure structure, const CoupledScene& scene,
+                                 const Need& need, int starts, int steps) {
+    const double period = scene.device.longest_period_s();
+    auto shared = std::make_shared<Structure>(std::move(structure));
+    const auto seed = random();
+    const auto worst = [shared, scene, starts, steps, seed](const auto& rate) {
+        test::Random own{seed};
+        MotionSearch<Structure> search{*shared, scene.places, scene.device.force_limit};
+        return search.most(own, starts, steps, rate);
+    };
+    struct Known {
+        double friction = -1.0;
+        double damping = 0.0;
+    };
+    auto known = std::make_shared<Known>();
+    return {[=](double damping_factor, double friction_factor) {
+                const double friction = friction_factor * need.friction;
+                if (known->friction != friction) {
+                    const double held = scene.places.held;
+                    known->friction = friction;
+                    known->damping =
+                        period * worst([&](const Account& account) {
+                            return account.square > 0.0
+                                       ? (-account.work - held - friction * account.length) / account.square
+                                       : 0.0;
+                        });
+                }
+                return known->damping > damping_factor * need.damping;
+            },
+            need};
+}
+
+/// An object of straight pieces that holds finite energy.
+[[nodiscard]] inline Pieces closed_pieces(test::Random& random, int count, double step, Slopes slopes) {
+    std::vector<double> forces = random_forces(random, count, step, slopes);
+    const double steepest = std::max(slopes.M, slopes.s);
+    while (forces.back() <= 0.0) {
+        forces.push_back(forces.back() + steepest * step);
+    }
+    int before = 0;
+    while (forces.front() >= 0.0) {
+        forces.insert(forces.begin(), forces.front() - steepest * step);
+        ++before;
+    }
+    return {-step * before, step, forces};
+}
+
+[[nodiscard]] inline std::optional<Trial> draw_coupled(test::Random& random, StructureKind kind, int delay,
+                                                       bool firm) {
+    const bool network = random() % 3 == 0;
+    const bool hysteresis = random() % 3 == 0;
+    CoupledScene scene;
+    scene.device = random_device(random, delay);
+    scene.places.delay = delay;
+    const auto certified = [&](const auto& object) {
+        return certified_need(scene.device, [&](const DeviceProfile& generous) {
+            return certify(object, scene.scheme, generous);
+        });
+    };
+    const auto placed = [&](double low, double high, double step, double slope, const auto& force) {
+        const Least least = least_energy(low - 5.0 * (high - low), high + 5.0 * (high - low), force);
+        scene.places.start = least.place;
+        scene.places.low = low;
+        scene.places.high = high;
+        scene.places.finest = 1e-2 * step;
+        scene.places.widest = 3.0 * (high - low) * std::max(1.0, slope / scene.scheme.coupling.stiffness);
+    };
+    constexpr int starts = 6;
+    constexpr int steps = 60;
+    if (network) {
+        const ForceModel model = hysteresis ? small_hysteresis(random, test::uniform(random, 0.005, 0.05))
+                                            : ForceModel{small_network(random), test::unit_domain()};
+        const double slope = std::max(1.0, model.slope_bounds().largest());
+        limit_by(random, scene.device, slope * test::uniform(random, 0.05, 0.5));
+        scene.scheme = random_coupling(random, kind, slope, scene.device.period_s, firm);
+        const auto need = certified(model);
+        if (!need || need->damping <= 0.0) {
+            return std::nullopt;
+        }
+        const NetworkCurve& curve = hysteresis ? model.hysteresis()->force() : model.network()->curve();
+        placed(0.0, 1.0, model.finest_width(), slope, [&](double x) { return curve.at(x).value; });
+        return with_structure(
+            model, scene.scheme, scene.device.period_s, [&](auto structure) -> std::optional<Trial> {
+                return motion_trial(random, std::move(structure), scene, *need, starts, steps);
+            });
+    }
+    const int count = 12;
+    const double step = std::exp(test::uniform(random, -6.0, -2.0));
+    const Slopes slopes = random_slopes(random);
+    const Pieces g = closed_pieces(random, count, step, slopes);
+    scene.scheme = random_coupling(random, kind, std::max(slopes.M, slopes.s), scene.device.period_s, firm);
+    limit_by(random, scene.device, largest_of(g.points()));
+    const double period = scene.device.period_s;
+    placed(0.0, step * count, step, std::max(slopes.M, slopes.s), [&](double x) { return g.at(x).value; });
+    const auto build = [&](const auto& object, const ForceBounds& bounds) -> std::optional<Trial> {
+        const auto need = certified(bounds);
+        if (!need || need->damping <= 0.0) {
+            return std::nullopt;
+        }
+        const auto run = [&](auto structure) -> std::optional<Trial> {
+            return motion_trial(random, std::move(structure), scene, *need, starts, steps);
+        };
+        switch (kind) {
+            case StructureKind::Massless:
+                return run(Massless{object, scene.scheme.coupling, period});
+            case StructureKind::Implicit:
+                return run(Implicit{object, scene.scheme.inertia, scene.scheme.coupling, period});
+            default:
+                return run(EnergyConsistent{object, scene.scheme.inertia, scene.scheme.coupling, period,
+                                            1e-3 * step});
+        }
+    };
+    if (hysteresis) {
+        std::vector<double> h(g.points().size(), 0.2 * largest_of(g.points()));
+        const HysteresisPair<Pieces> pair{g, Pieces{0.0, step, h}, step * test::uniform(random, 0.3, 3.0)};
+        return build(pair, bounds_of(pair));
+    }
+    return build(PieceObject{g}, bounds_of(g));
+}
+
+}  // namespace palpate::energy_search
