@@ -68,7 +68,7 @@ void tick(benchmark::State& state, const palpate::ForceModel& model, palpate::St
     scheme.structure = kind;
     scheme.compensated = compensated;
     scheme.play_radius = model.hysteresis() != nullptr ? 0.005 : 0.0;
-    palpate::with_structure(model, scheme, 1e-3, [&](auto structure) {
+    palpate::with_structure(model, scheme, 1e-3, 5.0, [&](auto structure) {
         Playback device{palpate::bench::hand_motion(4000)};
         palpate::GuardSettings settings;
         settings.force_limit = 50.0;

@@ -25,13 +25,13 @@ SWING = 4.0
 ANGLE = (
     DeviceProfile(id="knob", coulomb_friction=0.005),
     DeviceProfile(id="weak knob", viscous_damping=0.005, coulomb_friction=0.002),
-    DeviceProfile(id="late knob", coulomb_friction=0.01, delay_samples=1),
+    DeviceProfile(id="late knob", coulomb_friction=0.01, delay_s=1e-3),
 )
 LENGTH = {"position_unit": "m", "inertia": 0.05, "encoder_step": 1e-6, "force_limit": 20.0}
 TRAVEL = (
     DeviceProfile(id="slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH),
     DeviceProfile(id="weak slide", viscous_damping=1.0, coulomb_friction=0.01, **LENGTH),
-    DeviceProfile(id="late slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH, delay_samples=1),
+    DeviceProfile(id="late slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH, delay_s=1e-3),
 )
 
 
@@ -138,7 +138,7 @@ def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile)
     force = strokes(model, x)[0]
     slope = np.where(np.abs(force) < 0.8 * device.force_limit, np.gradient(force, x), -np.inf)
     place, steepest = float(x[np.argmax(slope)]), float(slope.max())
-    late = (0.5 + device.delay_samples) * device.period_s
+    late = 0.5 * device.period_s + device.delay_s
     stiffness = 0.05 * steepest
     target = place + float(strokes(rendered, np.array([place]))[0, 0]) / stiffness
     hand = Hand(stiffness=stiffness, damping=0.0, lower=target, upper=target)
@@ -148,7 +148,7 @@ def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile)
             viscous_damping=device.viscous_damping,
             coulomb_friction=device.coulomb_friction,
             encoder_step=device.encoder_step,
-            delay_samples=device.delay_samples,
+            delay_s=device.delay_s,
             force_limit=device.force_limit,
             position_unit=device.position_unit,
         )

@@ -82,21 +82,20 @@ void bind_rendering(py::module_& module) {
         names.append(std::string(name));
     }
     module.attr("structure_names") = py::tuple(names);
+    module.attr("most_prediction_taps") = most_prediction_taps;
     module.attr("most_simulated_ticks") = most_simulated_ticks;
     py::class_<Scheme> type(module, "Scheme",
                             "How a model is rendered: the structure and its numbers, SI units.");
     type.def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
-                         double mass, double damping, bool compensated, double play_radius) {
-                 return Scheme{structure_named(name),
-                               {coupling_stiffness, coupling_damping},
-                               {mass, damping},
-                               compensated,
-                               play_radius};
+                         double mass, double damping, bool compensated, double play_radius, int predict) {
+                 return Scheme{structure_named(name), {coupling_stiffness, coupling_damping},
+                               {mass, damping},       compensated,
+                               play_radius,           predict};
              }),
              py::kw_only(), "structure"_a = structure, "coupling_stiffness"_a = scheme.coupling.stiffness,
              "coupling_damping"_a = scheme.coupling.damping, "mass"_a = scheme.inertia.mass,
              "damping"_a = scheme.inertia.damping, "compensated"_a = scheme.compensated,
-             "play_radius"_a = scheme.play_radius)
+             "play_radius"_a = scheme.play_radius, "predict"_a = scheme.predict)
         .def_property_readonly("structure",
                                [](const Scheme& s) {
                                    return std::string(structure_names[static_cast<std::size_t>(s.structure)]);
@@ -107,6 +106,8 @@ void bind_rendering(py::module_& module) {
         .def_property_readonly("damping", [](const Scheme& s) { return s.inertia.damping; })
         .def_readonly("compensated", &Scheme::compensated)
         .def_readonly("play_radius", &Scheme::play_radius)
+        .def_readonly("predict", &Scheme::predict,
+                      "m: samples used to predict the position half a sample ahead; 0 = none.")
         .def(
             "validate",
             [](const Scheme& s, const ForceModel& model, std::optional<double> period_s) {
@@ -123,7 +124,7 @@ void bind_rendering(py::module_& module) {
             "a\n"
             "hysteresis model sticks.");
     define_by_fields(type, {"structure", "coupling_stiffness", "coupling_damping", "mass", "damping",
-                            "compensated", "play_radius"});
+                            "compensated", "play_radius", "predict"});
 
     module.def(
         "explicit_slope_limit",

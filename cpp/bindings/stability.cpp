@@ -67,9 +67,10 @@ void bind_inequality(py::module_& module) {
     py::class_<Inequality> type(
         module, "Inequality",
         "One line of a certificate: left >= right, or left > right where it is strict.");
-    type.def(py::init([](std::string name, std::string formula, double left, double right,
+    type.def(py::init([](std::string id, double left, double right, std::string name, std::string formula,
                          const std::string& rests_on, std::string source, bool strict) {
-                 return Inequality{std::move(name),
+                 return Inequality{std::move(id),
+                                   std::move(name),
                                    std::move(formula),
                                    left,
                                    right,
@@ -77,8 +78,9 @@ void bind_inequality(py::module_& module) {
                                    std::move(source),
                                    strict};
              }),
-             py::kw_only(), "name"_a, "formula"_a, "left"_a, "right"_a, "rests_on"_a, "source"_a,
-             "strict"_a = false)
+             py::kw_only(), "id"_a, "left"_a, "right"_a, "name"_a = "", "formula"_a = "",
+             "rests_on"_a = name_of(Basis::Proved), "source"_a = "", "strict"_a = false)
+        .def_readonly("id", &Inequality::id, "Stable name; texts may change between releases.")
         .def_readonly("name", &Inequality::name)
         .def_readonly("formula", &Inequality::formula)
         .def_readonly("left", &Inequality::left, "What there is.")
@@ -90,7 +92,7 @@ void bind_inequality(py::module_& module) {
             "rests_on", [](const Inequality& line) { return std::string(name_of(line.rests_on)); },
             "proved, linear (the linearised system only) or none (no bound is known beyond).")
         .def_readonly("source", &Inequality::source);
-    define_by_fields(type, {"name", "formula", "left", "right", "rests_on", "source", "strict"}, false);
+    define_by_fields(type, {"id", "left", "right", "name", "formula", "rests_on", "source", "strict"}, false);
     type.def("__repr__", [](const Inequality& line) {
         return "<Inequality " + line.formula + ": " + readable(line.left) + " against " +
                readable(line.right) + (line.holds() ? ", holds>" : ", fails>");
@@ -106,7 +108,8 @@ void bind_stability(py::module_& module) {
                                  "What is proved of a model, rendered by a scheme, on a device.");
     type.def(py::init([](const Scheme& scheme, const DeviceProfile& device, std::string model,
                          const ForceBounds& bounds, std::vector<Inequality> inequalities,
-                         const std::string& verdict, std::string why, double longest_period_s) {
+                         const std::string& verdict, double longest_period_s, std::string fingerprint,
+                         std::string why) {
                  return Certificate{scheme,
                                     device,
                                     std::move(model),
@@ -114,11 +117,12 @@ void bind_stability(py::module_& module) {
                                     std::move(inequalities),
                                     named<Verdict>(verdict, verdict_names, "verdict"),
                                     std::move(why),
-                                    longest_period_s};
+                                    longest_period_s,
+                                    std::move(fingerprint)};
              }),
              py::kw_only(), "scheme"_a, "device"_a, "model"_a, "bounds"_a, "inequalities"_a, "verdict"_a,
-             "why"_a, "longest_period_s"_a,
-             "A certificate that stood in a file; nothing of it is to be believed before `check`.")
+             "longest_period_s"_a, "fingerprint"_a, "why"_a = "",
+             "A certificate as stored in a file. Use the result of `check`.")
         .def_readonly("scheme", &Certificate::scheme)
         .def_readonly("device", &Certificate::device)
         .def_readonly("model", &Certificate::model, "Fingerprint of the model.")
@@ -134,17 +138,15 @@ void bind_stability(py::module_& module) {
         .def_readonly(
             "longest_period_s", &Certificate::longest_period_s,
             "Time between two samples up to which every inequality holds [s]; 0 where one does not.")
-        .def(
-            "check",
-            [](const Certificate& certificate, const ForceModel& model) {
-                const std::string wrong = disagreement(certificate, model);
-                detail::require(wrong.empty(), wrong);
-            },
-            "model"_a,
-            "Computes everything again; ValueError names the first field that is not what the model gives.");
-    define_by_fields(
-        type, {"scheme", "device", "model", "bounds", "inequalities", "verdict", "why", "longest_period_s"},
-        false);
+        .def_readonly("fingerprint", &Certificate::fingerprint,
+                      "16 hexadecimal digits over every number and name of the certificate.")
+        .def("check", &checked, "model"_a,
+             "Computes the certificate again and returns the result. ValueError names the first field that "
+             "differs.");
+    define_by_fields(type,
+                     {"scheme", "device", "model", "bounds", "inequalities", "verdict", "longest_period_s",
+                      "fingerprint", "why"},
+                     false);
     type.def("__repr__", [](const Certificate& certificate) {
         return "<Certificate for " + certificate.device.id + ": " +
                std::string(name_of(certificate.verdict)) + "; " + certificate.why + ">";

@@ -15,8 +15,6 @@ namespace palpate::control {
 
 namespace {
 
-constexpr double delay_tolerance = 0.25;  ///< of a sample, for the device's own clock
-
 UsbOptions usb_options(const Options& options) {
     UsbOptions usb;
     if (const std::size_t colon = options.device.find(':'); colon != std::string::npos) {
@@ -91,7 +89,7 @@ int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
     if (!options.uncertified && file.certificate) {
         // A command that comes later than that is one that nobody certified.
         const DeviceProfile& certified = file.certificate->device;
-        usb.longest_delay_s = (certified.delay_samples + delay_tolerance) * certified.period_s;
+        usb.longest_delay_s = certified.delay_s;
     }
     UsbDevice device{std::move(usb)};
     if (const Opened opened = device.open(); !opened) {

@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_samples', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_simulated_ticks', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -265,7 +265,7 @@ class DeviceProfile:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
+    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -277,9 +277,14 @@ class DeviceProfile:
         [N or N*m]
         """
     @property
-    def delay_samples(self) -> int:
+    def delay_fraction(self) -> float:
         """
-        Whole samples from command to force.
+        tau: rest of the delay [samples].
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        Time from a sample to the force that is computed from it [s].
         """
     @property
     def encoder_step(self) -> float:
@@ -310,6 +315,11 @@ class DeviceProfile:
         How much longer than period_s the time between two samples can get [s].
         """
     @property
+    def late_samples(self) -> int:
+        """
+        Smallest number of whole samples that is not shorter than the delay.
+        """
+    @property
     def longest_period_s(self) -> float:
         """
         period_s + jitter_s: what a certificate has to hold for [s].
@@ -328,6 +338,11 @@ class DeviceProfile:
     def viscous_damping(self) -> float:
         """
         [N*s/m or N*m*s/rad]
+        """
+    @property
+    def whole_delay_samples(self) -> int:
+        """
+        n: number of whole samples in the delay.
         """
 class Hand:
     """
@@ -376,7 +391,7 @@ class Scheme:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, predict: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -410,6 +425,11 @@ class Scheme:
     @property
     def play_radius(self) -> float:
         ...
+    @property
+    def predict(self) -> int:
+        """
+        m: samples used to predict the position half a sample ahead; 0 = none.
+        """
     @property
     def structure(self) -> str:
         ...
@@ -485,7 +505,7 @@ class Inequality:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, name: str, formula: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, rests_on: str, source: str, strict: bool = False) -> None:
+    def __init__(self, *, id: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, name: str = '', formula: str = '', rests_on: str = 'proved', source: str = '', strict: bool = False) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -497,6 +517,11 @@ class Inequality:
     @property
     def holds(self) -> bool:
         ...
+    @property
+    def id(self) -> str:
+        """
+        Stable name; texts may change between releases.
+        """
     @property
     def left(self) -> float:
         """
@@ -534,17 +559,17 @@ class Certificate:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, scheme: Scheme, device: DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, why: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    def __init__(self, *, scheme: Scheme, device: DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex, fingerprint: str, why: str = '') -> None:
         """
-        A certificate that stood in a file; nothing of it is to be believed before `check`.
+        A certificate as stored in a file. Use the result of `check`.
         """
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
         ...
-    def check(self, model: ForceModel) -> None:
+    def check(self, model: ForceModel) -> Certificate:
         """
-        Computes everything again; ValueError names the first field that is not what the model gives.
+        Computes the certificate again and returns the result. ValueError names the first field that differs.
         """
     @property
     def bounds(self) -> ForceBounds:
@@ -557,6 +582,11 @@ class Certificate:
     @property
     def device(self) -> DeviceProfile:
         ...
+    @property
+    def fingerprint(self) -> str:
+        """
+        16 hexadecimal digits over every number and name of the certificate.
+        """
     @property
     def inequalities(self) -> list[Inequality]:
         ...
@@ -698,6 +728,10 @@ def guard_effects() -> list:
     By row: guard, cost (RMS change of the force over its RMS), wrong (what is wrong, and what of
     it is measured), without and with the guard.
     """
+def longest_delay_s(period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Longest delay of a profile [s]: 16 periods.
+    """
 def measure(device: str = 'simulated', *, object: ForceModel | None = None, transducer: bool = True, position_unit: str = 'rad', force_unit: str = 'N*m', probe: bool = False, lower: typing.SupportsFloat | typing.SupportsIndex | None = None, upper: typing.SupportsFloat | typing.SupportsIndex | None = None, speed: typing.SupportsFloat | typing.SupportsIndex | None = None, stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, force_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, push: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_hz: typing.SupportsFloat | typing.SupportsIndex = 1000.0, duration_s: typing.SupportsFloat | typing.SupportsIndex = 10.0, record: str = '', force: bool = False, keep: bool = False, priority: typing.SupportsInt | typing.SupportsIndex = 80, cpu: typing.SupportsInt | typing.SupportsIndex = -1, lowest_rate_share: typing.SupportsFloat | typing.SupportsIndex = 0.8, wait_s: typing.SupportsFloat | typing.SupportsIndex | None = None, progress: collections.abc.Callable | None = None, friction_share: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     A real object measured in real time; on the simulated device the model `object` is mounted.
@@ -802,7 +836,7 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
     """
 __version__: str = '0.1.0'
 failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
-longest_delay_samples: int = 16
+most_prediction_taps: int = 16
 most_simulated_ticks: int = 3600000
 paper_sample_time_s: float = 0.001
 status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}

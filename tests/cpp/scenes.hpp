@@ -132,7 +132,7 @@ inline Scene random_certified_scene(Random& random, double room) {
         DeviceProfile device;
         device.period_s = uniform(random, 3e-4, 2e-3);
         device.inertia = std::exp(uniform(random, -10.0, -5.0));
-        device.delay_samples = static_cast<int>(random() % 3);
+        device.delay_s = static_cast<double>(random() % 3) * device.period_s;
         device.force_limit = 1e9;
         const bool steps = random() % 2 == 0 && !has_mass(scheme.structure);
         device.encoder_step = steps ? std::exp(uniform(random, -11.0, -5.0)) : 0.0;
@@ -158,11 +158,13 @@ inline Scene random_certified_scene(Random& random, double room) {
 
 template <SimulatedHand H, class Watch>
 ClosedLoopEnd run(const Scene& scene, H hand, std::size_t ticks, int substeps, Watch watch) {
-    const double from = (scene.device.delay_samples + 2) * scene.device.period_s;
-    return with_structure(scene.model, scene.scheme, scene.device.period_s, [&](auto structure) {
-        const ClosedLoopSettings settings{substeps, scene.start, 0.0, Guards{.limit = {1e9}}};
-        return closed_loop(std::move(structure), scene.device, Later<H>{hand, from}, ticks, settings, watch);
-    });
+    const double from = (scene.device.late_samples() + 2) * scene.device.period_s;
+    return with_structure(
+        scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit, [&](auto structure) {
+            const ClosedLoopSettings settings{substeps, scene.start, 0.0, Guards{.limit = {1e9}}};
+            return closed_loop(std::move(structure), scene.device, Later<H>{hand, from}, ticks, settings,
+                               watch);
+        });
 }
 
 inline std::ostream& operator<<(std::ostream& out, const Scene& scene) {
@@ -174,7 +176,7 @@ inline std::ostream& operator<<(std::ostream& out, const Scene& scene) {
                << ", T = " << scene.device.period_s << ", J = " << scene.device.inertia
                << ", b = " << scene.device.viscous_damping << ", f_c = " << scene.device.coulomb_friction
                << ", encoder step " << scene.device.encoder_step << ", force step " << scene.device.force_step
-               << ", delay " << scene.device.delay_samples << ", start " << scene.start;
+               << ", delay " << scene.device.late_samples() << ", start " << scene.start;
 }
 
 }  // namespace palpate::test

@@ -25,7 +25,7 @@ DeviceProfile smooth(double viscous_damping, int delay_samples = 0) {
     DeviceProfile device;
     device.viscous_damping = viscous_damping;
     device.encoder_step = 0.0;
-    device.delay_samples = delay_samples;
+    device.delay_s = delay_samples * device.period_s;
     return device;
 }
 

@@ -38,12 +38,23 @@ DeviceProfile strong() {
     return device;
 }
 
+/// The message of the check; empty if the certificate is accepted.
+std::string disagreement(const Certificate& stored, const ForceModel& model) {
+    try {
+        (void)checked(stored, model);
+        return "";
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+}
+
 /// What would stand in a file if the bounds had been these: every line follows from them.
 Certificate with_bounds(const Certificate& certificate, const std::function<void(ForceBounds&)>& change) {
     ForceBounds bounds = certificate.bounds;
     change(bounds);
     Certificate changed = certify_rendered(bounds, certificate.scheme, certificate.device);
     changed.model = certificate.model;
+    changed.fingerprint = fingerprint_of(changed);
     return changed;
 }
 
@@ -113,6 +124,33 @@ TEST(CertificateCheck, RefusesAWideBoundThatProvesNothingAnyMore) {
     EXPECT_EQ(wrong.rfind("certificate.verdict is ", 0), 0U) << wrong;
 }
 
+TEST(CertificateCheck, RefusesAnEditedDeviceEvenIfNoLineUsesTheField) {
+    const ForceModel model = hysteretic();
+    const Certificate certificate = certify(model, direct(), strong());
+    const auto refused = [&](const std::function<void(DeviceProfile&)>& change) {
+        Certificate edited = certificate;
+        change(edited.device);
+        return disagreement(edited, model).rfind("certificate.fingerprint is ", 0) == 0;
+    };
+    EXPECT_TRUE(refused([](auto& d) { d.id = "other"; }));
+    EXPECT_TRUE(refused([](auto& d) { d.position_unit = "m"; }));
+    EXPECT_TRUE(refused([](auto& d) { d.inertia *= 2.0; }));
+    EXPECT_TRUE(refused([](auto& d) { d.force_limit *= 2.0; }));
+    EXPECT_TRUE(refused([](auto& d) { d.delay_s = 1e-15; }));
+}
+
+TEST(CertificateCheck, ComparesNoText) {
+    const ForceModel model = hysteretic();
+    Certificate stored = certify(model, direct(), strong());
+    const Certificate before = stored;
+    stored.why = "";
+    for (Inequality& line : stored.inequalities) {
+        line.name = line.formula = line.source = "";
+    }
+    EXPECT_EQ(checked(stored, model).why, before.why);
+    EXPECT_EQ(checked(stored, model).inequalities[1].formula, before.inequalities[1].formula);
+}
+
 TEST(CertificateCheck, NamesTheFirstFieldOfADeviceThatIsAnother) {
     const DeviceProfile device = strong();
     EXPECT_EQ(device_difference(device, device), "");
@@ -127,7 +165,7 @@ TEST(CertificateCheck, NamesTheFirstFieldOfADeviceThatIsAnother) {
     EXPECT_TRUE(names(difference([](auto& d) { d.id = "other"; }), "this is other"));
     EXPECT_TRUE(names(difference([](auto& d) { d.period_s *= 1.001; }), "period_s"));
     EXPECT_TRUE(names(difference([](auto& d) { d.viscous_damping *= 1.001; }), "viscous_damping"));
-    EXPECT_TRUE(names(difference([](auto& d) { d.delay_samples = 1; }), "delay_samples"));
+    EXPECT_TRUE(names(difference([](auto& d) { d.delay_s = d.period_s; }), "delay_s"));
     EXPECT_TRUE(names(difference([](auto& d) { d.position_unit = "m"; }), "in rad"));
 }
 

@@ -74,7 +74,7 @@ TEST(CertifiedScenes, NeverGiveMoreThanTheObjectHeld) {
         });
         ++tried[std::string(name_of(scene.scheme.structure)) +
                 (scene.model.hysteresis() != nullptr ? " hysteresis" : "") + " delay " +
-                std::to_string(scene.device.delay_samples)];
+                std::to_string(scene.device.late_samples())];
     }
     for (const auto& [what, count] : tried) {
         RecordProperty(what, count);
@@ -147,7 +147,7 @@ TEST(CertifiedScenes, KeepTheirEnergyWithForcesOfVelocity) {
         DeviceProfile device;
         device.period_s = test::uniform(random, 3e-4, 2e-3);
         device.inertia = std::exp(test::uniform(random, -10.0, -5.0));
-        device.delay_samples = static_cast<int>(random() % 3);
+        device.delay_s = static_cast<double>(random() % 3) * device.period_s;
         device.encoder_step = random() % 2 == 0 ? 0.0 : std::exp(test::uniform(random, -11.0, -6.0));
         device.force_limit = 1e9;
         const auto enough = test::just_enough(scene.model, scene.scheme, device, 1.0 + 1e-9);

@@ -24,7 +24,7 @@ DeviceProfile random_device(test::Random& random) {
     device.viscous_damping = test::uniform(random, 0.0, 0.2);
     device.coulomb_friction = random() % 2 == 0 ? 0.0 : test::uniform(random, 0.0, 0.1);
     device.encoder_step = random() % 2 == 0 ? 0.0 : 1e-4;
-    device.delay_samples = static_cast<int>(random() % 3);
+    device.delay_s = static_cast<double>(random() % 3) * device.period_s;
     return device;
 }
 

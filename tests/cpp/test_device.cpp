@@ -81,7 +81,7 @@ TEST(SimulatedDevice, EncoderReportsWholeSteps) {
 TEST(SimulatedDevice, DelaysLimitsAndRoundsTheForce) {
     for (const int delay : {0, 1, 2, longest_delay_samples}) {
         DeviceProfile profile;
-        profile.delay_samples = delay;
+        profile.delay_s = delay * profile.period_s;
         profile.force_step = 0.25;
         SimulatedDevice device{profile, no_hand};
         ASSERT_TRUE(device.open());
@@ -91,6 +91,22 @@ TEST(SimulatedDevice, DelaysLimitsAndRoundsTheForce) {
                 << delay << " " << k;
         }
     }
+}
+
+// Newton's law by hand: no force for a quarter of the second tick, the first command for the rest.
+TEST(SimulatedDevice, AppliesACommandAFractionOfASampleLate) {
+    DeviceProfile profile;
+    profile.delay_s = 1.25 * profile.period_s;
+    profile.viscous_damping = 0.0;
+    profile.encoder_step = 0.0;
+    SimulatedDevice device{profile, no_hand, 1000};
+    ASSERT_TRUE(device.open());
+    EXPECT_EQ(device.exchange({1.0}).applied, 0.0);
+    EXPECT_EQ(device.exchange({2.0}).applied, 1.0);
+    const double T = profile.period_s;
+    EXPECT_NEAR(device.handle_velocity(), -0.75 * T / profile.inertia, 1e-9);
+    EXPECT_EQ(device.exchange({3.0}).applied, 2.0);
+    EXPECT_NEAR(device.handle_velocity(), -(0.75 + 0.25 + 2.0 * 0.75) * T / profile.inertia, 1e-9);
 }
 
 TEST(SimulatedDevice, TakesAForceThatIsNoNumberAsZero) {
@@ -135,8 +151,8 @@ TEST(DeviceProfile, RefusesImpossibleValuesByName) {
     EXPECT_EQ(refusal([](DeviceProfile&) {}), "accepted");
     EXPECT_EQ(refusal([](DeviceProfile& p) { p.inertia = 0.0; }),
               "device profile: inertia is 0, must be > 0");
-    EXPECT_EQ(refusal([](DeviceProfile& p) { p.delay_samples = 17; }),
-              "device profile: delay_samples is 17, must be 0 to 16");
+    EXPECT_EQ(refusal([](DeviceProfile& p) { p.delay_s = 17.0 * p.period_s; }),
+              "device profile: delay_s is 0.017, must be 0 to 16 periods");
     EXPECT_NE(refusal([](DeviceProfile& p) { p.period_s = std::nan(""); }), "accepted");
     EXPECT_NE(refusal([](DeviceProfile& p) { p.viscous_damping = -1.0; }), "accepted");
 }

@@ -139,11 +139,12 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
     const double held = test::energy_at(model, scheme, start) - energy_range(model).least;
     for (const double share : {0.1, 0.5, 1.0, 3.0, 10.0}) {
         for (const int pace : {1, 3, 10}) {
-            const PacingHand hand{share * radius, pace, 1e6, device.period_s, device.delay_samples + 2};
-            const ClosedLoopEnd end = with_structure(model, scheme, device.period_s, [&](auto structure) {
-                return closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
-                                   [](const Tick&, const Motion&, const EnergyAccount&) { return true; });
-            });
+            const PacingHand hand{share * radius, pace, 1e6, device.period_s, device.late_samples() + 2};
+            const ClosedLoopEnd end =
+                with_structure(model, scheme, device.period_s, device.force_limit, [&](auto structure) {
+                    return closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
+                                       [](const Tick&, const Motion&, const EnergyAccount&) { return true; });
+                });
             if (end.energy.motor + end.energy.loss < -held - 1e-9 * end.energy.throughput) {
                 return true;
             }
@@ -162,13 +163,13 @@ TEST(Hysteresis, GeneratesInInnerAndOuterLoopsOnlyWhereItsStickIsLeftOut) {
         Scheme scheme;
         scheme.structure = StructureKind::Direct;
         DeviceProfile device = smooth_knob();
-        device.delay_samples = k % 3;
+        device.delay_s = (k % 3) * device.period_s;
         device.force_limit = 1e9;
         const auto enough = test::just_enough(model, scheme, device, 1.0 + 1e-9);
         ASSERT_TRUE(enough);
         EXPECT_FALSE(generates(model, *enough)) << "model " << k;
         const ForceBounds bounds = force_bounds(model);
-        device.viscous_damping = device.period_s * (0.5 + device.delay_samples) * bounds.sliding;
+        device.viscous_damping = device.period_s * (0.5 + device.late_samples()) * bounds.sliding;
         without += generates(model, device) ? 1 : 0;
     }
     EXPECT_GE(without, tried / 2) << "of " << tried;

@@ -107,7 +107,7 @@ Rendering render(const std::vector<Fault>& faults, const LoopSettings& settings,
     const Bench bench = bench_for(model, true, period_s);
     run.guards = bench.guards();
     run.guards.ramp_s = 0.02;
-    with_structure(model, bench.scheme(model), period_s, [&](auto structure) {
+    with_structure(model, bench.scheme(model), period_s, bench.device.force_limit, [&](auto structure) {
         Observing device{Faulty{SimulatedDevice{bench.device, bench.hand, 4}, faults,
                                 3.0 * run.guards.largest_speed * period_s},
                          run.observed};

@@ -53,7 +53,7 @@ Guarded render(const ForceModel& model, const DeviceProfile& device, const Guard
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
     run.energy =
-        with_structure(model, scheme, device.period_s, [&](auto structure) {
+        with_structure(model, scheme, device.period_s, device.force_limit, [&](auto structure) {
             return closed_loop(std::move(structure), device, hand, ticks, {20, start, 0.0, guards}, watch);
         }).energy;
     return run;
@@ -102,14 +102,15 @@ TEST(Guards, TouchNoForceOfCertifiedScenes) {
         guards.reading = {};
         std::size_t acted = 0;
         const Hand hand{50.0, 0.05, 0.1, 0.9, test::uniform(random, 0.5, 8.0)};
-        with_structure(scene.model, scene.scheme, scene.device.period_s, [&](auto structure) {
-            return closed_loop(
-                std::move(structure), scene.device, hand, 1000, {8, 0.1, 0.0, guards},
-                [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
-                    acted += tick.status == Status::Drained || tick.status == Status::Softened;
-                    return true;
-                });
-        });
+        with_structure(
+            scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit, [&](auto structure) {
+                return closed_loop(
+                    std::move(structure), scene.device, hand, 1000, {8, 0.1, 0.0, guards},
+                    [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
+                        acted += tick.status == Status::Drained || tick.status == Status::Softened;
+                        return true;
+                    });
+            });
         EXPECT_EQ(acted, 0U) << scene;
     }
 }
@@ -119,7 +120,7 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
     for (int k = 0; k < test::cases(50); ++k) {
         DeviceProfile device;
         device.encoder_step = 0.0;
-        device.delay_samples = static_cast<int>(random() % 3);
+        device.delay_s = static_cast<double>(random() % 3) * device.period_s;
         const double stiffness = test::uniform(random, 1.5, 8.0) * 2.0 * device.viscous_damping / period;
         const ForceModel model = wall(stiffness);
         GuardSettings settings = settings_for(device);
@@ -132,8 +133,8 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
             // What the motor gave and the device's damping did not take back out of nine tenths of it.
             return -(run.energy.motor + 0.9 * run.energy.loss);
         };
-        EXPECT_LT(lost(true), 1.3 * held) << stiffness << " delay " << device.delay_samples;
-        EXPECT_GT(lost(false), 2.0 * held) << stiffness << " delay " << device.delay_samples;
+        EXPECT_LT(lost(true), 1.3 * held) << stiffness << " delay " << device.late_samples();
+        EXPECT_GT(lost(false), 2.0 * held) << stiffness << " delay " << device.late_samples();
     }
 }
 
@@ -182,7 +183,7 @@ TEST(EnergyTank, IsSizedByTheModelAndItsCoupling) {
 TEST(PassivityObserver, SeesWhatTheMotorTook) {
     DeviceProfile device;
     device.encoder_step = 0.0;
-    device.delay_samples = 1;
+    device.delay_s = device.period_s;
     SimulatedHandle<GreedyHand, Midpoint> handle{device, {10.0, 0.05, 0.03, 0.5}, 20, 0.1};
     ASSERT_TRUE(handle.open());
     Controller controller{handle, Direct{test::Spring{30.0}}, Guards{}};

@@ -190,40 +190,41 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
     settings.duration_s = 0.1;
     settings.lowest_rate_share = 0.0;
     Counts counts;
-    with_structure(rendered, scheme, 1.0 / settings.rate_hz, [&](auto structure) {
-        Sinful<Sin> device{sin};
-        EXPECT_TRUE(device.open());
-        Controller controller{device, std::move(structure),
-                              guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
-        Outlets outlets;
-        using Recorder = FlightRecorder<TickRecord, Outlets>;
-        Recorder recorder{outlets, 4096, std::chrono::milliseconds{5}};
-        LastRecords<TickRecord> last{100};
-        LoopProgress progress;
-        const auto report = std::make_unique<LoopReport>();
-        const std::atomic<bool> asked{false};
-        std::atomic<bool> over{false};
-        std::thread loop{[&] {
-            Periodic clock{100'000};
-            WatchedSink<Recorder> sink{recorder, last};
-            allocations = locks = exceptions = 0;
-            before();
-            watched = true;
-            run_loop(controller, settings, clock, asked, sink, progress, *report);
-            watched = false;
-            over.store(true);
-            after();
-        }};
-        while (!over.load()) {
-            std::this_thread::sleep_for(std::chrono::milliseconds{1});
-        }
-        counts = {allocations, locks, exceptions, report->timing.ticks()};
-        if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
-            loop.join();
-        } else {
-            _exit(counts.ticks > 0 ? 0 : 1);  // the filtered thread cannot even end
-        }
-    });
+    with_structure(
+        rendered, scheme, 1.0 / settings.rate_hz, GuardSettings{}.force_limit, [&](auto structure) {
+            Sinful<Sin> device{sin};
+            EXPECT_TRUE(device.open());
+            Controller controller{device, std::move(structure),
+                                  guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
+            Outlets outlets;
+            using Recorder = FlightRecorder<TickRecord, Outlets>;
+            Recorder recorder{outlets, 4096, std::chrono::milliseconds{5}};
+            LastRecords<TickRecord> last{100};
+            LoopProgress progress;
+            const auto report = std::make_unique<LoopReport>();
+            const std::atomic<bool> asked{false};
+            std::atomic<bool> over{false};
+            std::thread loop{[&] {
+                Periodic clock{100'000};
+                WatchedSink<Recorder> sink{recorder, last};
+                allocations = locks = exceptions = 0;
+                before();
+                watched = true;
+                run_loop(controller, settings, clock, asked, sink, progress, *report);
+                watched = false;
+                over.store(true);
+                after();
+            }};
+            while (!over.load()) {
+                std::this_thread::sleep_for(std::chrono::milliseconds{1});
+            }
+            counts = {allocations, locks, exceptions, report->timing.ticks()};
+            if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
+                loop.join();
+            } else {
+                _exit(counts.ticks > 0 ? 0 : 1);  // the filtered thread cannot even end
+            }
+        });
     return counts;
 }
 

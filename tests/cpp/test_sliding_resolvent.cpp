@@ -172,7 +172,7 @@ TEST(Scheme, RendersWithTablesWhatTheNetworkItselfWould) {
         const ForceModel model{network, domain};
         const auto compare = [&](const auto& reference, const char* solver) {
             ASSERT_EQ(solver_name(model, scheme, 1e-3).value_or("none"), solver);
-            with_structure(model, scheme, 1e-3, [&](auto structure) {
+            with_structure(model, scheme, 1e-3, 1e9, [&](auto structure) {
                 expect_same_rendering(random, std::move(structure), reference, 1e-8 * steepest);
             });
         };

@@ -130,7 +130,7 @@ TAKES: dict[str, tuple[Call, str, set[str]]] = {
     "Scheme compensated": (lambda v: Scheme(compensated=v), "compensated", {"none", "int", "nan"}),
     "DeviceProfile id": (lambda v: DeviceProfile(id=v), "id", {"str", "bytes"}),
     "DeviceProfile number": (lambda v: DeviceProfile(inertia=v), "inertia", {"int"}),
-    "DeviceProfile whole number": (lambda v: DeviceProfile(delay_samples=v), "delay_samples", {"int"}),
+    "Scheme whole number": (lambda v: Scheme(structure="direct", predict=v), "predict", {"int"}),
     "Finding level": (lambda v: Finding(v, "sentence"), "level", set()),
     "Finding sentence": (lambda v: Finding("usable", v), "sentence", {"str"}),
     "Verdict": (Verdict, "findings", set()),

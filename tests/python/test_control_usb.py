@@ -75,7 +75,7 @@ def test_what_is_only_stable_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_model_that_is_certified_for_this_device_needs_no_more_words(tmp_path: Path) -> None:
-    certified = certified_for(tmp_path, id="EMU-1", delay_samples=1, coulomb_friction=1e-3)
+    certified = certified_for(tmp_path, id="EMU-1", delay_s=1.25e-3, coulomb_friction=1e-3)
     answer = control("--wait-ms", "10000", "--duration-s", 0.2, "--json", device=LOCK_STEP, model=certified)
     assert answer.returncode in (0, 1), answer.stderr  # a busy machine may end it
     assert json.loads(answer.stdout)["ticks"] > 0
@@ -87,7 +87,7 @@ def test_a_model_that_is_certified_for_this_device_needs_no_more_words(tmp_path:
 def planned(folder: Path, **device: Any) -> Path:
     """The spring, planned for the emulated knob; in lock-step the host may be four packets behind."""
     profile = {"id": "EMU-1", "viscous_damping": 50.0, "coulomb_friction": 0.01, "force_step": 1e-6}
-    plans = plan(load_model(SPRING), DeviceProfile(**{**profile, "delay_samples": 5, **device}))
+    plans = plan(load_model(SPRING), DeviceProfile(**{**profile, "delay_s": 5.25e-3, **device}))
     return plans.stored().save(folder / "planned.json")
 
 
@@ -124,7 +124,7 @@ def test_a_certificate_of_another_device_moves_nothing(
 
 def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
-    model = planned(tmp_path, delay_samples=0)
+    model = planned(tmp_path, delay_s=0.25e-3)
     words = ["--wait-ms", 500, "--duration-s", 0.3]
     for _ in range(20):  # on a busy machine a lost packet may end the run before
         answer = control(*words, device=[*LOCK_STEP, "--trace", str(trace)], model=model)

@@ -96,6 +96,7 @@ PLAN = {
     "inertia": None,
     "compensated": False,
     "play_radius": 2e-4,
+    "predict": None,
     "refused": ["none"],
     "network": None,
     "accepted_force_error": 0.2,

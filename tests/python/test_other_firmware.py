@@ -65,5 +65,5 @@ def test_its_sign_and_mechanics_are_measured(seed: int) -> None:
     findings = {one["name"]: one for one in told["findings"]}
     # A coarse encoder does not see such a push.
     assert findings["sign of the force"]["right"] or told["encoder_step"] > 1e-3, answer.stdout
-    assert told["delay_samples"] in (0, 1, 2, 3)
+    assert 0.0 <= told["delay_s"] < 4e-3
     assert findings["wire"]["right"]

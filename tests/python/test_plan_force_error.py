@@ -137,7 +137,8 @@ def test_the_named_device_property_is_enough_and_1_percent_less_is_not(switch: M
     assert rate
     assert step
     period_s = 1.0 / float(rate[1])
-    faster = {"period_s": period_s, "jitter_s": weak.jitter_s * period_s / weak.period_s}
+    share = period_s / weak.period_s
+    faster = {"period_s": period_s, "jitter_s": share * weak.jitter_s, "delay_s": share * weak.delay_s}
     strong = {"viscous_damping": float(damping[1]), "coulomb_friction": float(friction[1])}
     for fields in (strong, {**faster, "encoder_step": float(step[1])}):
         chosen = plan(switch, changed(weak, **fields))

@@ -23,12 +23,12 @@ GOOD = ROOT / "tests" / "models" / "good"
 CHANGED: dict[str, Any] = {
     "Scheme": _core.Scheme(structure="implicit", coupling_stiffness=1 / 3, mass=1e-7, play_radius=0.1),
     "Hand": _core.Hand(stiffness=1 / 3, damping=0.1, lower=-1e-9, upper=2.0, frequency_hz=0.7),
-    "DeviceProfile": _core.DeviceProfile(id="it's", encoder_step=1e-7, delay_samples=3, position_unit="m"),
+    "DeviceProfile": _core.DeviceProfile(id="it's", encoder_step=1e-7, delay_s=3e-4, position_unit="m"),
     "ForceBounds": _core.ForceBounds(
         slope_min=-0.1, slope_max=1 / 3, steepest=2.0, sliding=1.0, loss_max=1e-9, hysteresis=True
     ),
     "Inequality": _core.Inequality(
-        name="a", formula="b > c", left=1 / 3, right=0.1, rests_on="linear", source="s", strict=True
+        id="i", name="a", formula="b > c", left=1 / 3, right=0.1, rests_on="linear", source="s", strict=True
     ),
     "Bench": bench_for(model_by_hand()),
     "Certificate": _core.certify(model_by_hand(), _core.Scheme(structure="direct"), _core.DeviceProfile()),
@@ -70,7 +70,7 @@ def test_values_that_differ_in_one_field_are_not_equal() -> None:
         fields = value.__reduce__()[0].keywords
         for field, content in fields.items():
             if isinstance(content, float):
-                assert type(value)(**{**fields, field: content + 1.0}) != value, field
+                assert type(value)(**{**fields, field: content + 1e-3}) != value, field
     assert _core.Scheme() != _core.Hand()
     assert _core.Scheme() != 1
 

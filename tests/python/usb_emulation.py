@@ -43,6 +43,8 @@ class Frame:
 
     started: int
     """Frames since the first command."""
+    sequence: int
+    """Sequence number of its sample, modulo 65536."""
     position: float
     torque: float
     status: int
@@ -58,6 +60,7 @@ def frames(trace: Path) -> list[Frame]:
         return [
             Frame(
                 int(row["started"]),
+                int(row["sequence"]),
                 float(row["position_rad"]),
                 float(row["torque_Nm"]),
                 int(row["status"]),

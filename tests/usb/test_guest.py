@@ -37,7 +37,7 @@ DIRECT = "--uncertified --structure direct"
 UNSTOPPED = "--uncertified --lowest-rate-share 0"
 
 # What GET_INFO and the echoes say of the emulated device; mechanics and hand are the defaults of both.
-KNOWN: dict[str, Any] = {"id": "EMU-1", "delay_samples": 1, "force_step": 1e-6}
+KNOWN: dict[str, Any] = {"id": "EMU-1", "delay_s": 1.25e-3, "force_step": 1e-6}
 DEVICE = DeviceProfile(**KNOWN)
 # A certificate spends friction. The emulated device has none, but this is about what a certificate forbids.
 WITH_FRICTION = DeviceProfile(**KNOWN, coulomb_friction=1e-3)

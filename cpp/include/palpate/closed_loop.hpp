@@ -39,7 +39,7 @@ template <Structure S, SimulatedHand H, class Watch>
     (void)device.open();
     Controller controller{device, std::move(structure), settings.guards};
     (void)controller.start();
-    const auto delay = static_cast<std::size_t>(profile.delay_samples);
+    const auto delay = static_cast<std::size_t>(profile.late_samples());
     ClosedLoopEnd end;
     end.met = device.handle();
     bool goes_on = true;

@@ -71,7 +71,7 @@ template <Device D, Structure S, class Watch>
                                                              double start) {
     SchemeChoices direct;
     direct.structure = StructureKind::Direct;
-    return with_structure(model, bench.scheme(model, direct), bench.device.period_s,
+    return with_structure(model, bench.scheme(model, direct), bench.device.period_s, bench.device.force_limit,
                           [start](auto structure) -> std::function<double(double)> {
                               structure.reset(start);
                               return [structure](double position) mutable {

@@ -114,7 +114,7 @@ template <Device D, class Watch>
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
     validate(scheme, model, period_s);
-    return with_structure(model, scheme, period_s, [&](auto structure) {
+    return with_structure(model, scheme, period_s, guards.force_limit, [&](auto structure) {
         Controller controller{device, std::move(structure), guards_of(guards, model, scheme, period_s)};
         return run_session(controller, settings, outlets, asked, watch);
     });

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -57,7 +58,7 @@ template <class Each>
     detail::require(
         ticks <= most_simulated_ticks,
         "ticks is " + std::to_string(ticks) + ", must be at most " + std::to_string(most_simulated_ticks));
-    return with_structure(model, scheme, profile.period_s, [&](auto structure) {
+    return with_structure(model, scheme, profile.period_s, profile.force_limit, [&](auto structure) {
         SimulatedDevice device{profile, hand, substeps, start_position};
         (void)device.open();
         Controller controller{device, std::move(structure), ForceLimit{profile.force_limit}};
@@ -96,18 +97,19 @@ template <class Each>
                                                   std::span<const double> position, double period_s,
                                                   Each&& each) {
     validate(scheme, model, period_s);
-    return with_structure(model, scheme, period_s, [&](auto&& structure) {
-        std::vector<Rendered> rendered;
-        rendered.reserve(position.size());
-        if (!position.empty()) {
-            structure.reset(position.front());
-        }
-        for (const double x : position) {
-            each(rendered.size());
-            rendered.push_back(structure.step(x));
-        }
-        return rendered;
-    });
+    return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),
+                          [&](auto&& structure) {
+                              std::vector<Rendered> rendered;
+                              rendered.reserve(position.size());
+                              if (!position.empty()) {
+                                  structure.reset(position.front());
+                              }
+                              for (const double x : position) {
+                                  each(rendered.size());
+                                  rendered.push_back(structure.step(x));
+                              }
+                              return rendered;
+                          });
 }
 
 [[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
@@ -120,22 +122,25 @@ template <class Each>
 [[nodiscard]] std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
                                                  std::span<const double> force, double period_s,
                                                  double start_position, Each&& each) {
-    return with_structure(model, scheme, period_s, [&](auto&& structure) -> std::vector<Rendered> {
-        if constexpr (requires { structure.drive(0.0); }) {
-            std::vector<Rendered> rendered;
-            rendered.reserve(force.size());
-            structure.reset(start_position);
-            for (const double f : force) {
-                each(rendered.size());
-                rendered.push_back(structure.drive(f));
+    return with_structure(
+        model, scheme, period_s, std::numeric_limits<double>::infinity(),
+        [&](auto&& structure) -> std::vector<Rendered> {
+            if constexpr (requires { structure.drive(0.0); }) {
+                std::vector<Rendered> rendered;
+                rendered.reserve(force.size());
+                structure.reset(start_position);
+                for (const double f : force) {
+                    each(rendered.size());
+                    rendered.push_back(structure.drive(f));
+                }
+                return rendered;
+            } else {
+                throw std::invalid_argument(
+                    "structure is " +
+                    std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
+                    ", must be implicit or explicit: only an inertia turns force into motion");
             }
-            return rendered;
-        } else {
-            throw std::invalid_argument(
-                "structure is " + std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
-                ", must be implicit or explicit: only an inertia turns force into motion");
-        }
-    });
+        });
 }
 
 [[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,

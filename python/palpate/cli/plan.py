@@ -138,6 +138,14 @@ def plan(
     end_with(verdict)
 
 
+_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
+_CERTIFICATE = {
+    "certified": "certified",
+    "stable-locally": "stable (local), passivity not certified",
+    "refused": "refused",
+}
+
+
 def structure_words(plan: Plan) -> str:
     """The structure, and the changes to the identified network that it renders."""
     words = [plan.structure]
@@ -163,6 +171,8 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
         "written": None if written is None else str(written),
         "plan": plan.record(),
         "certificate": certificate_record(certificate),
+        "inequalities": [{name: getattr(line, name) for name in _LINE} for line in certificate.inequalities],
+        "why": certificate.why,
         "steepest_slope": steepest,
         "felt_slope": felt,
         "seconds": seconds,
@@ -195,7 +205,7 @@ def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: f
         if error.largest
         else "none"
     )
-    rows["certificate"] = certificate.verdict
+    rows["certificate"] = _CERTIFICATE[certificate.verdict]
     rows["holds for"] = f"up to {number(1e3 * certificate.longest_period_s)} ms between two samples"
     rows["planned in"] = f"{seconds:.1f} s"
     rows["written"] = "nothing; -o OUT.json writes model and plan" if written is None else str(written)

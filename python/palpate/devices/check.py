@@ -34,8 +34,8 @@ _STATE_FRICTION = (
 )
 _NO_FRICTION = "without friction no certificate of direct rendering holds for an encoder with steps"
 _SHORTEST_S = 2.0
-_DELAY_TOLERANCE = 0.25
-"""Of a sample: what the clocks of host and device leave open."""
+_DELAY_MARGIN = 0.05
+"""Added to the measured delay, because the clocks of host and device drift [periods]"""
 _SEEN_STEPS = 5.0
 """A push that moved the handle by less, in encoder steps, tells nothing."""
 _SURE = 3.0
@@ -96,12 +96,12 @@ class Check:
         """For each number of the profile whether it was measured, stated or said by the device."""
         stated = self.coulomb_friction is not None
         friction = "stated, not measured" if stated else "measured, less its uncertainty: a lower bound"
-        delay = "measured" if self.numbers["delay_samples"] is not None else "not measured; assumed to be 0"
+        delay = "measured" if self.numbers["delay_s"] is not None else "not measured; assumed to be 0"
         return (
             f"{self.device}, measured by palpate check-device.",
             "inertia, viscous_damping: measured by pushes. period_s: said by the device. jitter_s: measured.",
             f"coulomb_friction: {friction}.",
-            f"delay_samples: {delay}.",
+            f"delay_s: {delay}.",
             "encoder_step, force_step, force_limit: said by the device, not measured.",
         )
 
@@ -211,7 +211,7 @@ def judge(listened: Mapping[str, Any]) -> Check:
         "repeated_samples": float(listened["repeated_samples"]),
         "encoder_step": base.encoder_step,
         "force_limit": base.force_limit,
-        "delay_samples": None,
+        "delay_s": None,
         "inertia": None,
         "viscous_damping": None,
         "coulomb_friction": None,
@@ -221,15 +221,15 @@ def judge(listened: Mapping[str, Any]) -> Check:
     findings = findings_at_rest(listened)
     if "round_trip" in listened:
         delay_us = listened["delay"]
-        samples = max(0, math.ceil(1e-6 * delay_us["p999_us"] / base.period_s - _DELAY_TOLERANCE))
-        numbers["delay_samples"] = float(samples)
+        delay_s = 1e-6 * delay_us["p999_us"] + _DELAY_MARGIN * base.period_s
+        numbers["delay_s"] = delay_s
         for told in ("round_trip", "delay"):
             numbers.update({f"{told}_{name}": value for name, value in listened[told].items()})
         findings.append(
             Finding(
                 "delay",
-                f"{samples} samples from a sample to its force: p50 {delay_us['p50_us']:.0f} us, "
-                f"p99.9 {delay_us['p999_us']:.0f} us",
+                f"{1e6 * delay_s:.0f} us from a sample to its force: p50 "
+                f"{delay_us['p50_us']:.0f} us, p99.9 {delay_us['p999_us']:.0f} us",
             )
         )
     return Check(listened["device"], tuple(findings), numbers, base)
@@ -239,8 +239,8 @@ def with_pushes(check: Check, push: Push) -> Check:
     """Add what pushes showed to a check."""
     findings = [*check.findings, _sign(push, check.base.encoder_step)]
     numbers = dict(check.numbers)
-    if push.delay_samples is not None and numbers["delay_samples"] is None:
-        numbers["delay_samples"] = float(push.delay_samples)
+    if push.delay_samples is not None and numbers["delay_s"] is None:
+        numbers["delay_s"] = push.delay_samples * check.base.period_s
         findings.append(Finding("delay", f"{push.delay_samples} samples from a sample to its force"))
     mechanics = push.mechanics
     if mechanics is None:

@@ -27,13 +27,13 @@ def compare(expected: CoreProfile, measured: Numbers, *, name: str) -> Finding:
     expected : DeviceProfile
         The profile, or the device of a certificate.
     measured : mapping
-        ``period_s``, ``jitter_s``, ``delay_samples``, ``encoder_step``, ``force_limit``,
+        ``period_s``, ``jitter_s``, ``delay_s``, ``encoder_step``, ``force_limit``,
         ``viscous_damping``, ``coulomb_friction``; None where it was not measured.
     name : str
         Of the finding.
     """
     period, jitter = measured["period_s"], measured["jitter_s"]
-    delay, damping = measured["delay_samples"], measured["viscous_damping"]
+    delay, damping = measured["delay_s"], measured["viscous_damping"]
     friction = measured["coulomb_friction"]
     step, limit = measured["encoder_step"], measured["force_limit"]
     assert period is not None
@@ -48,8 +48,8 @@ def compare(expected: CoreProfile, measured: Numbers, *, name: str) -> Finding:
         wrong.append(
             f"its period gets {1e6 * (period + jitter):.0f} us long, {1e6 * longest:.0f} us are counted on"
         )
-    if delay is not None and delay > expected.delay_samples:
-        wrong.append(f"its delay is {delay:g} samples, {expected.delay_samples} are counted on")
+    if delay is not None and delay > expected.delay_s:
+        wrong.append(f"its delay is {1e6 * delay:.0f} us, {1e6 * expected.delay_s:.0f} us are counted on")
     if not math.isclose(step, expected.encoder_step, rel_tol=_STEP_TOLERANCE):
         wrong.append(f"its encoder step is {step:.4g}, {expected.encoder_step:.4g} is counted on")
     if limit < expected.force_limit * (1.0 - _STEP_TOLERANCE):
@@ -88,7 +88,7 @@ def profile_of(base: CoreProfile, measured: Numbers) -> DeviceProfile:
             "mounted on, for 10 s; if the friction is above the pushes, state it with --coulomb-friction (in "
             "Python coulomb_friction)"
         )
-    period, jitter, delay = measured["period_s"], measured["jitter_s"], measured["delay_samples"]
+    period, jitter, delay = measured["period_s"], measured["jitter_s"], measured["delay_s"]
     assert period is not None
     assert jitter is not None
     return DeviceProfile(
@@ -101,6 +101,6 @@ def profile_of(base: CoreProfile, measured: Numbers) -> DeviceProfile:
         coulomb_friction=friction,
         encoder_step=base.encoder_step,
         force_step=base.force_step,
-        delay_samples=int(delay or 0),
+        delay_s=delay or 0.0,
         force_limit=base.force_limit,
     )

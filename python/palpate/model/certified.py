@@ -19,7 +19,7 @@ _DEVICE = (
     "coulomb_friction",
     "encoder_step",
     "force_step",
-    "delay_samples",
+    "delay_s",
     "force_limit",
 )
 _BOUNDS = (
@@ -33,7 +33,7 @@ _BOUNDS = (
     "mean_force",
     "drag",
 )
-_INEQUALITY = ("name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
+_INEQUALITY = ("id", "left", "right")
 
 
 def device_record(device: DeviceProfile) -> dict[str, Any]:
@@ -44,6 +44,7 @@ def device_record(device: DeviceProfile) -> dict[str, Any]:
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
     """A certificate as it stands in a model file."""
     return {
+        "fingerprint": certificate.fingerprint,
         "model": certificate.model,
         "structure": certificate.scheme.structure,
         "device": device_record(certificate.device),
@@ -52,7 +53,6 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
             {name: getattr(line, name) for name in _INEQUALITY} for line in certificate.inequalities
         ],
         "verdict": certificate.verdict,
-        "why": certificate.why,
         "longest_period_s": certificate.longest_period_s,
     }
 
@@ -70,6 +70,7 @@ def scheme_of(plan: Mapping[str, Any]) -> Scheme:
         structure=plan["structure"],
         compensated=plan["compensated"],
         play_radius=plan["play_radius"] or 0.0,
+        predict=plan["predict"] or 0,
         **given,
     )
 
@@ -84,27 +85,17 @@ def checked_certificate(
     InputError
         It says what the model and the device do not give: the field, its value, what would be right.
     """
-    lines = []
-    for index, record in enumerate(certificate["inequalities"]):
-        line = Inequality(**{k: v for k, v in record.items() if k not in ("margin", "holds")})
-        path = f"certificate.inequalities[{index}]"
-        if abs(record["margin"] - line.margin) > 1e-9 * max(abs(record["margin"]), abs(line.margin)):
-            raise InputError(f"{path}.margin is {record['margin']}: must be left - right = {line.margin}")
-        if record["holds"] != line.holds:
-            raise InputError(f"{path}.holds is {record['holds']}: must be what left and right say")
-        lines.append(line)
     stored = Certificate(
         scheme=scheme_of(plan),
         device=DeviceProfile(**certificate["device"]),
         model=certificate["model"],
         bounds=ForceBounds(**certificate["bounds"], hysteresis=model.hysteretic),
-        inequalities=lines,
+        inequalities=[Inequality(**line) for line in certificate["inequalities"]],
         verdict=certificate["verdict"],
-        why=certificate["why"],
         longest_period_s=certificate["longest_period_s"],
+        fingerprint=certificate["fingerprint"],
     )
     try:
-        stored.check(model)
+        return stored.check(model)
     except ValueError as error:
         raise InputError(str(error)) from None
-    return stored

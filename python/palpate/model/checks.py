@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from .._core import longest_delay_s
 from ..arguments import shown
 from ..errors import InputError
 from .schema import VERSION, ModelFile, Network
@@ -212,6 +213,13 @@ def _check_plan(file: ModelFile) -> None:
         "certificate.structure",
         certificate.structure,
         "that of the plan",
+    )
+    longest = longest_delay_s(certificate.device.period_s)
+    _require(
+        certificate.device.delay_s <= longest,
+        "certificate.device.delay_s",
+        certificate.device.delay_s,
+        f"at most {longest}",
     )
     unit = certificate.device.position_unit
     _require(

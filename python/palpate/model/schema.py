@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from .._core import longest_delay_samples
+from .._core import most_prediction_taps
 
 VERSION = 1
 """Version of the file format that is read and written."""
@@ -138,6 +138,8 @@ class PlanRecord(_Part):
     compensated: bool
     play_radius: Positive | None
     """In place of the model's own"""
+    predict: Annotated[int, Field(ge=1, le=most_prediction_taps)] | None
+    """Samples used to predict the position half a sample ahead"""
     refused: list[str]
     """Why simpler structures were refused"""
     network: Network | None
@@ -158,7 +160,7 @@ class DeviceRecord(_Part):
     coulomb_friction: NotNegative
     encoder_step: NotNegative
     force_step: NotNegative
-    delay_samples: Annotated[int, Field(ge=0, le=longest_delay_samples)]
+    delay_s: NotNegative
     force_limit: Positive
 
 
@@ -178,30 +180,25 @@ class BoundsRecord(_Part):
 
 
 class InequalityRecord(_Part):
-    """left >= right, or left > right where it is strict."""
+    """Both sides of one line. Its text, basis and strictness follow from its id."""
 
-    name: str
-    formula: str
+    id: str
     left: Number
     right: Number
-    margin: Number
-    strict: bool
-    holds: bool
-    rests_on: Literal["proved", "linear", "none"]
-    source: str
 
 
 class CertificateRecord(_Part):
     """What was proved of the plan. It is computed again whenever the file is read."""
 
+    fingerprint: str
+    """Over every number and name of the certificate, scheme and model"""
     model: str
     """Fingerprint of the network, domain and continuation"""
     structure: Structure
     device: DeviceRecord
     bounds: BoundsRecord
     inequalities: list[InequalityRecord]
-    verdict: Literal["certified", "stable (local), passivity not certified", "refused"]
-    why: str
+    verdict: Literal["certified", "stable-locally", "refused"]
     longest_period_s: NotNegative
     """Time between two samples up to which every inequality holds"""
 

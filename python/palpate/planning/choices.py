@@ -47,13 +47,13 @@ def renderable_slopes(device: DeviceProfile, stick: float = 0.0) -> tuple[float,
     """
     held = device.viscous_damping / device.longest_period_s
     friction = friction_slope(device) - 2.0 * stick
-    highest = min(held / (0.5 + device.delay_samples) - stick, friction)
-    return (-highest if device.delay_samples else -friction), highest
+    highest = min(held / (0.5 + device.late_samples) - stick, friction)
+    return (-highest if device.late_samples else -friction), highest
 
 
 def steepest_stick(device: DeviceProfile) -> float:
     """The slope h/r that leaves half of what the device holds to sliding; what is more of h is left out."""
-    held = device.viscous_damping / device.longest_period_s / (0.5 + device.delay_samples)
+    held = device.viscous_damping / device.longest_period_s / (0.5 + device.late_samples)
     return min(0.5 * held, 0.25 * friction_slope(device))
 
 
@@ -65,7 +65,7 @@ def coupling_for(device: DeviceProfile, damping: float) -> float:
     available = SPARE * device.viscous_damping / device.longest_period_s
 
     def fits(stiffness: float) -> bool:
-        return _core.coupling_need(stiffness, damping, device.period_s, device.delay_samples) <= available
+        return _core.coupling_need(stiffness, damping, device.period_s, device.late_samples) <= available
 
     low, high = 0.0, 2.0 * available
     if high <= 0.0 or not fits(1e-9 * high):
@@ -83,7 +83,7 @@ def play_radius_for(model: Model, device: DeviceProfile) -> float:
     and friction taken off as well.
     """
     sliding = sliding_bounds(model)
-    delay = device.delay_samples
+    delay = device.late_samples
     held = device.viscous_damping / device.longest_period_s
     room = (held - 0.5 * max(0.0, sliding.slope_max) - delay * sliding.sliding) / (0.5 + delay)
     room = min(room, 0.5 * (friction_slope(device, sliding.mean_force) - sliding.sliding))

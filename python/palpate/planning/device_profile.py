@@ -72,8 +72,8 @@ class DeviceProfile(_core.DeviceProfile):
         Delta [rad or m]; 0 = not quantised.
     force_step : float
         Delta_F, of the command [N*m or N]; 0 = not quantised.
-    delay_samples : int
-        n_d, whole samples between command and force, 0 to 16.
+    delay_s : float
+        t_d, time from a sample to the force that is computed from it [s]; 0 to 16 periods.
     force_limit : float
         [N*m or N]
 

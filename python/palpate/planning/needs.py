@@ -102,9 +102,11 @@ def _properties(model: Model, device: DeviceProfile) -> tuple[_Property, _Proper
     def faster(on: DeviceProfile, factor: float) -> DeviceProfile:
         rate = _rounded(math.ceil, factor / device.period_s)
         jitter_s = device.jitter_s / (rate * device.period_s)
-        return _changed(on, period_s=1.0 / rate, jitter_s=jitter_s)
+        delay_s = device.delay_s / (rate * device.period_s)
+        return _changed(on, period_s=1.0 / rate, jitter_s=jitter_s, delay_s=delay_s)
 
-    jitter = " with jitter in proportion" if device.jitter_s else ""
+    shorter = [name for name, value in (("jitter", device.jitter_s), ("delay", device.delay_s)) if value]
+    in_proportion = f" with {' and '.join(shorter)} in proportion" if shorter else ""
     return (
         _Property(
             lambda on, factor: _changed(on, viscous_damping=_rounded(math.ceil, factor * b)),
@@ -116,7 +118,7 @@ def _properties(model: Model, device: DeviceProfile) -> tuple[_Property, _Proper
             lambda on, factor: _changed(on, coulomb_friction=_rounded(math.ceil, factor * f_c)),
             lambda on: f"f_c >= {on.coulomb_friction:.3g} {force} (has {device.coulomb_friction:.3g})",
         ),
-        _Property(faster, lambda on: f"a rate of {1.0 / on.period_s:.3g} Hz{jitter}"),
+        _Property(faster, lambda on: f"a rate of {1.0 / on.period_s:.3g} Hz{in_proportion}"),
         _Property(
             lambda on, factor: _changed(on, encoder_step=_rounded(math.floor, device.encoder_step / factor)),
             lambda on: f"an encoder step of {on.encoder_step:.3g} {position}",

@@ -140,6 +140,7 @@ class Plan:
             "inertia": {"mass": scheme.mass, "damping": scheme.damping} if heavy else None,
             "compensated": scheme.compensated,
             "play_radius": scheme.play_radius or None,
+            "predict": scheme.predict or None,
             "refused": list(self.refused),
             "accepted_force_error": self.accept_force_error,
         }

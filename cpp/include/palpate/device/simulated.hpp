@@ -20,7 +20,7 @@ namespace palpate {
 inline constexpr int most_substeps = 1000;  ///< of one tick of a simulated device
 
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
-/// friction, encoder, force step and limit, hold over the tick, whole samples of delay. `Plant` moves the
+/// friction, encoder, force step and limit, hold over the tick, delay. `Plant` moves the
 /// handle: SemiImplicitEuler, Midpoint where energy is accounted for, or MountedObject where the device is there
 /// to measure a real thing.
 ///
@@ -53,11 +53,17 @@ class SimulatedHandle {
         return {};
     }
 
-    /// Applies the command over one period (later by the delay) and samples the encoder at its end.
+    /// Applies the command over one period (later by the delay) and samples the encoder at its end. With a
+    /// fractional delay the force changes within the tick; the reading reports the later one.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
-        applied_ = delayed(converted(command.force));
-        plant_.tick({profile_.inertia, profile_.viscous_damping, profile_.coulomb_friction},
-                    hand_.grip(time(), handle_), applied_, profile_.period_s / substeps_, substeps_, handle_);
+        pend(converted(command.force));
+        const double late = profile_.delay_fraction();
+        const int before = late > 0.0 ? std::max(1, static_cast<int>(std::lround(late * substeps_))) : 0;
+        const Grip grip = hand_.grip(time(), handle_);
+        if (before > 0) {
+            move(grip, pending(tick_ + pending_.size() - 1), late, before);
+        }
+        move(grip, pending(tick_), 1.0 - late, std::max(1, substeps_ - before));
         ++tick_;
         const double measured = encoded(handle_.position);
         const double velocity = (measured - last_reading_) / profile_.period_s;
@@ -93,10 +99,20 @@ class SimulatedHandle {
         return step > 0.0 ? step * std::round(limited / step) : limited;
     }
 
-    [[nodiscard]] double delayed(double force) noexcept {
-        const auto delay = static_cast<std::size_t>(profile_.delay_samples);
+    /// Keeps the command of this tick until its delay is over.
+    void pend(double force) noexcept {
+        const auto delay = static_cast<std::size_t>(profile_.whole_delay_samples());
         pending_[(tick_ + delay) % pending_.size()] = force;
-        return pending_[tick_ % pending_.size()];
+    }
+    [[nodiscard]] double pending(std::uint64_t tick) const noexcept {
+        return pending_[tick % pending_.size()];
+    }
+
+    /// Moves the handle against a force over a share of the tick.
+    void move(const Grip& grip, double force, double share, int substeps) noexcept {
+        applied_ = force;
+        plant_.tick({profile_.inertia, profile_.viscous_damping, profile_.coulomb_friction}, grip, applied_,
+                    share * profile_.period_s / substeps, substeps, handle_);
     }
 
     DeviceProfile profile_;
@@ -108,7 +124,7 @@ class SimulatedHandle {
     double applied_ = 0.0;
     double last_reading_ = 0.0;
     std::uint64_t tick_ = 0;
-    std::array<double, longest_delay_samples + 1> pending_{};  ///< forces on their way, by tick
+    std::array<double, longest_delay_samples + 2> pending_{};  ///< forces on their way, by tick
 };
 
 /// The device of demonstrations, tests and examples, with a hand that sweeps.

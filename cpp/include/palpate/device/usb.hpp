@@ -23,8 +23,8 @@ struct UsbOptions {
     std::string serial;                     ///< empty: the only one there is
     std::chrono::microseconds wait{5'000};  ///< how long an exchange waits for the device's next packet
     std::uint16_t time_to_live_ms = 10;     ///< how long a torque outlives its packet
-    double longest_delay_s = 0.0;           ///< from a sample to its force; 0 = any [s]
-    bool makes_force = true;                ///< else it is listened to: it is never enabled
+    double longest_delay_s = std::numeric_limits<double>::infinity();  ///< from a sample to its force [s]
+    bool makes_force = true;  ///< else it is listened to: it is never enabled
 };
 
 /// What happened on the wire, packets and transfers.
@@ -223,8 +223,9 @@ class UsbDevice {
     }
 
     [[nodiscard]] Nanoseconds longest_delay() const noexcept {
-        return options_.longest_delay_s > 0.0 ? static_cast<Nanoseconds>(1e9 * options_.longest_delay_s)
-                                              : std::numeric_limits<Nanoseconds>::max();
+        return std::isfinite(options_.longest_delay_s)
+                   ? static_cast<Nanoseconds>(1e9 * options_.longest_delay_s)
+                   : std::numeric_limits<Nanoseconds>::max();
     }
 
     [[nodiscard]] static std::string fault_text(std::uint16_t bits) {

@@ -71,7 +71,7 @@ inline constexpr double coupling_time = 0.2e-3;
 /// The stiffest coupling that a device bears whatever stands behind it: b > K_c T / 2 + B_c, and what it becomes
 /// with delay.
 [[nodiscard]] inline double coupling_limit(const DeviceProfile& device) noexcept {
-    const double need = coupling_need({1.0, coupling_time}, device.period_s, device.delay_samples);
+    const double need = coupling_need({1.0, coupling_time}, device.period_s, device.late_samples());
     return device.viscous_damping / (device.period_s * need);
 }
 

@@ -28,7 +28,7 @@ namespace palpate {
 [[nodiscard]] inline bool spring_swings_up(const DeviceProfile& device, double stiffness) {
     constexpr double late_phase = 0.03;  // [rad]
     constexpr double radians = 1000.0;   // of the swing that are watched
-    const double late = (0.5 + device.delay_samples) * device.period_s;
+    const double late = (0.5 + device.delay_s / device.period_s) * device.period_s;
     const double inertia = stiffness * late * late / (late_phase * late_phase);
     const PassiveHand heavy{0.0, 0.0, std::max(0.0, inertia - device.inertia), 0.0};
     const auto ticks = static_cast<std::size_t>(radians / late_phase * late / device.period_s);
@@ -37,7 +37,7 @@ namespace palpate {
 
 /// K <= 2b / ((1 + 2 n_d) T): Colgate and Schenkel 1997, with delay Diolaiti et al. 2006.
 [[nodiscard]] inline double direct_limit(const DeviceProfile& device) noexcept {
-    return 2.0 * device.viscous_damping / ((1.0 + 2.0 * device.delay_samples) * device.period_s);
+    return 2.0 * device.viscous_damping / ((1.0 + 2.0 * device.delay_s / device.period_s) * device.period_s);
 }
 
 /// A limit over the damping of the device, a line for each delay: `limit(device)` says theory, and it is searched
@@ -50,7 +50,7 @@ template <class Limit, class Fails>
         const auto device = [&](double damping) {
             DeviceProfile knob = smooth_knob();
             knob.viscous_damping = damping;
-            knob.delay_samples = delay;
+            knob.delay_s = delay * knob.period_s;
             return knob;
         };
         lines.push_back(failure_line(
@@ -111,7 +111,7 @@ template <class Limit, class Fails>
     FailureMap map{"play", "play radius r [rad]", "loss h [N*m]", {}};
     for (int delay = 0; delay <= 2; ++delay) {
         DeviceProfile device = smooth_knob();
-        device.delay_samples = delay;
+        device.delay_s = delay * device.period_s;
         map.lines.push_back(failure_line(
             "delay " + std::to_string(delay), logarithmic(1e-4, 1e-2, points),
             [&](double radius) { return radius * (direct_limit(device) - spring); },

@@ -22,7 +22,7 @@ namespace palpate {
     const auto device = [](double period, int delay) {
         DeviceProfile knob = smooth_knob();
         knob.period_s = period;
-        knob.delay_samples = delay;
+        knob.delay_s = delay * knob.period_s;
         return knob;
     };
     for (int delay = 0; delay <= 2; ++delay) {

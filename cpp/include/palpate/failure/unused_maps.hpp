@@ -24,7 +24,7 @@ namespace palpate {
     map.searched = 10.0;
     const auto add = [&](const std::string& name, int delay, double damping) {
         DeviceProfile device = smooth_knob();
-        device.delay_samples = delay;
+        device.delay_s = delay * device.period_s;
         const double bound = direct_limit(device);
         map.lines.push_back(failure_line(
             name, logarithmic(1e-5, 1e-1, points), [&](double /*mass*/) { return bound; },

@@ -42,7 +42,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
         return std::nullopt;
     }
     plan.only({"structure", "solver", "network", "coupling", "inertia", "compensated", "play_radius",
-               "refused", "accepted_force_error"});
+               "predict", "refused", "accepted_force_error"});
     Scheme scheme;
     scheme.structure = read_name<StructureKind>(plan["structure"], structure_names);
     if (const JsonField solver = plan["solver"]; !solver.is_null()) {
@@ -64,6 +64,11 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     if (const JsonField radius = plan["play_radius"]; !radius.is_null()) {
         scheme.play_radius = radius.positive();
     }
+    if (const JsonField predict = plan["predict"]; !predict.is_null()) {
+        scheme.predict =
+            static_cast<int>(std::min<std::uint64_t>(predict.count(1), most_prediction_taps + 1));
+        predict.require(scheme.predict <= most_prediction_taps, "<= " + std::to_string(most_prediction_taps));
+    }
     for (const JsonField& sentence : plan["refused"].items()) {
         (void)sentence.words();
     }
@@ -73,7 +78,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
 
 [[nodiscard]] inline DeviceProfile read_device(const JsonField& device) {
     device.only({"id", "position_unit", "period_s", "jitter_s", "inertia", "viscous_damping",
-                 "coulomb_friction", "encoder_step", "force_step", "delay_samples", "force_limit"});
+                 "coulomb_friction", "encoder_step", "force_step", "delay_s", "force_limit"});
     DeviceProfile profile;
     profile.id = device["id"].words();
     profile.position_unit = device["position_unit"].one_of({"rad", "m"});
@@ -84,11 +89,9 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     profile.coulomb_friction = device["coulomb_friction"].not_negative();
     profile.encoder_step = device["encoder_step"].not_negative();
     profile.force_step = device["force_step"].not_negative();
-    const JsonField delay = device["delay_samples"];
-    profile.delay_samples = static_cast<int>(
-        std::min<std::uint64_t>(delay.count(0), static_cast<std::uint64_t>(longest_delay_samples) + 1));
-    delay.require(profile.delay_samples <= longest_delay_samples,
-                  "<= " + std::to_string(longest_delay_samples));
+    profile.delay_s = device["delay_s"].not_negative();
+    device["delay_s"].require(profile.delay_s <= longest_delay_s(profile.period_s),
+                              "at most " + readable(longest_delay_s(profile.period_s)));
     profile.force_limit = device["force_limit"].positive();
     return profile;
 }
@@ -109,17 +112,11 @@ inline void require_given(const JsonField& field, bool used, const char* structu
 }
 
 [[nodiscard]] inline Inequality read_inequality(const JsonField& line) {
-    line.only({"name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source"});
+    line.only({"id", "left", "right"});
     Inequality read;
-    read.name = line["name"].words();
-    read.formula = line["formula"].words();
+    read.id = line["id"].words();
     read.left = line["left"].number();
     read.right = line["right"].number();
-    read.rests_on = read_name<Basis>(line["rests_on"], basis_names);
-    read.source = line["source"].words();
-    read.strict = line["strict"].flag();
-    line["margin"].require(agree(line["margin"].number(), read.margin()), "left - right");
-    line["holds"].require(line["holds"].flag() == read.holds(), "what left and right say");
     return read;
 }
 
@@ -132,11 +129,12 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     if (file.is_null()) {
         return std::nullopt;
     }
-    file.only(
-        {"model", "structure", "device", "bounds", "inequalities", "verdict", "why", "longest_period_s"});
+    file.only({"fingerprint", "model", "structure", "device", "bounds", "inequalities", "verdict",
+               "longest_period_s"});
     file.require(plan.has_value(), "null, because plan is");
     Certificate read;
     read.scheme = *plan;
+    read.fingerprint = file["fingerprint"].words();
     read.model = file["model"].words();
     file["structure"].require(read_name<StructureKind>(file["structure"], structure_names) == plan->structure,
                               "that of the plan");
@@ -149,12 +147,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
         read.inequalities.push_back(read_inequality(line));
     }
     read.verdict = read_name<Verdict>(file["verdict"], verdict_names);
-    read.why = file["why"].words();
     read.longest_period_s = file["longest_period_s"].not_negative();
-    if (const std::string wrong = disagreement(read, model); !wrong.empty()) {
-        throw std::invalid_argument(wrong);
-    }
-    return read;
+    return checked(read, model);
 }
 
 }  // namespace palpate::detail

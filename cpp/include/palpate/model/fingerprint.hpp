@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <bit>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "palpate/model/force_model.hpp"
@@ -28,7 +28,21 @@ class NumberHash {
             add(number);
         }
     }
-    [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
+    void add(std::string_view text) noexcept {
+        add(static_cast<std::uint64_t>(text.size()));
+        for (const char letter : text) {
+            add(static_cast<std::uint64_t>(static_cast<unsigned char>(letter)));
+        }
+    }
+    /// 16 hexadecimal digits.
+    [[nodiscard]] std::string text() const {
+        constexpr std::string_view digits{"0123456789abcdef"};
+        std::string text;
+        for (unsigned digit = 16; digit-- > 0;) {
+            text += digits[(value_ >> (4U * digit)) & 0xFU];
+        }
+        return text;
+    }
 
   private:
     std::uint64_t value_ = 0xCBF29CE484222325U;
@@ -63,12 +77,7 @@ class NumberHash {
     if (model.velocity() != nullptr) {
         hash.add(std::uint64_t{1});  // the second input is the velocity
     }
-    constexpr std::array<char, 17> digits{"0123456789abcdef"};
-    std::string text;
-    for (unsigned digit = 16; digit-- > 0;) {
-        text += digits[(hash.value() >> (4U * digit)) & 0xFU];
-    }
-    return text;
+    return hash.text();
 }
 
 }  // namespace palpate

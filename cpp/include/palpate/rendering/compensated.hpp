@@ -70,9 +70,16 @@ class CompensatedResolvent {
 
     CompensatedResolvent(PiecewiseForce force, double coupling_stiffness, double p,
                          const ResolventOptions& options = {})
-        : factor_{1.0 - p / coupling_stiffness}, felt_{scaled(std::move(force), factor_), p, options} {}
+        : slope_{p},
+          factor_{1.0 - p / coupling_stiffness},
+          felt_{scaled(std::move(force), factor_), p, options} {}
 
     [[nodiscard]] bool tabulated() const noexcept { return felt_.tabulated(); }
+    /// Whether every load line of this slope is certified to have one solution. f rises by the shifted position
+    /// where it does by x: x - f(x)/K_c rises with x.
+    [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && felt_.unique(p); }
+    /// The search for a force of which nothing is certified.
+    [[nodiscard]] LoadLineSolver uncertified() const noexcept { return felt_.uncertified(); }
 
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const Compensated<E>& environment,
@@ -86,6 +93,7 @@ class CompensatedResolvent {
     }
 
   private:
+    double slope_;
     double factor_;
     Resolvent felt_;
 };

@@ -61,7 +61,11 @@ struct Scheme {
     Inertia inertia;
     bool compensated = false;  ///< take the coupling's spring out of the model beforehand
     double play_radius = 0.0;  ///< r of a hysteresis model [m or rad]; 0 = the model's own
+    int predict = 0;           ///< m: samples used to predict the position half a sample ahead; 0 = none
 };
+
+/// Largest number of samples that a prediction uses.
+inline constexpr int most_prediction_taps = 16;
 
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
@@ -83,6 +87,11 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
         require(positive(scheme.inertia.mass), "mass", scheme.inertia.mass, "> 0");
         require(not_negative(scheme.inertia.damping), "damping", scheme.inertia.damping, ">= 0");
     }
+    require(scheme.predict >= 0 && scheme.predict <= most_prediction_taps, "predict", scheme.predict,
+            "0 to 16");
+    detail::require(scheme.predict == 0 || scheme.structure == StructureKind::Direct,
+                    "predict is " + std::to_string(scheme.predict) + ", must be 0 for the structure " +
+                        std::string(name_of(scheme.structure)));
     require(not_negative(scheme.play_radius), "play_radius", scheme.play_radius, ">= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
                     "play_radius is 0, but the model leaves it to the rendering: must be > 0");
@@ -127,8 +136,10 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
 /// Calls `visit` with the structure that the scheme asks for, built over the model's environment. The one place
 /// that prepares a model for the loop: curves become certified polynomials and load lines certified tables, each
 /// where that can be proved, in a few milliseconds.
+/// `force_limit`: of the device [N or N*m]; structures with a state of their own need it inside their solution.
 template <class Visitor>
-auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, Visitor visit) {
+auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s,
+                    [[maybe_unused]] double force_limit, Visitor visit) {
     validate(scheme, given);
     if (const VelocityNetwork* force = given.velocity()) {
         return visit(DirectVelocity{*force, period_s});
@@ -175,7 +186,7 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
 /// where there is none to solve.
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
-    return with_structure(model, scheme, period_s,
+    return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),
                           [&](const auto& structure) -> std::optional<std::string_view> {
                               if constexpr (requires { structure.solver(); }) {
                                   return structure.solver().tabulated() ? "table" : "newton";

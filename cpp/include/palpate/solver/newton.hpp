@@ -66,6 +66,11 @@ struct LoadLineSolver {
     /// Whether every load line of this slope is certified to have one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p + least_slope > 0.0; }
 
+    /// The same search for a force of which nothing is certified.
+    [[nodiscard]] LoadLineSolver uncertified() const noexcept {
+        return {.max_evaluations = max_evaluations, .tolerance = tolerance, .longest_step = longest_step};
+    }
+
     /// Solves from where the last step predicts the solution, and leaves to the next what it may start from. A
     /// step that is not finite leaves the memory as it was.
     template <Environment E>

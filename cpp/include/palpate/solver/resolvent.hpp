@@ -131,6 +131,10 @@ class Resolvent {
     /// Those of one turn, from left to right. The first is none: it stands for not knowing.
     [[nodiscard]] const std::vector<Branch>& branches() const noexcept { return branches_; }
     [[nodiscard]] const LoadLineSolver& solver() const noexcept { return solver_; }
+    /// Whether every load line of this slope is certified to have one solution.
+    [[nodiscard]] bool unique(double p) const noexcept { return solver_.unique(p); }
+    /// The search for a force of which nothing is certified.
+    [[nodiscard]] LoadLineSolver uncertified() const noexcept { return solver_.uncertified(); }
 
     /// Inlined, so that a step pays for what it uses of the answer.
     template <Environment E>

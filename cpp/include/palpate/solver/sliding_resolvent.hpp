@@ -48,6 +48,10 @@ class SlidingResolvent {
     [[nodiscard]] bool tabulated() const noexcept {
         return unique_ && press_.tabulated() && release_.tabulated();
     }
+    /// Whether every load line of this slope is certified to have one solution.
+    [[nodiscard]] bool unique(double p) const noexcept { return stick_.unique(p); }
+    /// The search for a force of which nothing is certified.
+    [[nodiscard]] LoadLineSolver uncertified() const noexcept { return stick_.uncertified(); }
     [[nodiscard]] std::size_t cells() const noexcept { return press_.cells() + release_.cells(); }
     [[nodiscard]] double position_error() const noexcept {
         return std::max(press_.position_error(), release_.position_error());

@@ -30,8 +30,7 @@ enum class Verdict : std::uint8_t {
     Refused,
 };
 
-inline constexpr std::array<std::string_view, 3> verdict_names{
-    "certified", "stable (local), passivity not certified", "refused"};
+inline constexpr std::array<std::string_view, 3> verdict_names{"certified", "stable-locally", "refused"};
 
 [[nodiscard]] constexpr std::string_view name_of(Verdict verdict) noexcept {
     return verdict_names[static_cast<std::size_t>(verdict)];
@@ -47,9 +46,49 @@ struct Certificate {
     Verdict verdict = Verdict::Refused;
     std::string why;                ///< one sentence
     double longest_period_s = 0.0;  ///< up to which all inequalities hold; 0 where they do not
+    std::string fingerprint;        ///< of every number and name above, as `fingerprint_of` computes it
 
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
 };
+
+/// 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of the
+/// device, bounds, sides of each line, verdict. Detects a certificate that was edited; it is no signature.
+[[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
+    detail::NumberHash hash;
+    hash.add(certificate.model);
+    const Scheme& scheme = certificate.scheme;
+    hash.add(static_cast<std::uint64_t>(scheme.structure));
+    const bool coupled = scheme.structure != StructureKind::Direct;
+    const bool heavy = has_mass(scheme.structure);
+    for (const double number :
+         {coupled ? scheme.coupling.stiffness : 0.0, coupled ? scheme.coupling.damping : 0.0,
+          heavy ? scheme.inertia.mass : 0.0, heavy ? scheme.inertia.damping : 0.0,
+          scheme.compensated ? 1.0 : 0.0, scheme.play_radius, static_cast<double>(scheme.predict)}) {
+        hash.add(number);
+    }
+    const DeviceProfile& device = certificate.device;
+    hash.add(device.id);
+    hash.add(device.position_unit);
+    for (const double number :
+         {device.period_s, device.inertia, device.viscous_damping, device.coulomb_friction,
+          device.encoder_step, device.force_step, device.delay_s, device.force_limit, device.jitter_s}) {
+        hash.add(number);
+    }
+    const ForceBounds& bounds = certificate.bounds;
+    for (const double number :
+         {bounds.slope.lower, bounds.slope.upper, bounds.steepest, bounds.sliding, bounds.loss.lower,
+          bounds.loss.upper, bounds.loss_per_play, bounds.mean_force, bounds.drag}) {
+        hash.add(number);
+    }
+    for (const Inequality& line : certificate.inequalities) {
+        hash.add(line.id);
+        hash.add(line.left);
+        hash.add(line.right);
+    }
+    hash.add(static_cast<std::uint64_t>(certificate.verdict));
+    hash.add(certificate.longest_period_s);
+    return hash.text();
+}
 
 namespace detail {
 
@@ -81,8 +120,8 @@ namespace detail {
     }
     std::vector<Inequality> lines = detail::inequalities_behind_a_coupling(bounds, scheme, device);
     if (bounds.drag > 0.0) {
-        lines.push_back({"force of velocity behind a coupling", "B_v = 0", 0.0, bounds.drag, Basis::None,
-                         "docs/certificate.md"});
+        lines.push_back({"velocity-coupling", "force of velocity behind a coupling", "B_v = 0", 0.0,
+                         bounds.drag, Basis::None, "docs/certificate.md"});
     }
     return lines;
 }
@@ -143,7 +182,7 @@ namespace detail {
 /// What is proved of any rendered force within bounds. Wider bounds never prove more.
 [[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
                                                   const DeviceProfile& device) {
-    Certificate certificate{scheme, device, "", bounds, {}, Verdict::Refused, "", 0.0};
+    Certificate certificate{scheme, device, "", bounds, {}, Verdict::Refused, "", 0.0, ""};
     std::vector<Inequality> lines = inequalities_of(certificate.bounds, scheme, device);
     const auto all = [&](const auto& condition) {
         return std::all_of(lines.begin(), lines.end(), condition);
@@ -160,6 +199,7 @@ namespace detail {
     }
     certificate.why = detail::reason(lines, certificate.verdict);
     certificate.inequalities = std::move(lines);
+    certificate.fingerprint = fingerprint_of(certificate);
     return certificate;
 }
 
@@ -177,6 +217,7 @@ namespace detail {
     validate(scheme, model);
     Certificate certificate = certify(force_bounds(model, scheme.play_radius), scheme, device);
     certificate.model = fingerprint(model);
+    certificate.fingerprint = fingerprint_of(certificate);
     return certificate;
 }
 

@@ -56,22 +56,14 @@ namespace detail {
 
 [[nodiscard]] inline std::string line_disagrees(const std::string& path, const Inequality& stored,
                                                 const Inequality& now) {
-    if (stored.name != now.name) {
-        return "certificate." + path + ".name is \"" + stored.name + "\": must be \"" + now.name + "\"";
+    if (stored.id != now.id) {
+        return "certificate." + path + ".id is \"" + stored.id + "\": must be \"" + now.id + "\"";
     }
     if (!agree(stored.left, now.left)) {
         return disagrees(path + ".left", stored.left, now.left);
     }
     if (!agree(stored.right, now.right)) {
         return disagrees(path + ".right", stored.right, now.right);
-    }
-    if (stored.rests_on != now.rests_on) {
-        return "certificate." + path + ".rests_on is \"" + std::string(name_of(stored.rests_on)) +
-               "\": must be \"" + std::string(name_of(now.rests_on)) + "\"";
-    }
-    if (stored.strict != now.strict) {
-        return "certificate." + path + ".strict is " + (stored.strict ? "true" : "false") + ": must be " +
-               (now.strict ? "true" : "false");
     }
     return "";
 }
@@ -96,7 +88,7 @@ namespace detail {
           {"coulomb_friction", certified.coulomb_friction, device.coulomb_friction},
           {"encoder_step", certified.encoder_step, device.encoder_step},
           {"force_step", certified.force_step, device.force_step},
-          {"delay_samples", double(certified.delay_samples), double(device.delay_samples)},
+          {"delay_s", certified.delay_s, device.delay_s},
           {"force_limit", certified.force_limit, device.force_limit}}) {
         if (!agree(before, now)) {
             return opening + " with " + name + " = " + readable(before) + ", and here it is " +
@@ -106,13 +98,14 @@ namespace detail {
     return "";
 }
 
-/// The first thing in a stored certificate that is not what the model gives, as a sentence that begins with its
-/// field; empty where everything agrees. Nothing that is stored is believed: bounds are computed again and must not
-/// be wider than those that are stored, and from these every line, the verdict and the period follow anew.
-[[nodiscard]] inline std::string disagreement(const Certificate& stored, const ForceModel& model) {
+/// Computes a stored certificate again and returns the result, with its texts. The stored sides, verdict and period
+/// must follow from the stored bounds. The stored bounds must be no narrower than the bounds computed from the model.
+/// Throws std::invalid_argument with the first field that differs, its value and the right one.
+[[nodiscard]] inline Certificate checked(const Certificate& stored, const ForceModel& model) {
+    const auto require = [](const std::string& wrong) { detail::require(wrong.empty(), wrong); };
     if (const std::string now = fingerprint(model); stored.model != now) {
-        return "certificate.model is \"" + stored.model + "\": must be \"" + now +
-               "\", that of this network; it was changed after it was certified, plan it again";
+        require("certificate.model is \"" + stored.model + "\": must be \"" + now +
+                "\", that of this network; it was changed after it was certified, plan it again");
     }
     ForceBounds bounds;
     try {
@@ -120,35 +113,32 @@ namespace detail {
         validate(stored.scheme, model);
         bounds = rendered_bounds(force_bounds(model, stored.scheme.play_radius), stored.scheme);
     } catch (const std::invalid_argument& error) {
-        return std::string("certificate is of an impossible plan: ") + error.what();
+        require(std::string("certificate is of an impossible plan: ") + error.what());
     }
-    if (std::string wrong = detail::tighter_than_true(stored.bounds, bounds); !wrong.empty()) {
-        return wrong;
-    }
-    const Certificate now = certify_rendered(stored.bounds, stored.scheme, stored.device);
-    if (now.verdict == Verdict::Refused) {
-        return "certificate.verdict is \"" + std::string(name_of(stored.verdict)) +
-               "\": must be \"refused\", " + now.why;
-    }
-    if (stored.verdict != now.verdict) {
-        return "certificate.verdict is \"" + std::string(name_of(stored.verdict)) + "\": must be \"" +
-               std::string(name_of(now.verdict)) + "\"";
+    require(detail::tighter_than_true(stored.bounds, bounds));
+    Certificate now = certify_rendered(stored.bounds, stored.scheme, stored.device);
+    if (stored.verdict != now.verdict || now.verdict == Verdict::Refused) {
+        require("certificate.verdict is \"" + std::string(name_of(stored.verdict)) + "\": must be \"" +
+                std::string(name_of(now.verdict)) + "\", " + now.why);
     }
     if (stored.inequalities.size() != now.inequalities.size()) {
-        return "certificate.inequalities has " + std::to_string(stored.inequalities.size()) +
-               " lines: must have " + std::to_string(now.inequalities.size());
+        require("certificate.inequalities has " + std::to_string(stored.inequalities.size()) +
+                " lines: must have " + std::to_string(now.inequalities.size()));
     }
     for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
         const std::string path = "inequalities[" + std::to_string(k) + "]";
-        if (std::string wrong = detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]);
-            !wrong.empty()) {
-            return wrong;
-        }
+        require(detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]));
     }
     if (!agree(stored.longest_period_s, now.longest_period_s)) {
-        return detail::disagrees("longest_period_s", stored.longest_period_s, now.longest_period_s);
+        require(detail::disagrees("longest_period_s", stored.longest_period_s, now.longest_period_s));
     }
-    return "";
+    if (const std::string right = fingerprint_of(stored); stored.fingerprint != right) {
+        require("certificate.fingerprint is \"" + stored.fingerprint + "\": must be \"" + right +
+                "\"; the certificate was edited, plan it again");
+    }
+    now.model = stored.model;
+    now.fingerprint = stored.fingerprint;
+    return now;
 }
 
 }  // namespace palpate

@@ -21,9 +21,10 @@ namespace detail {
 /// What holds for every passive object behind a coupling.
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, const DeviceProfile& device) {
     const double need =
-        device.longest_period_s() * coupling_need(coupling, device.period_s, device.delay_samples);
-    if (device.delay_samples == 0) {
-        return {"viscous damping against the held coupling",
+        device.longest_period_s() * coupling_need(coupling, device.period_s, device.late_samples());
+    if (device.late_samples() == 0) {
+        return {"damping-coupling",
+                "viscous damping against the held coupling",
                 "b > K_c T / 2 + B_c",
                 device.viscous_damping,
                 need,
@@ -31,7 +32,8 @@ namespace detail {
                 "Colgate, Stanley and Brown 1995; docs/certificate.md",
                 true};
     }
-    return {"viscous damping against the held, late coupling",
+    return {"damping-coupling",
+            "viscous damping against the held, late coupling",
             "b >= T max sin^2((n_d + 1) theta / 2) (A^2 + K_c^2 / 4 cot^2(theta / 2)) / A",
             device.viscous_damping,
             need,
@@ -40,42 +42,45 @@ namespace detail {
 }
 
 /// A line that says that nothing is known beyond it.
-[[nodiscard]] inline Inequality unknown(const char* name, const char* formula, double value) {
-    return {name, formula, 0.0, value, Basis::None, "no bound is known"};
+[[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double value) {
+    return {id, name, formula, 0.0, value, Basis::None, "no bound is known"};
 }
 
 /// What the proof of a coupled structure asks of an object whose force falls: `room` is how steeply it may.
 inline void add_falling(std::vector<Inequality>& lines, const ForceBounds& bounds,
                         const DeviceProfile& device, double room, const char* formula) {
-    lines.push_back({"falling force behind the coupling", formula, room, bounds.falling(), Basis::Proved,
-                     "docs/certificate.md"});
-    if (device.delay_samples > 0) {
-        lines.push_back(unknown("a force that falls, with delay", "known for s_ = 0 only", bounds.falling()));
+    lines.push_back({"falling-slope-coupling", "falling force behind the coupling", formula, room,
+                     bounds.falling(), Basis::Proved, "docs/certificate.md"});
+    if (device.late_samples() > 0) {
+        lines.push_back(unknown("falling-slope-delay", "a force that falls, with delay",
+                                "known for s_ = 0 only", bounds.falling()));
     }
 }
 
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
-        lines.push_back({"loss that never generates", "min h >= 0", bounds.loss.lower, 0.0, Basis::Proved,
-                         "docs/certificate.md"});
+        lines.push_back({"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower,
+                         0.0, Basis::Proved, "docs/certificate.md"});
     }
 }
 
 /// Behind a coupling no bound is known for what encoder steps do to a mass, or to a play.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name) {
-    lines.push_back(
-        unknown(name, "known for an encoder without steps, Delta = 0, only", device.encoder_step));
+    lines.push_back(unknown("encoder-step-coupling", name,
+                            "known for an encoder without steps, Delta = 0, only", device.encoder_step));
     DeviceProfile smooth = device;
     smooth.encoder_step = 0.0;
     Inequality friction = friction_inequality(smooth, 0.0, bounds.mean_force, "0");
+    friction.id = "friction-force-step";
     friction.name = "Coulomb friction against force steps";
     lines.push_back(friction);
 }
 
 /// p + min f' > 0: the load line has one solution.
 [[nodiscard]] inline Inequality uniqueness(double p, double falling, const char* formula) {
-    return {"one solution of the load line", formula, p, falling, Basis::Proved, "docs/certificate.md", true};
+    return {"unique-solution", "one solution of the load line", formula, p, falling,
+            Basis::Proved,     "docs/certificate.md",           true};
 }
 
 /// gamma: what an error of the encoder can become of in the force of a massless object.

@@ -23,17 +23,18 @@ namespace palpate {
     const char* const poles = "poles of the linearised step; docs/certificate.md";
     const Interval slopes{bounds.slope.lower, bounds.slope.upper};
     return {
-        {"slope below the step's limit", "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c",
+        {"explicit-slope", "slope below the step's limit", "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c",
          (4.0 * inertia.mass - 2.0 * damping * T) / (T * T), slopes.upper + coupling.stiffness, Basis::Linear,
          poles, true},
-        {"damping that the step can follow", "2 m > (B_o + B_c) T", 2.0 * inertia.mass, damping * T,
+        {"explicit-damping", "damping that the step can follow", "2 m > (B_o + B_c) T", 2.0 * inertia.mass,
+         damping * T, Basis::Linear, poles, true},
+        {"explicit-damping-positive", "damping inside the unit circle", "B_o + B_c > 0", damping, 0.0,
          Basis::Linear, poles, true},
-        {"damping inside the unit circle", "B_o + B_c > 0", damping, 0.0, Basis::Linear, poles, true},
-        {"falling force behind the coupling", "K_c > s_", coupling.stiffness, bounds.falling(), Basis::Linear,
-         poles, true},
-        {"viscous damping of the linearised port", "b >= max T Re{(1 - 1/z) H} / (2 - 2 cos theta)",
-         device.viscous_damping,
-         device.longest_period_s() / T * explicit_need(slopes, inertia, coupling, T, device.delay_samples),
+        {"explicit-falling-slope", "falling force behind the coupling", "K_c > s_", coupling.stiffness,
+         bounds.falling(), Basis::Linear, poles, true},
+        {"explicit-port-damping", "viscous damping of the linearised port",
+         "b >= max T Re{(1 - 1/z) H} / (2 - 2 cos theta)", device.viscous_damping,
+         device.longest_period_s() / T * explicit_need(slopes, inertia, coupling, T, device.late_samples()),
          Basis::Linear, "Colgate and Schenkel 1997, linearised; docs/certificate.md"}};
 }
 

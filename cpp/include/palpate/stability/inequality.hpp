@@ -27,7 +27,8 @@ inline constexpr std::array<std::string_view, 3> basis_names{"proved", "linear",
 
 /// One line of a certificate: left >= right, or left > right where it is strict.
 struct Inequality {
-    std::string name;     ///< what it is about, in words
+    std::string id;       ///< stable name, compared when a certificate is checked; texts are not
+    std::string name;     ///< subject in words
     std::string formula;  ///< in the symbols of docs/certificate.md
     double left = 0.0;    ///< what there is
     double right = 0.0;   ///< what is needed

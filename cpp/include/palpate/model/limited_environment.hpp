@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "palpate/model/environment.hpp"
+
+namespace palpate {
+
+/// An environment with its force limited to +-`force_limit`: c(f(x)), c(u) = clip(u, +-F_max).
+///
+/// Where the limit acts the slope is 0. The energy is NaN: the integral of the limited force has no closed form.
+template <Environment E>
+class LimitedEnvironment {
+  public:
+    using State = typename E::State;
+
+    LimitedEnvironment(E environment, double force_limit)
+        : environment_{std::move(environment)}, force_limit_{force_limit} {}
+
+    [[nodiscard]] const E& unlimited() const noexcept { return environment_; }
+    [[nodiscard]] double force_limit() const noexcept { return force_limit_; }
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        const EnvironmentSample sample = environment_.at(x, state);
+        const double force = std::clamp(sample.force, -force_limit_, force_limit_);
+        return {force, force == sample.force ? sample.slope : 0.0, std::numeric_limits<double>::quiet_NaN(),
+                sample.extrapolated};
+    }
+    void advance(double x, State& state) const noexcept { environment_.advance(x, state); }
+    [[nodiscard]] State start(double x) const noexcept { return environment_.start(x); }
+
+  private:
+    E environment_;
+    double force_limit_;
+};
+
+}  // namespace palpate

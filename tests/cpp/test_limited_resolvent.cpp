@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/solver/limited_resolvent.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/hysteresis.hpp"
+#include "palpate/model/network.hpp"
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "palpate/solver/resolvent.hpp"
+#include "palpate/solver/sliding_resolvent.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::cases;
+using test::Random;
+using test::uniform;
+
+/// The one root of c(f(y)) + p y = q by bisection.
+template <class E>
+double bisected(const LimitedEnvironment<E>& object, const typename E::State& state, LoadLine line) {
+    double low = (line.intercept - object.force_limit()) / line.slope;
+    double high = (line.intercept + object.force_limit()) / line.slope;
+    for (int k = 0; k < 100; ++k) {
+        const double middle = 0.5 * (low + high);
+        (object.at(middle, state).force + line.slope * middle < line.intercept ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+/// A motion of random jumps; counts the steps at which the limit acts.
+template <class E, class Solver>
+int expect_the_bisected_root(Random& random, const LimitedEnvironment<E>& object,
+                             const LimitedResolvent<Solver>& solver, double p) {
+    auto state = object.start(0.5);
+    typename LimitedResolvent<Solver>::Memory memory{0.5};
+    int limited = 0;
+    for (int k = 0; k < 300; ++k) {
+        const LoadLine line{p, uniform(random, -0.5, 1.5) * p};
+        const Solution solution = solver.solve(object, state, line, memory);
+        EXPECT_EQ(solution.status, Status::Ok) << k;
+        EXPECT_NEAR(solution.position, bisected(object, state, line), 5e-12 + 1e-12 * p) << k;
+        EXPECT_LE(std::abs(solution.environment.force), object.force_limit());
+        EXPECT_NEAR(solution.environment.force, line.intercept - p * solution.position,
+                    1e-11 * (1.0 + p) * (1.0 + std::abs(solution.position)));
+        EXPECT_EQ(solution.environment.extrapolated, object.at(solution.position, state).extrapolated);
+        limited += std::abs(solution.environment.force) == object.force_limit() ? 1 : 0;
+        object.advance(solution.position, state);
+    }
+    return limited;
+}
+
+TEST(LimitedEnvironment, ClipsTheForceAndItsSlope) {
+    const LimitedEnvironment object{test::Spring{40.0}, 2.0};
+    EXPECT_EQ(object.at(0.04, {}).force, 1.6);
+    EXPECT_EQ(object.at(0.04, {}).slope, 40.0);
+    EXPECT_EQ(object.at(0.06, {}).force, 2.0);
+    EXPECT_EQ(object.at(0.06, {}).slope, 0.0);
+    EXPECT_EQ(object.at(-1.0, {}).force, -2.0);
+    EXPECT_TRUE(std::isnan(object.at(std::nan(""), {}).force));
+}
+
+TEST(LimitedResolvent, FindsTheOneRootOfALimitedNetwork) {
+    Random random{81};
+    int limited = 0;
+    for (int k = 0; k < cases(30); ++k) {
+        const WaveletNetwork network{test::random_network(random, static_cast<std::size_t>(1 + k % 12)),
+                                     test::unit_domain(Continuation::Free)};
+        const Interval force = network.curve().value_bounds();
+        const double p = (4.0 * force.largest() - network.curve().slope_bounds().lower) *
+                         std::exp(uniform(random, 0.0, 2.0));
+        const CompiledNetwork compiled{network};
+        const LimitedEnvironment object{compiled, uniform(random, 0.2, 0.8) * force.largest()};
+        const LimitedResolvent solver{Resolvent{network.curve(), p}};
+        ASSERT_TRUE(solver.unlimited().unique(p));
+        limited += expect_the_bisected_root(random, object, solver, p);
+    }
+    EXPECT_GT(limited, cases(30) * 30);
+    EXPECT_LT(limited, cases(30) * 270);
+}
+
+TEST(LimitedResolvent, FindsTheOneRootOfALimitedHysteresis) {
+    Random random{82};
+    int limited = 0;
+    for (int k = 0; k < cases(30); ++k) {
+        const NetworkParameters parameters = test::random_network(random, 6);
+        const LossParameters loss{std::vector<double>(6, 0.02), 0.0, 0.5};
+        const HysteresisNetwork pair{parameters, loss, test::unit_domain(), 0.02};
+        const Interval force = pair.force().value_bounds();
+        const double p = (4.0 * force.largest() - pair.force().slope_bounds().lower + 25.0) *
+                         std::exp(uniform(random, 0.0, 2.0));
+        const LimitedEnvironment object{CompiledHysteresis{pair},
+                                        uniform(random, 0.2, 0.8) * force.largest()};
+        const LimitedResolvent solver{SlidingResolvent{pair, p}};
+        ASSERT_TRUE(solver.unlimited().unique(p));
+        limited += expect_the_bisected_root(random, object, solver, p);
+    }
+    EXPECT_GT(limited, cases(30) * 30);
+    EXPECT_LT(limited, cases(30) * 270);
+}
+
+TEST(LimitedResolvent, SolvesACompensatedEnvironment) {
+    Random random{83};
+    const WaveletNetwork network{test::random_network(random, 7), test::unit_domain()};
+    const double stiffness = 1.3 * network.curve().slope_bounds().largest();
+    const double p = 1.4 * stiffness;
+    const LimitedEnvironment object{Compensated{CompiledNetwork{network}, stiffness},
+                                    0.5 * network.curve().value_bounds().largest()};
+    const LimitedResolvent solver{CompensatedResolvent{piecewise(network.curve()), stiffness, p}};
+    ASSERT_TRUE(solver.unlimited().unique(p));
+    EXPECT_GT(expect_the_bisected_root(random, object, solver, p), 30);
+}
+
+TEST(LimitedResolvent, FindsARootWhereTheLoadLineIsNotUnique) {
+    Random random{84};
+    int falling = 0;
+    for (int k = 0; k < cases(30); ++k) {
+        const WaveletNetwork network{test::random_network(random, 6), test::unit_domain()};
+        const double p = -0.6 * network.curve().slope_bounds().lower;
+        if (!(p > 0.0)) {
+            continue;
+        }
+        ++falling;
+        const double largest = network.curve().value_bounds().largest();
+        const LimitedEnvironment object{network, uniform(random, 0.3, 0.9) * largest};
+        const LimitedResolvent solver{Resolvent{network.curve(), p}};
+        LimitedResolvent<Resolvent>::Memory memory{0.5};
+        double q = object.at(0.5, {}).force + 0.5 * p;
+        for (int j = 0; j < 300; ++j) {
+            q += uniform(random, -0.05, 0.05) * p;
+            const Solution solution = solver.solve(object, {}, {p, q}, memory);
+            ASSERT_EQ(solution.status, Status::Ok) << k << " " << j;
+            ASSERT_NEAR(object.at(solution.position, {}).force + p * solution.position, q, 1e-9 * (1.0 + p));
+        }
+    }
+    EXPECT_GT(falling, cases(30) / 2);
+}
+
+TEST(LimitedResolvent, NeverExceedsTheLimitBehindAMasslessCoupling) {
+    // A spring of 200 N/m behind 300 N/m and 0.05 N s/m, limited to 2 N.
+    const LimitedEnvironment object{test::Spring{200.0}, 2.0};
+    const VirtualCoupling coupling{300.0, 0.05};
+    LoadLineSolver spring;
+    spring.least_slope = 200.0;
+    Massless structure{object, coupling, 1e-3, LimitedResolvent{spring}};
+    structure.reset(0.0);
+    double last_position = 0.0;
+    double last_device = 0.0;
+    int limited = 0;
+    for (int k = 1; k < 2000; ++k) {
+        const double device = 0.05 * std::sin(0.01 * k);
+        const Rendered rendered = structure.step(device);
+        ASSERT_EQ(rendered.status, Status::Ok);
+        const double y = rendered.environment_position;
+        ASSERT_LE(std::abs(rendered.force), 2.0);
+        ASSERT_NEAR(rendered.force, std::clamp(200.0 * y, -2.0, 2.0), 1e-9);
+        ASSERT_NEAR(rendered.force,
+                    coupling.force(device - y, ((device - last_device) - (y - last_position)) / 1e-3), 1e-9);
+        limited += std::abs(rendered.force) == 2.0 ? 1 : 0;
+        last_position = y;
+        last_device = device;
+    }
+    EXPECT_GT(limited, 500);
+}
+
+TEST(LimitedResolvent, RefusesALoadLineThatIsNotFinite) {
+    Random random{85};
+    const WaveletNetwork network{test::random_network(random, 5), test::unit_domain()};
+    const LimitedEnvironment object{network, 1.0};
+    const LimitedResolvent solver{Resolvent{network.curve(), 2000.0}};
+    LimitedResolvent<Resolvent>::Memory memory{0.5};
+    for (const double q : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+        EXPECT_EQ(solver.solve(object, {}, {2000.0, q}, memory).status, Status::NonFinite);
+    }
+    EXPECT_EQ(solver.solve(object, {}, {2000.0, 1000.0}, memory).status, Status::Ok);
+}
+
+}  // namespace
+}  // namespace palpate
