@@ -10,6 +10,7 @@
 
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/stability/limited_mean.hpp"
 
 namespace palpate {
 
@@ -22,8 +23,10 @@ struct ForceBounds {
     double sliding = 0.0;        ///< max |f'|, or max(|g'| + |h'|); of all velocities
     Interval loss;               ///< h; 0 without hysteresis
     double loss_per_play = 0.0;  ///< max h/r
-    double mean_force = 0.0;     ///< |mean| over a period; what is left of it makes a motor
+    double mean_force = 0.0;     ///< what the limited force pushes on average over a period, beyond its loss
     double drag = 0.0;           ///< B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone
+    double loss_slope = 0.0;     ///< max |h'|
+    double play_radius = 0.0;    ///< r; 0 without hysteresis
 
     /// M = max(0, max f'); NaN stays NaN
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
@@ -34,7 +37,8 @@ struct ForceBounds {
     [[nodiscard]] bool finite() const noexcept {
         return std::isfinite(slope.lower) && std::isfinite(slope.upper) && std::isfinite(steepest) &&
                std::isfinite(sliding) && std::isfinite(loss.lower) && std::isfinite(loss.upper) &&
-               std::isfinite(loss_per_play) && std::isfinite(mean_force) && std::isfinite(drag);
+               std::isfinite(loss_per_play) && std::isfinite(loss_slope) && std::isfinite(play_radius) &&
+               std::isfinite(mean_force) && std::isfinite(drag);
     }
 };
 
@@ -106,23 +110,7 @@ struct SlopeReading {
     return bounds;
 }
 
-/// |mean| over a period; what rounding alone can have left counts as none.
-[[nodiscard]] inline double mean_over_period(const NetworkCurve& curve) noexcept {
-    if (!curve.periodic()) {
-        return 0.0;
-    }
-    const NetworkParameters& network = curve.parameters();
-    const double reach = std::max(std::abs(curve.lower()), std::abs(curve.upper()));
-    double size = std::abs(network.bias) + std::abs(network.linear[0]) * reach;
-    for (const double weight : network.weight) {
-        size += std::abs(weight);
-    }
-    const double turn = curve.inside(curve.upper()).integral - curve.inside(curve.lower()).integral;
-    const double mean = std::abs(turn / (curve.upper() - curve.lower()));
-    return mean <= 1e-12 * size * std::max(1.0, reach / (curve.upper() - curve.lower())) ? 0.0 : mean;
-}
-
-[[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve) {
+[[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve, double force_limit) {
     ForceBounds bounds;
     bounds.slope = slope_bounds(curve.parameters(), curve.lower(), curve.upper(), slope_slack);
     if (!curve.periodic()) {
@@ -133,11 +121,12 @@ struct SlopeReading {
         }
     }
     bounds.steepest = bounds.sliding = bounds.slope.largest();
-    bounds.mean_force = mean_over_period(curve);
+    bounds.mean_force = mean_push(PeriodicStrokes{curve, nullptr, bounds.sliding}, force_limit);
     return bounds;
 }
 
-[[nodiscard]] inline ForceBounds hysteresis_bounds(const HysteresisNetwork& pair, double radius) {
+[[nodiscard]] inline ForceBounds hysteresis_bounds(const HysteresisNetwork& pair, double radius,
+                                                   double force_limit) {
     const NetworkCurve& g = pair.force();
     const NetworkCurve& h = pair.loss();
     const auto over_domain = [&](double a, double b, double c) {
@@ -157,6 +146,8 @@ struct SlopeReading {
         bounds.steepest = std::max({bounds.steepest, slide.largest(), rising_stick, falling_stick});
     }
     bounds.loss = loss_bounds(h.parameters(), g.lower(), g.upper());
+    bounds.loss_slope = over_domain(0.0, 1.0, 0.0).largest();
+    bounds.play_radius = radius;
     if (!g.periodic()) {
         for (const auto& [line, loss] : {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
             const Interval slopes = line_slopes(line);
@@ -171,10 +162,11 @@ struct SlopeReading {
                             std::max(bounds.slope.upper, slopes.upper + loss_slope + stick + rounding)};
             bounds.sliding = std::max(bounds.sliding, slide);
             bounds.steepest = std::max(bounds.steepest, slide + stick);
+            bounds.loss_slope = std::max(bounds.loss_slope, loss_slope);
         }
     }
     bounds.loss_per_play = std::max(0.0, bounds.loss.upper) / radius;
-    bounds.mean_force = mean_over_period(g);
+    bounds.mean_force = mean_push(PeriodicStrokes{g, &h, bounds.sliding}, force_limit);
     return bounds;
 }
 
@@ -195,18 +187,36 @@ struct SlopeReading {
 
 }  // namespace detail
 
-/// The bounds of a model of one position, or of position and velocity; `play_radius` in place of the model's own
-/// where it is above 0. Throws std::invalid_argument for other models of several inputs.
-[[nodiscard]] inline ForceBounds force_bounds(const ForceModel& model, double play_radius = 0.0) {
+/// Bounds of a model of one position, or of position and velocity, on a device that limits its force to
+/// `force_limit`; `play_radius` in place of the model's own where it is above 0. Throws std::invalid_argument for
+/// other models of several inputs.
+[[nodiscard]] inline ForceBounds force_bounds(const ForceModel& model, double play_radius = 0.0,
+                                              double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);
     if (const VelocityNetwork* force = model.velocity()) {
         return detail::velocity_bounds(*force);
     }
     if (const WaveletNetwork* network = model.network()) {
-        return detail::static_bounds(network->curve());
+        return detail::static_bounds(network->curve(), force_limit);
     }
     const HysteresisNetwork& pair = *model.hysteresis();
-    return detail::hysteresis_bounds(pair, play_radius > 0.0 ? play_radius : pair.play_radius());
+    return detail::hysteresis_bounds(pair, play_radius > 0.0 ? play_radius : pair.play_radius(), force_limit);
+}
+
+/// The shift of a force that repeats with which it does not push on average on a device that limits it; 0 for
+/// other models. Add it to the bias of the network.
+[[nodiscard]] inline double balancing_shift(const ForceModel& model, double force_limit) {
+    if (const WaveletNetwork* network = model.network()) {
+        const NetworkCurve& f = network->curve();
+        const Interval slope = slope_bounds(f.parameters(), f.lower(), f.upper(), detail::slope_slack);
+        return detail::balancing_shift({f, nullptr, slope.largest()}, force_limit);
+    }
+    if (const HysteresisNetwork* pair = model.hysteresis()) {
+        const double wide = pair->force().upper() - pair->force().lower();
+        const double sliding = detail::hysteresis_bounds(*pair, wide, force_limit).sliding;
+        return detail::balancing_shift({pair->force(), &pair->loss(), sliding}, force_limit);
+    }
+    return 0.0;
 }
 
 }  // namespace palpate

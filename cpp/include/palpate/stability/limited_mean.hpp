@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "palpate/model/bounds.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/model/network_curve.hpp"
+
+namespace palpate {
+
+namespace detail {
+
+/// The strokes g + h and g - h of a model that repeats; h is null without hysteresis.
+struct PeriodicStrokes {
+    const NetworkCurve& g;
+    const NetworkCurve* h = nullptr;
+    double steepest = 0.0;  ///< proved bound of |g'| + |h'|
+
+    /// Value and antiderivative of g + side h + shift.
+    [[nodiscard]] std::pair<double, double> at(double x, double side, double shift) const noexcept {
+        const Curve force = g.inside(x);
+        const Curve loss = h != nullptr ? h->inside(x) : Curve{};
+        return {force.value + side * loss.value + shift, force.integral + side * loss.integral + shift * x};
+    }
+
+    /// What rounding alone can make of a mean.
+    [[nodiscard]] double rounding() const noexcept {
+        const double reach = std::max(std::abs(g.lower()), std::abs(g.upper()));
+        const auto size = [&](const NetworkParameters& network) {
+            double sum = std::abs(network.bias) + std::abs(network.linear[0]) * reach;
+            for (const double weight : network.weight) {
+                sum += std::abs(weight);
+            }
+            return sum;
+        };
+        const double all = size(g.parameters()) + (h != nullptr ? size(h->parameters()) : 0.0);
+        return 1e-12 * all * std::max(1.0, reach / (g.upper() - g.lower()));
+    }
+};
+
+/// Proved bounds of the mean over a period of c(g + side h + shift), where c limits a force to +-limit. Cells in
+/// which the limit is certainly reached, or certainly not, are integrated exactly. Others are halved until what
+/// they can hide is below rounding: in a cell of width w that is at most L w^2 / 4.
+[[nodiscard]] inline Interval limited_mean(const PeriodicStrokes& strokes, double side, double shift,
+                                           double limit) {
+    constexpr std::size_t first_cells = 256;
+    constexpr std::size_t most_cells = 100'000;
+    constexpr int most_halvings = 40;
+    const double lower = strokes.g.lower();
+    const double period = strokes.g.upper() - lower;
+    const auto at = [&](double x) { return strokes.at(x, side, shift); };
+    const double whole = at(strokes.g.upper()).second - at(lower).second;
+    double beyond = 0.0;  // integral of f - c(f)
+    double hidden = 0.0;
+    if (std::isfinite(limit)) {
+        std::vector<std::uint64_t> open(first_cells);
+        for (std::size_t k = 0; k < first_cells; ++k) {
+            open[k] = k;
+        }
+        double width = period / first_cells;
+        for (int halving = 0; !open.empty(); ++halving, width *= 0.5) {
+            std::vector<std::uint64_t> next;
+            double guess = 0.0;
+            for (const std::uint64_t cell : open) {
+                const double from = lower + static_cast<double>(cell) * width;
+                const double force = at(from + 0.5 * width).first;
+                const double excess = std::abs(force) - limit;
+                const double change = 0.5 * strokes.steepest * width;
+                if (excess >= change) {
+                    beyond += at(from + width).second - at(from).second - std::copysign(limit, force) * width;
+                } else if (!(excess <= -change)) {
+                    guess += std::copysign(std::max(0.0, excess), force) * width;
+                    next.push_back(2 * cell);
+                    next.push_back(2 * cell + 1);
+                }
+            }
+            hidden = 0.125 * strokes.steepest * width * width * static_cast<double>(next.size());
+            if (hidden <= 1e-15 * limit * period || next.size() > most_cells || halving == most_halvings) {
+                beyond += guess;
+                break;
+            }
+            open = std::move(next);
+        }
+    }
+    const double mean = (whole - beyond) / period;
+    return {mean - hidden / period, mean + hidden / period};
+}
+
+/// How strongly a limited model that repeats pushes on average, beyond what its loss takes:
+/// max(0, mean c(g - h), -mean c(g + h)). Above 0 it is a motor. Rounding counts as 0.
+[[nodiscard]] inline double mean_push(const PeriodicStrokes& strokes, double limit, double shift = 0.0) {
+    if (!strokes.g.periodic()) {
+        return 0.0;
+    }
+    if (!std::isfinite(strokes.steepest)) {
+        return std::numeric_limits<double>::quiet_NaN();
+    }
+    const double push = std::max(limited_mean(strokes, -1.0, shift, limit).upper,
+                                 -limited_mean(strokes, 1.0, shift, limit).lower);
+    return push <= strokes.rounding() ? 0.0 : push;
+}
+
+/// The smallest shift of the force for which it does not push on average. The mean of a limited force never falls
+/// with the shift, and has one zero.
+[[nodiscard]] inline double balancing_shift(const PeriodicStrokes& strokes, double limit) {
+    if (mean_push(strokes, limit) == 0.0) {
+        return 0.0;
+    }
+    // The stroke that pushes: the force of the lower one is above 0, or that of the upper one below 0.
+    const double side = limited_mean(strokes, -1.0, 0.0, limit).upper > 0.0 ? -1.0 : 1.0;
+    const auto pushes = [&](double shift) {
+        const Interval mean = limited_mean(strokes, side, side * shift, limit);
+        return side * (mean.lower + mean.upper) < 0.0;
+    };
+    double low = 0.0;
+    double high = mean_push(strokes, limit);
+    while (pushes(high)) {
+        low = high;
+        high *= 2.0;
+    }
+    for (double middle = 0.5 * (low + high); middle > low && middle < high; middle = 0.5 * (low + high)) {
+        (pushes(middle) ? low : high) = middle;
+    }
+    return side * high;
+}
+
+}  // namespace detail
+
+}  // namespace palpate
