@@ -9,13 +9,16 @@
 
 #include "palpate/controller.hpp"
 #include "palpate/device/simulated.hpp"
+#include "palpate/model/limited_environment.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/simulation.hpp"
+#include "palpate/solver/limited_resolvent.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -187,6 +190,201 @@ TEST(Massless, BalancesTheCouplingAtEveryTick) {
         const double velocity_error = ((x - device) - (y - position)) / period;
         EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
         EXPECT_NEAR(rendered.force, object.at(y, {}).force, 1e-12);
+        device = x;
+        position = y;
+    }
+}
+
+/// Falls with slope -s within f_0 / s of 0, pushes away from 0 with f_0 beyond, and is closed in by a wall.
+struct PushingOut {
+    using State = Stateless;
+    double push;     ///< f_0
+    double falling;  ///< s
+    double wall;     ///< where a wall of slope 1 begins
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double width = push / falling;
+        const double side = x < 0.0 ? -1.0 : 1.0;
+        const double reach = std::abs(x);
+        if (reach <= width) {
+            return {-falling * x, -falling, -0.5 * falling * x * x, false};
+        }
+        const double beyond = std::max(0.0, reach - wall);
+        return {side * (beyond - push), beyond > 0.0 ? 1.0 : 0.0,
+                push * (0.5 * width - reach) + 0.5 * beyond * beyond, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+/// Work of a hand, F d + A d^2 for every sample: against the clipped force and the damping of a device.
+struct HandWork {
+    double device_damping;  ///< A = b/T
+    double limit;           ///< of the device
+    double position = 0.0;
+    double force = 0.0;
+    double work = 0.0;
+
+    void move(double to, double rendered) noexcept {
+        const double d = to - position;
+        force = std::clamp(rendered, -limit, limit);
+        work += force * d + device_damping * d * d;
+        position = to;
+    }
+};
+
+/// Winds the coupling up quickly, lets the mass fly, and slows it down with a spring just below the limit.
+template <class S>
+double work_of_a_throw(S structure, double limit) {
+    constexpr double stiffness = 90.0;
+    constexpr double wound_up = 0.5;
+    HandWork hand{0.5 * stiffness, limit};
+    structure.reset(0.0);
+    Rendered now = structure.step(0.0);
+    const auto move = [&](double to) {
+        hand.move(to, now.force);
+        now = structure.step(to);
+    };
+    for (int k = 0; k < 60; ++k) {
+        move(hand.position + wound_up / 60.0);
+    }
+    double before = -1.0;
+    while (now.environment_position < hand.position + limit / stiffness &&
+           now.environment_position > before) {
+        before = now.environment_position;
+        move(hand.position);
+    }
+    for (int k = 0; k < 4000 && now.environment_position >= before; ++k) {
+        before = now.environment_position;
+        move(std::max(hand.position, before - 0.99 * limit / stiffness));
+    }
+    return hand.work;
+}
+
+// spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+TEST(ForceLimit, InsideTheStepKeepsAThrownMassFromGivingEnergy) {
+    const Inertia mass{0.05, 0.0};
+    const VirtualCoupling spring{90.0, 0.0};
+    constexpr double none = std::numeric_limits<double>::infinity();
+    const auto implicit = [&](double limit) {
+        return Implicit<Spring>{Spring{0.0}, mass, spring, period, {}, limit, {}};
+    };
+    const auto consistent = [&](double limit) {
+        return EnergyConsistent{Spring{0.0}, mass, spring, period, 1e-4, true, limit};
+    };
+    EXPECT_LT(work_of_a_throw(implicit(none), 5.0), -1.9) << "clipped outside the step";
+    EXPECT_LT(work_of_a_throw(consistent(none), 5.0), -1.9) << "clipped outside the step";
+    EXPECT_GT(work_of_a_throw(implicit(5.0), 5.0), 0.0);
+    EXPECT_GT(work_of_a_throw(consistent(5.0), 5.0), 0.0);
+}
+
+// spec of the certificate: "falling slopes with mass and limit fail: s = 0.31 K_c, m = 7 K_c T^2, F_max = 1.34 f_0,
+// a 68-sample cycle gives 0.44 f_0^2 / K_c"; this one gives 0.416
+TEST(ForceLimit, DoesNotKeepAFallingForceWithMassFromGivingEnergy) {
+    const PushingOut object{1.0, 0.31, 7.5};
+    const Inertia mass{7.0, 0.0};
+    constexpr double limit = 1.34;
+    // The state on the cycle when the hand changes sides: position -0.0826, moved by 1.0850 in the last sample.
+    constexpr double last = -0.08262168687;
+    constexpr double before = -1.16758952181;
+    Implicit<PushingOut> structure{object, mass, {1.0, 0.0}, 1.0, {}, limit, {}};
+    structure.reset(before);
+    const double there =
+        structure.drive(7.0 * (last - before) + object.at(last, {}).force).environment_position;
+    ASSERT_NEAR(there, last, 1e-9);
+    const double side = limit + last + 1e-6;  // the coupling is at its limit all the time
+    HandWork hand{0.5, limit, side, limit};
+    double force = limit;
+    double moved = 0.0;
+    double now = last;
+    for (const double x : {-side, side}) {
+        for (int k = 0; k < 34; ++k) {
+            hand.move(x, force);
+            const Rendered rendered = structure.step(x);
+            ASSERT_EQ(rendered.status, Status::Limited);
+            force = rendered.force;
+            moved = rendered.environment_position - std::exchange(now, rendered.environment_position);
+        }
+    }
+    EXPECT_NEAR(now, last, 1e-6) << "the cycle closes";
+    EXPECT_NEAR(moved, last - before, 1e-6) << "the cycle closes";
+    EXPECT_LT(hand.work, -0.41);
+}
+
+/// Checks each step of a structure with mass: `residual(y, G)` is the object's side of the step less G.
+template <class S, class Residual>
+int limited_steps(S structure, double limit, VirtualCoupling spring, test::Random& random,
+                  Residual residual) {
+    structure.reset(0.2);
+    double x = 0.2;
+    double y = 0.2;
+    int limited = 0;
+    for (int k = 0; k < 400; ++k) {
+        const double moved = test::uniform(random, -0.05, 0.05) + 0.02 * std::sin(0.05 * k);
+        const double u = moved - y;
+        const Rendered now = structure.step(x + moved);
+        const double spread = x + moved - now.environment_position;
+        const double coupling_force =
+            spring.stiffness * spread + spring.damping / period * (u - (now.environment_position - 2.0 * y));
+        EXPECT_NEAR(now.force, std::clamp(coupling_force, -limit, limit), 1e-8);
+        EXPECT_NEAR(residual(now.environment_position, now.force), 0.0, 1e-8);
+        EXPECT_EQ(now.status, std::abs(coupling_force) > limit ? Status::Limited : Status::Ok);
+        limited += now.status == Status::Limited ? 1 : 0;
+        x += moved;
+        y = now.environment_position;
+    }
+    return limited;
+}
+
+TEST(ForceLimit, GivesObjectAndDeviceTheSameForce) {
+    test::Random random{31};
+    const ClickAndWall object;
+    const VirtualCoupling spring{100.0, 0.02};
+    const Inertia mass{0.01, 0.05};
+    const double inertial = mass.mass / period / period;
+    constexpr double limit = 8.0;
+    double last = 0.2;
+    double before = 0.2;
+    const int limited = limited_steps(Implicit<ClickAndWall>{object, mass, spring, period, {}, limit, {}},
+                                      limit, spring, random, [&](double y, double force) {
+                                          const double own = inertial * (y - 2.0 * last + before) +
+                                                             mass.damping / period * (y - last) +
+                                                             object.at(y, {}).force;
+                                          before = std::exchange(last, y);
+                                          return own - force;
+                                      });
+    EXPECT_GT(limited, 100);
+    EXPECT_LT(limited, 380);
+    double velocity = 0.0;
+    last = 0.2;
+    const Spring linear{40.0};
+    EXPECT_GT(limited_steps(
+                  EnergyConsistent{linear, mass, spring, period, 1e-4, false, limit}, limit, spring, random,
+                  [&](double y, double force) {
+                      const double own = 2.0 * mass.mass / period * ((y - last) / period - velocity) +
+                                         mass.damping / period * (y - last) + 20.0 * (y + last);
+                      velocity = 2.0 * (y - last) / period - velocity;
+                      last = y;
+                      return own - force;
+                  }),
+              100);
+}
+
+TEST(ForceLimit, OfAMasslessObjectIsTheLimitOfItsForce) {
+    const ClickAndWall object;
+    constexpr double limit = 1.0;
+    using Limited = LimitedEnvironment<ClickAndWall>;
+    Massless structure{Limited{object, limit}, coupling, period, LimitedResolvent{LoadLineSolver{}}};
+    double device = 0.0;
+    double position = 0.0;
+    for (int k = 0; k < 500; ++k) {
+        const double x = 0.3 * (1.0 - std::cos(0.01 * k));
+        const Rendered rendered = structure.step(x);
+        const double y = rendered.environment_position;
+        const double velocity_error = ((x - device) - (y - position)) / period;
+        EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
+        EXPECT_NEAR(rendered.force, std::min(limit, object.at(y, {}).force), 1e-12);
+        EXPECT_EQ(rendered.status, object.at(y, {}).force > limit ? Status::Limited : Status::Ok) << k;
         device = x;
         position = y;
     }

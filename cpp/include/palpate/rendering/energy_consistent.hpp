@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
@@ -21,19 +22,23 @@ namespace palpate {
 ///
 /// D alone rings on stiff walls. With the switch it stands in for f(y) only where f(y) would generate energy,
 /// (f(y) - D)(y - y_{k-1}) < 0.
+///
+/// A force limit acts as in `Implicit`: beyond it device and object both get G = +-F_max.
 template <Environment E>
 class EnergyConsistent {
   public:
     /// `shortest`: steps below it take D from Gauss points of f, because the quotient loses digits; 1e-2 of
     /// the finest wavelet's width is right.
     EnergyConsistent(E environment, Inertia inertia, VirtualCoupling coupling, double period,
-                     double shortest = 1e-4, bool switched = true)
+                     double shortest = 1e-4, bool switched = true,
+                     double force_limit = std::numeric_limits<double>::infinity())
         : environment_{std::move(environment)},
           inertia_{inertia},
           coupling_{coupling},
           period_{period},
           shortest_{shortest},
-          switched_{switched} {
+          switched_{switched},
+          force_limit_{force_limit} {
         reset(0.0);
     }
 
@@ -44,24 +49,36 @@ class EnergyConsistent {
         velocity_ = 0.0;
     }
 
-    /// Behind the coupling: the device's measured position in, the coupling's force out.
+    /// Behind the coupling: the device's measured position in, the force on device and object out.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
-        const double last = position_;
-        Rendered rendered = advance(coupling_, coupling_.force(device, device_velocity + last / period_));
-        if (rendered.status == Status::NonFinite) {
+        const double push = coupling_.force(device, device_velocity + position_ / period_);
+        const Solution solution = solve(coupling_, push, position_);
+        if (solution.status == Status::NonFinite) {
+            return detail::refused(position_);
+        }
+        const double force = coupling_.force(device - solution.position,
+                                             device_velocity - (solution.position - position_) / period_);
+        if (std::abs(force) > force_limit_) {
+            const double limited = std::copysign(force_limit_, force);
+            const Solution driven = solve({0.0, 0.0}, limited, solution.position);
+            if (driven.status == Status::NonFinite) {
+                return detail::refused(position_);
+            }
+            device_ = device;
+            Rendered rendered = moved_to(driven, limited);
+            rendered.evaluations += solution.evaluations;
+            rendered.status = rendered.status == Status::Ok ? Status::Limited : rendered.status;
             return rendered;
         }
         device_ = device;
-        rendered.force = coupling_.force(device - position_, device_velocity - (position_ - last) / period_);
-        return rendered;
+        return moved_to(solution, force);
     }
 
     /// Without the coupling: a given force drives the environment.
     [[nodiscard]] Rendered drive(double force) noexcept {
-        Rendered rendered = advance({0.0, 0.0}, force);
-        rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;
-        return rendered;
+        const Solution solution = solve({0.0, 0.0}, force, position_);
+        return solution.status == Status::NonFinite ? detail::refused(position_) : moved_to(solution, force);
     }
 
     [[nodiscard]] double velocity() const noexcept { return velocity_; }
@@ -103,21 +120,24 @@ class EnergyConsistent {
         }
     };
 
-    /// `push` is what the coupling would exert on an environment at rest at 0, its damper's memory included.
-    [[nodiscard]] Rendered advance(VirtualCoupling coupling, double push) noexcept {
+    /// The end of the step, searched from `start`. `push` is what the coupling would exert on an environment at
+    /// rest at 0, its damper's memory included.
+    [[nodiscard]] Solution solve(VirtualCoupling coupling, double push, double start) const noexcept {
         const double memory = 2.0 * inertia_.mass / (period_ * period_) + inertia_.damping / period_;
         const LoadLine line{memory + coupling.stiffness + coupling.damping / period_,
                             memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + push};
         const Stepped stepped{environment_, position_, environment_.at(position_, state_).energy, shortest_,
                               switched_};
-        const Solution solution = LoadLineSolver{}.solve(stepped, state_, line, position_);
-        if (solution.status == Status::NonFinite) {
-            return detail::refused(position_);
-        }
+        Solution solution = LoadLineSolver{}.solve(stepped, state_, line, start);
+        ++solution.evaluations;
+        return solution;
+    }
+
+    [[nodiscard]] Rendered moved_to(const Solution& solution, double force) noexcept {
         environment_.advance(solution.position, state_);
         velocity_ = 2.0 * (solution.position - position_) / period_ - velocity_;
         position_ = solution.position;
-        return {0.0, position_, solution.evaluations + 1, solution.status, solution.environment.extrapolated};
+        return {force, position_, solution.evaluations, solution.status, solution.environment.extrapolated};
     }
 
     E environment_;
@@ -126,6 +146,7 @@ class EnergyConsistent {
     double period_;
     double shortest_;
     bool switched_;
+    double force_limit_;  ///< F_max
     typename E::State state_;
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
@@ -19,30 +21,42 @@ namespace palpate {
 ///
 /// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit
 /// equation of section 4.3, with the damping of figure 14.
+///
+/// A force limit acts on device and object alike. If |F| > F_max at the solution y*, the object is driven by
+/// G = +-F_max alone: y is the first root of its load line from y* in the direction of -G. There |F(y)| > F_max,
+/// because F falls with y, and the device gets the same G.
 template <Environment E, class Solver = LoadLineSolver>
 class Implicit {
   public:
-    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver = {})
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver = {},
+             double force_limit = std::numeric_limits<double>::infinity())
+        : Implicit{std::move(environment), inertia, coupling, period, solver, force_limit, solver} {}
+
+    /// `solver` is for the load line behind the coupling, `alone` for that of the object alone.
+    Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver,
+             double force_limit, Solver alone)
         : environment_{std::move(environment)},
           coupling_{coupling},
           period_{period},
+          force_limit_{force_limit},
           inertial_{inertia.mass / (period * period)},
-          coupled_{load_line_slope(inertia, coupling, period)},
-          alone_{load_line_slope(inertia, {0.0, 0.0}, period)},
-          coupled_memory_{inertial_ + coupled_ - coupling.stiffness},
-          alone_memory_{inertial_ + alone_},
-          solver_{std::move(solver)} {
+          coupled_slope_{load_line_slope(inertia, coupling, period)},
+          alone_slope_{load_line_slope(inertia, {0.0, 0.0}, period)},
+          coupled_factor_{inertial_ + coupled_slope_ - coupling.stiffness},
+          alone_factor_{inertial_ + alone_slope_},
+          coupled_{std::move(solver)},
+          alone_{std::move(alone)} {
         reset(0.0);
     }
 
-    /// p of every step behind the coupling.
+    /// p of every step behind the coupling; with a coupling of zeros that of the object alone.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return coupling.stiffness + coupling.damping / period +
                (inertia.mass / (period * period) + inertia.damping / period);
     }
 
-    [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+    [[nodiscard]] const Solver& solver() const noexcept { return coupled_; }
 
     void reset(double position) noexcept {
         state_ = environment_.start(position);
@@ -52,50 +66,67 @@ class Implicit {
         before_ = position;
     }
 
-    /// Behind the coupling: the device's measured position in, the coupling's force out.
+    /// Behind the coupling: the device's measured position in, the force on device and object out.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double velocity = (device - device_) / period_;
-        const double last = position_;
-        Rendered rendered = advance(coupled_, coupling_.force(device, velocity), coupled_memory_);
-        if (rendered.status == Status::NonFinite) {
-            return rendered;
-        }
-        device_ = device;
-        rendered.force = coupling_.force(device - position_, velocity - (position_ - last) / period_);
-        return rendered;
-    }
-
-    /// Without the coupling: a given force drives the environment (paper figure 12).
-    [[nodiscard]] Rendered drive(double force) noexcept {
-        Rendered rendered = advance(alone_, force, alone_memory_);
-        rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;
-        return rendered;
-    }
-
-  private:
-    /// Solves the load line of slope p and moves on. `push` is what drives an environment at rest at 0,
-    /// `memory` what of q goes with the last position.
-    [[nodiscard]] Rendered advance(double p, double push, double memory) noexcept {
-        const LoadLine line{p, push - inertial_ * before_ + memory * position_};
-        const Solution solution = solver_.solve(environment_, state_, line, memory_);
+        const LoadLine line{coupled_slope_, coupling_.force(device, velocity) - inertial_ * before_ +
+                                                coupled_factor_ * position_};
+        const Solution solution = coupled_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
+        const double force =
+            coupling_.force(device - solution.position, velocity - (solution.position - position_) / period_);
+        if (std::abs(force) > force_limit_) {
+            Rendered rendered =
+                drive_from(solution.position, std::copysign(force_limit_, force), solution.evaluations);
+            if (rendered.status == Status::NonFinite) {
+                return rendered;
+            }
+            device_ = device;
+            rendered.status = rendered.status == Status::Ok ? Status::Limited : rendered.status;
+            return rendered;
+        }
+        device_ = device;
+        return moved_to(solution, force, 0);
+    }
+
+    /// Without the coupling: a given force drives the environment (paper figure 12).
+    [[nodiscard]] Rendered drive(double force) noexcept { return drive_from(position_, force, 0); }
+
+  private:
+    /// Moves the object by a force alone, to the first root from `start`.
+    [[nodiscard]] Rendered drive_from(double start, double force, int evaluations) noexcept {
+        const LoadLine line{alone_slope_, force - inertial_ * before_ + alone_factor_ * position_};
+        typename Solver::Memory from{start};
+        const Solution solution = alone_.solve(environment_, state_, line, from);
+        memory_ = typename Solver::Memory{position_};
+        if (solution.status == Status::NonFinite) {
+            return detail::refused(position_);
+        }
+        memory_ = typename Solver::Memory{solution.position};
+        return moved_to(solution, force, evaluations);
+    }
+
+    [[nodiscard]] Rendered moved_to(const Solution& solution, double force, int evaluations) noexcept {
         environment_.advance(solution.position, state_);
         before_ = position_;
         position_ = solution.position;
-        return {0.0, position_, solution.evaluations, solution.status, solution.environment.extrapolated};
+        return {force, position_, solution.evaluations + evaluations, solution.status,
+                solution.environment.extrapolated};
     }
 
     E environment_;
     VirtualCoupling coupling_;
     double period_;
+    double force_limit_;     ///< F_max
     double inertial_;        ///< m/T^2
-    double coupled_;         ///< p behind the coupling
-    double alone_;           ///< p without it
-    double coupled_memory_;  ///< the factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
-    double alone_memory_;    ///< and without the coupling: 2m/T^2 + B_o/T
-    Solver solver_;
+    double coupled_slope_;   ///< p behind the coupling
+    double alone_slope_;     ///< p without it
+    double coupled_factor_;  ///< the factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
+    double alone_factor_;    ///< and without the coupling: 2m/T^2 + B_o/T
+    Solver coupled_;
+    Solver alone_;
     typename E::State state_;
     typename Solver::Memory memory_;
     double device_ = 0.0;    ///< x_{k-1}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
@@ -14,6 +15,8 @@ namespace palpate {
 /// load line with
 ///
 ///     p = K_c + B_c / T,   q = K_c x_k + (B_c / T)(x_k - x_{k-1} + y_{k-1});   then F = f(y).
+///
+/// A force limit belongs to the environment: `LimitedEnvironment`.
 template <Environment E, class Solver = LoadLineSolver>
 class Massless {
   public:
@@ -51,11 +54,21 @@ class Massless {
         environment_.advance(solution.position, state_);
         device_ = device;
         position_ = solution.position;
-        return {solution.environment.force, position_, solution.evaluations, solution.status,
-                solution.environment.extrapolated};
+        return {solution.environment.force, position_, solution.evaluations,
+                limited(solution) ? Status::Limited : solution.status, solution.environment.extrapolated};
     }
 
   private:
+    /// True if the environment has a force limit, and it acts at an exact solution.
+    [[nodiscard]] bool limited(const Solution& solution) const noexcept {
+        if constexpr (requires { environment_.force_limit(); }) {
+            return solution.status == Status::Ok &&
+                   std::abs(solution.environment.force) >= environment_.force_limit();
+        } else {
+            return false;
+        }
+    }
+
     E environment_;
     VirtualCoupling coupling_;
     double period_;
