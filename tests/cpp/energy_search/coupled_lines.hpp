@@ -11,6 +11,7 @@
 
 #include "held_lines.hpp"
 #include "motions.hpp"
+#include "palpate/model/limited_environment.hpp"
 
 namespace palpate::energy_search {
 
@@ -35,6 +36,15 @@ template <class Force>
             least = {low + step * k, sum};
         }
     }
+    double below = least.place - step;
+    double above = least.place + step;
+    if (force(below) < 0.0 && force(above) > 0.0) {
+        for (int k = 0; k < 60; ++k) {
+            const double middle = 0.5 * (below + above);
+            (force(middle) < 0.0 ? below : above) = middle;
+        }
+        least.place = 0.5 * (below + above);
+    }
     return least;
 }
 
@@ -43,7 +53,18 @@ struct CoupledScene {
     Scheme scheme;
     DeviceProfile device;
     Places places;
+    std::string object;
+    Interval slopes;
 };
+
+[[nodiscard]] inline std::string text_of(const CoupledScene& scene) {
+    return scene.object + ", slope " + readable(scene.slopes.lower) + " to " + readable(scene.slopes.upper) +
+           ", K_c " + readable(scene.scheme.coupling.stiffness) + ", B_c " +
+           readable(scene.scheme.coupling.damping) + ", m " + readable(scene.scheme.inertia.mass) + ", B_o " +
+           readable(scene.scheme.inertia.damping) + ", T " + readable(scene.device.period_s) + " + " +
+           readable(scene.device.jitter_s) + ", delay " + readable(scene.device.delay_s) + ", limit " +
+           readable(scene.device.force_limit);
+}
 
 /// A coupling and an inertia about the size of the object's slopes. A `firm` object hardly moves: it is much stiffer
 /// than the coupling, or heavy.
@@ -73,10 +94,10 @@ template <class Structure>
     const double period = scene.device.longest_period_s();
     auto shared = std::make_shared<Structure>(std::move(structure));
     const auto seed = random();
-    const auto worst = [shared, scene, starts, steps, seed](const auto& rate) {
+    const auto worst = [shared, scene, starts, steps, seed](const auto& rate, const auto& gain) {
         test::Random own{seed};
         MotionSearch<Structure> search{*shared, scene.places, scene.device.force_limit};
-        return search.most(own, starts, steps, rate);
+        return search.most(own, starts, steps, rate, gain);
     };
     struct Known {
         double friction = -1.0;
@@ -89,15 +110,15 @@ template <class Structure>
                     const double held = scene.places.held;
                     known->friction = friction;
                     known->damping =
-                        period * worst([&](const Account& account) {
-                            return account.square > 0.0
-                                       ? (-account.work - held - friction * account.length) / account.square
-                                       : 0.0;
-                        });
+                        period *
+                        worst([&](const Account& account) { return account.damping(held, friction); },
+                              [&](const Account& account) {
+                                  return account.gain(need.damping / period, held, friction);
+                              });
                 }
                 return known->damping > damping_factor * need.damping;
             },
-            need};
+            need, text_of(scene)};
 }
 
 /// An object of straight pieces that holds finite energy.
@@ -115,20 +136,25 @@ template <class Structure>
     return {-step * before, step, forces};
 }
 
-[[nodiscard]] inline std::optional<Trial> draw_coupled(test::Random& random, StructureKind kind, int delay,
+[[nodiscard]] inline std::optional<Trial> draw_coupled(test::Random& random, StructureKind kind, double delay,
                                                        bool firm) {
     const bool network = random() % 3 == 0;
     const bool hysteresis = random() % 3 == 0;
     CoupledScene scene;
     scene.device = random_device(random, delay);
-    scene.places.delay = delay;
+    scene.places.delay = scene.device.whole_delay_samples();
+    scene.places.late = scene.device.delay_fraction();
+    scene.object = std::string(network ? "wavelets" : "pieces") + (hysteresis ? " with hysteresis" : "");
     const auto certified = [&](const auto& object) {
         return certified_need(scene.device, [&](const DeviceProfile& generous) {
             return certify(object, scene.scheme, generous);
         });
     };
     const auto placed = [&](double low, double high, double step, double slope, const auto& force) {
-        const Least least = least_energy(low - 5.0 * (high - low), high + 5.0 * (high - low), force);
+        // Without mass the limit is part of the object.
+        const double limit = has_mass(kind) ? 1e300 : scene.device.force_limit;
+        const Least least = least_energy(low - 5.0 * (high - low), high + 5.0 * (high - low),
+                                         [&](double x) { return std::clamp(force(x), -limit, limit); });
         scene.places.start = least.place;
         scene.places.low = low;
         scene.places.high = high;
@@ -144,15 +170,17 @@ template <class Structure>
         limit_by(random, scene.device, slope * test::uniform(random, 0.05, 0.5));
         scene.scheme = random_coupling(random, kind, slope, scene.device.period_s, firm);
         const auto need = certified(model);
+        scene.slopes = force_bounds(model).slope;
         if (!need || need->damping <= 0.0) {
             return std::nullopt;
         }
         const NetworkCurve& curve = hysteresis ? model.hysteresis()->force() : model.network()->curve();
         placed(0.0, 1.0, model.finest_width(), slope, [&](double x) { return curve.at(x).value; });
-        return with_structure(
-            model, scene.scheme, scene.device.period_s, [&](auto structure) -> std::optional<Trial> {
-                return motion_trial(random, std::move(structure), scene, *need, starts, steps);
-            });
+        return with_structure(model, scene.scheme, scene.device.period_s, scene.device.force_limit,
+                              [&](auto structure) -> std::optional<Trial> {
+                                  return motion_trial(random, std::move(structure), scene, *need, starts,
+                                                      steps);
+                              });
     }
     const int count = 12;
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
@@ -164,20 +192,23 @@ template <class Structure>
     placed(0.0, step * count, step, std::max(slopes.M, slopes.s), [&](double x) { return g.at(x).value; });
     const auto build = [&](const auto& object, const ForceBounds& bounds) -> std::optional<Trial> {
         const auto need = certified(bounds);
+        scene.slopes = bounds.slope;
         if (!need || need->damping <= 0.0) {
             return std::nullopt;
         }
         const auto run = [&](auto structure) -> std::optional<Trial> {
             return motion_trial(random, std::move(structure), scene, *need, starts, steps);
         };
+        const double limit = scene.device.force_limit;
         switch (kind) {
             case StructureKind::Massless:
-                return run(Massless{object, scene.scheme.coupling, period});
+                return run(Massless{LimitedEnvironment{object, limit}, scene.scheme.coupling, period});
             case StructureKind::Implicit:
-                return run(Implicit{object, scene.scheme.inertia, scene.scheme.coupling, period});
+                return run(Implicit{object, scene.scheme.inertia, scene.scheme.coupling, period,
+                                    LoadLineSolver{}, limit});
             default:
                 return run(EnergyConsistent{object, scene.scheme.inertia, scene.scheme.coupling, period,
-                                            1e-3 * step});
+                                            1e-3 * step, true, limit});
         }
     };
     if (hysteresis) {

@@ -108,9 +108,9 @@ template <class MeanOf>
     HeldScene scene;
     const int nodes = slowly ? 3000 : delay == 0 ? 48 : delay == 1 ? 24 : 12;
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, slowly ? 1 : nodes, true);
-    scene.table = with_structure(model, scheme, device.period_s, [&](const auto& structure) {
-        return table_of(structure, scene.read, 0, sent_on(device));
-    });
+    scene.table = with_structure(
+        model, scheme, device.period_s, device.force_limit,
+        [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
     scene.held =
         held_energy(scene.read.grid, [&](double x) { return clipped(curve.at(x).value, device) - mean; });
     return trial_of(std::move(scene), *need, device);
@@ -163,7 +163,8 @@ template <class MeanOf>
     HeldScene& scene = shared->scene;
     scene.read = even_grid(0.0, wheel ? 1.0 / nodes : step, nodes, wheel ? 1 : delay == 0 ? nodes : 3, wheel);
     scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
-    scene.need = {need->damping / device.longest_period_s(), need->friction, delay, 0.0};
+    scene.need = {need->damping / device.longest_period_s(), need->friction, device.whole_delay_samples(),
+                  device.delay_fraction()};
     for (int buzzes = 0; buzzes < 4; ++buzzes) {
         Sent sent = sent_on(device);
         sent.guards.buzz = softened(buzzes);
@@ -211,7 +212,8 @@ template <class MeanOf>
     const std::vector<double> held =
         held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
     scene.held.assign(held.size(), *std::max_element(held.begin(), held.end()));
-    scene.need = {need->damping / device.longest_period_s(), need->friction, delay, 0.0};
+    scene.need = {need->damping / device.longest_period_s(), need->friction, device.whole_delay_samples(),
+                  device.delay_fraction()};
     const std::uint64_t ticks = 1 + random() % 30;
     for (std::uint64_t k = 0; k < ticks; ++k) {
         Sent sent = sent_on(device);

@@ -35,11 +35,13 @@ struct Fineness {
     return {coarse[std::min(memory, 3)], 23};
 }
 
-[[nodiscard]] inline DeviceProfile random_device(test::Random& random, int delay) {
+/// A device without limits or steps. `delay` is in samples; one without delay may have jitter.
+[[nodiscard]] inline DeviceProfile random_device(test::Random& random, double delay) {
     DeviceProfile device;
     device.period_s = test::uniform(random, 3e-4, 2e-3);
-    device.jitter_s = random() % 2 == 0 ? 0.0 : device.period_s * test::uniform(random, 0.0, 0.5);
-    device.delay_samples = delay;
+    device.jitter_s =
+        delay > 0.0 || random() % 2 == 0 ? 0.0 : device.period_s * test::uniform(random, 0.0, 0.5);
+    device.delay_s = delay * device.period_s;
     device.encoder_step = 0.0;
     device.force_step = 0.0;
     device.force_limit = 1e9;
@@ -74,7 +76,8 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
 
 /// A trial that searches a held force on a grid.
 [[nodiscard]] inline Trial trial_of(HeldScene scene, const Need& need, const DeviceProfile& device) {
-    scene.need = {need.damping / device.longest_period_s(), need.friction, device.delay_samples, 0.0};
+    scene.need = {need.damping / device.longest_period_s(), need.friction, device.whole_delay_samples(),
+                  device.delay_fraction()};
     auto shared = std::make_shared<const HeldScene>(std::move(scene));
     return {
         [shared](double damping, double friction) { return shared->search(damping, friction).violated(); },
@@ -148,11 +151,11 @@ template <class Force>
     const double place = steepest_place(force) - width * test::uniform(random, 0.3, 0.7);
     HeldScene scene;
     scene.read = even_grid(place, step, fine.nodes, fine.reach);
-    scene.table = with_structure(model, scheme, device.period_s, [&](const auto& structure) {
-        return table_of(structure, scene.read, 0, sent_on(device));
-    });
+    scene.table = with_structure(
+        model, scheme, device.period_s, device.force_limit,
+        [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
     // Behind a coupling the force at x is that of the object at y: what is felt is again a static force.
-    scene.held = coupled ? with_structure(model, scheme, device.period_s,
+    scene.held = coupled ? with_structure(model, scheme, device.period_s, device.force_limit,
                                           [&](auto structure) {
                                               return held_energy(scene.read.grid, [&](double x) {
                                                   structure.reset(x);
@@ -251,9 +254,9 @@ template <class Force>
     HeldScene scene;
     scene.read =
         even_grid(steepest_place(stick) - width * test::uniform(random, 0.3, 0.7), step, nodes, reach);
-    scene.table = with_structure(model, scheme, device.period_s, [&](const auto& structure) {
-        return play_table_of(structure, scene.read, radius, sent_on(device));
-    });
+    scene.table = with_structure(
+        model, scheme, device.period_s, device.force_limit,
+        [&](const auto& structure) { return play_table_of(structure, scene.read, radius, sent_on(device)); });
     scene.held =
         held_energy(scene.read.grid, [&](double x) { return clipped(pair.force().at(x).value, device); });
     return trial_of(std::move(scene), *need, device);

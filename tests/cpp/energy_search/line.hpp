@@ -44,6 +44,7 @@ template <class Certify>
 struct Trial {
     std::function<bool(double damping, double friction)> takes_energy;
     Need need;
+    std::string text{};  ///< the scene in words
 };
 
 enum class Part { Damping, Friction };

@@ -36,11 +36,29 @@ struct Motion {
     }
 };
 
-/// What a motion costs the hand, sample by sample, but for the device's damping and friction.
+/// What a motion costs the hand besides the device's damping and friction.
 struct Account {
-    double work = 0.0;    ///< sum F d [J]
+    double work = 0.0;    ///< sum of the mean force of a sample times d [J]
     double square = 0.0;  ///< sum d^2
     double length = 0.0;  ///< sum |d|
+    /// Sum tau (1 - tau) (change of the force within a sample)^2: an uneven path within the samples gains this over
+    /// 4 b / T.
+    double spread = 0.0;
+
+    /// b / T below which the motion takes energy out of an object that held `held`.
+    [[nodiscard]] double damping(double held, double friction) const noexcept {
+        if (!(square > 0.0)) {
+            return 0.0;
+        }
+        const double paid = work + held + friction * length;
+        return 0.5 * (-paid + std::sqrt(paid * paid + square * spread)) / square;
+    }
+
+    /// Energy taken out at a damping, over the length of the way.
+    [[nodiscard]] double gain(double damping, double held, double friction) const noexcept {
+        const double uneven = damping > 0.0 ? 0.25 * spread / damping : 0.0;
+        return length > 0.0 ? (uneven - work - held - damping * square) / length - friction : 0.0;
+    }
 };
 
 /// Where and how widely motions are tried.
@@ -52,7 +70,8 @@ struct Places {
     double finest = 0.0;  ///< of the sizes
     double widest = 0.0;
     double encoder_step = 0.0;
-    int delay = 0;
+    int delay = 0;      ///< whole samples
+    double late = 0.0;  ///< rest of the delay [samples]
 };
 
 /// Optimises motions of a structure. `Structure` must have `reset` and `step`; `limit` clips what is sent.
@@ -63,16 +82,24 @@ class MotionSearch {
         : structure_{structure}, places_{places}, limit_{limit} {}
 
     /// Largest over motions and their lengths of `rate(account)`, e.g. the damping below which energy is taken out.
-    template <class Rate>
-    [[nodiscard]] double most(test::Random& random, int starts, int steps, const Rate& rate) {
+    /// Half of the motions are optimised for that, which favours fast ones. The others are optimised for `gain`.
+    template <class Rate, class Gain>
+    [[nodiscard]] double most(test::Random& random, int starts, int steps, const Rate& rate,
+                              const Gain& gain) {
         double best = 0.0;
         for (int k = 0; k < starts; ++k) {
-            Motion motion = random_motion(random);
-            double found = evaluate(motion, rate);
+            const bool slow = k % 2 == 1;
+            const auto tried = [&](const Motion& motion) {
+                const Found found = evaluate(motion, rate, gain);
+                best = std::max(best, found.rate);
+                return slow ? found.gain : found.rate;
+            };
+            Motion motion = random_motion(random, slow);
+            double found = tried(motion);
             double stride = 0.5;
             for (int step = 0; step < steps; ++step) {
                 const Motion trial = changed(random, motion, stride);
-                const double here = evaluate(trial, rate);
+                const double here = tried(trial);
                 const bool better = here > found;
                 stride = std::clamp(stride * (better ? 1.6 : 0.93), 1e-3, 2.0);
                 if (better) {
@@ -80,63 +107,70 @@ class MotionSearch {
                     found = here;
                 }
             }
-            best = std::max(best, found);
         }
         return best;
     }
 
-    template <class Rate>
-    [[nodiscard]] double evaluate(const Motion& motion, const Rate& rate) {
+    /// The largest over all lengths of one motion.
+    struct Found {
+        double rate = 0.0;
+        double gain = -std::numeric_limits<double>::infinity();
+    };
+
+    template <class Rate, class Gain>
+    [[nodiscard]] Found evaluate(const Motion& motion, const Rate& rate, const Gain& gain) {
         double at = places_.start;
         if (places_.encoder_step > 0.0) {
             at = places_.encoder_step * std::round(at / places_.encoder_step);
         }
         structure_.reset(at);
-        const auto late = static_cast<std::size_t>(places_.delay);
-        std::vector<double> sent;
+        const auto late = static_cast<std::size_t>(places_.delay + (places_.late > 0.0 ? 1 : 0));
+        sent_.clear();
         Account account;
-        double most = 0.0;
+        Found most;
         double read = at;
         for (std::size_t k = 0; k < ticks + late; ++k) {
-            const double force = structure_.step(read).force;
-            sent.push_back(std::clamp(force, -limit_, limit_));
+            sent_.push_back(std::clamp(structure_.step(read).force, -limit_, limit_));
             if (k < late) {
                 continue;  // at rest until the first force acts
             }
             const std::size_t now = k - late;
-            const double target = now < approach ? places_.start + (motion.wave(0) - places_.start) *
-                                                                       static_cast<double>(now + 1) / approach
-                                                 : motion.wave(now - approach);
-            double next = target;
-            read = target;
+            read = now < approach ? places_.start + (motion.wave(0) - places_.start) *
+                                                        static_cast<double>(now + 1) / approach
+                                  : motion.wave(now - approach);
+            double next = read;
             if (places_.encoder_step > 0.0) {
-                read = places_.encoder_step * std::round(target / places_.encoder_step);
+                read = places_.encoder_step * std::round(read / places_.encoder_step);
                 next = read + places_.encoder_step * motion.within[now % motion.within.size()];
             }
             const double d = next - at;
-            account.work += sent[now] * d;
+            const double old = sent_[now];
+            const double fresh = sent_[places_.late > 0.0 ? now + 1 : now];
+            account.work += (places_.late * old + (1.0 - places_.late) * fresh) * d;
+            account.spread += places_.late * (1.0 - places_.late) * (fresh - old) * (fresh - old);
             account.square += d * d;
             account.length += std::abs(d);
             at = next;
             if (now > approach) {
-                most = std::max(most, rate(account));
+                most.rate = std::max(most.rate, rate(account));
+                most.gain = std::max(most.gain, gain(account));
             }
         }
-        return std::isfinite(most) ? most : std::numeric_limits<double>::infinity();
+        return most;
     }
 
     static constexpr std::size_t approach = 16;
     static constexpr std::size_t ticks = 500;
 
   private:
-    [[nodiscard]] Motion random_motion(test::Random& random) const {
+    [[nodiscard]] Motion random_motion(test::Random& random, bool slow) const {
         Motion motion;
         motion.centre = random() % 3 == 0 ? places_.start : test::uniform(random, places_.low, places_.high);
         motion.size =
             places_.finest * std::exp(test::uniform(random, 0.0, std::log(places_.widest / places_.finest)));
-        motion.sines = random() % 3 == 0;
+        motion.sines = slow || random() % 3 == 0;
         if (motion.sines) {
-            motion.period = std::exp(test::uniform(random, std::log(2.0), std::log(100.0)));
+            motion.period = std::exp(test::uniform(random, std::log(slow ? 10.0 : 2.0), std::log(100.0)));
             motion.shape.resize(2 * (1 + random() % 3));
         } else {
             constexpr int longest = 10;
@@ -144,7 +178,7 @@ class MotionSearch {
                                                     ? 2 * static_cast<std::size_t>(places_.delay) + 3
                                                     : longest));
         }
-        const bool alternates = random() % 2 == 0;
+        const bool alternates = !motion.sines && random() % 2 == 0;
         for (std::size_t i = 0; i < motion.shape.size(); ++i) {
             motion.shape[i] =
                 alternates ? (2 * i < motion.shape.size() ? 1.0 : -1.0) : test::uniform(random, -1.0, 1.0);
@@ -156,7 +190,7 @@ class MotionSearch {
         return motion;
     }
 
-    [[nodiscard]] static Motion changed(test::Random& random, Motion motion, double stride) {
+    [[nodiscard]] Motion changed(test::Random& random, Motion motion, double stride) const {
         std::normal_distribution<double> normal;
         const std::size_t one = random() % (motion.shape.size() + 3);
         const bool all = random() % 2 == 0;
@@ -169,7 +203,7 @@ class MotionSearch {
             motion.centre += motion.size * stride * normal(random);
         }
         if (all || one == motion.shape.size() + 1) {
-            motion.size *= std::exp(stride * normal(random));
+            motion.size = std::max(places_.finest, motion.size * std::exp(stride * normal(random)));
         }
         if (all || one == motion.shape.size() + 2) {
             motion.period = std::max(2.0, motion.period * std::exp(0.3 * stride * normal(random)));
@@ -185,6 +219,7 @@ class MotionSearch {
     Structure& structure_;
     Places places_;
     double limit_;
+    std::vector<double> sent_;
 };
 
 }  // namespace palpate::energy_search
