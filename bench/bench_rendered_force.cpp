@@ -151,7 +151,7 @@ void massless_newton(benchmark::State& state) {
     tick(state, palpate::Massless{compiled(), coupling, period}, of_the_coupling);
 }
 void massless_certified_newton(benchmark::State& state) {
-    const palpate::LoadLineSolver solver = palpate::certified_solver(palpate::piecewise(sum().curve()));
+    const palpate::CertifiedSolver solver{palpate::piecewise(sum().curve()), massless_slope()};
     tick(state, palpate::Massless{compiled(), coupling, period, solver}, of_the_coupling);
 }
 void massless_table(benchmark::State& state) {
@@ -163,7 +163,7 @@ void implicit_newton(benchmark::State& state) {
     tick(state, palpate::Implicit{compiled(), undamped, coupling, period}, of_the_mass);
 }
 void implicit_certified_newton(benchmark::State& state) {
-    const palpate::LoadLineSolver solver = palpate::certified_solver(palpate::piecewise(sum().curve()));
+    const palpate::CertifiedSolver solver{palpate::piecewise(sum().curve()), implicit_slope(undamped)};
     tick(state, palpate::Implicit{compiled(), undamped, coupling, period, solver}, of_the_mass);
 }
 void implicit_table(benchmark::State& state) {

@@ -25,6 +25,7 @@
 
 namespace {
 
+using palpate::CertifiedSolver;
 using palpate::CompiledNetwork;
 using palpate::Inertia;
 using palpate::LoadLineSolver;
@@ -103,6 +104,11 @@ double implicit_slope() {
     return palpate::Implicit<CompiledNetwork>::load_line_slope(Scene::inertia, Scene::coupling, period);
 }
 
+template <class Scene>
+double massless_slope() {
+    return palpate::Massless<CompiledNetwork>::load_line_slope(Scene::coupling, period);
+}
+
 template <class Scene, class E, class Solver>
 void implicit(benchmark::State& state, const WaveletNetwork& object, const E& environment,
               const Solver& solver) {
@@ -134,13 +140,13 @@ void implicit_table(benchmark::State& state) {
                     Resolvent{object.curve(), implicit_slope<Scene>()});
 }
 
-/// Newton's method with its predictor and certified stop; through a snap-through in the brackets of the branches.
+/// Newton's method in certified cells, with its predictor; through a snap-through in the brackets of the branches.
 template <class Scene>
 void implicit_newton(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
     if constexpr (std::is_same_v<Scene, SpringWall>) {
         implicit<Scene>(state, object, CompiledNetwork{object},
-                        palpate::certified_solver(palpate::piecewise(object.curve())));
+                        CertifiedSolver{palpate::piecewise(object.curve()), implicit_slope<Scene>()});
     } else {
         implicit<Scene>(state, object, CompiledNetwork{object},
                         Resolvent{object.curve(), implicit_slope<Scene>(), {1e-12, 0}});
@@ -151,7 +157,7 @@ void implicit_newton(benchmark::State& state) {
 void implicit_newton_network(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, object,
-                         palpate::certified_solver(palpate::piecewise(object.curve())));
+                         CertifiedSolver{palpate::piecewise(object.curve()), implicit_slope<SpringWall>()});
 }
 
 /// Newton's method as in a textbook: from the last position until the step is small.
@@ -163,13 +169,13 @@ void implicit_textbook(benchmark::State& state) {
 template <class Scene>
 void massless_table(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
-    const double p = palpate::Massless<CompiledNetwork>::load_line_slope(Scene::coupling, period);
-    massless<Scene>(state, object, Resolvent{object.curve(), p});
+    massless<Scene>(state, object, Resolvent{object.curve(), massless_slope<Scene>()});
 }
 
 void massless_newton(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
-    massless<SpringWall>(state, object, palpate::certified_solver(palpate::piecewise(object.curve())));
+    massless<SpringWall>(state, object,
+                         CertifiedSolver{palpate::piecewise(object.curve()), massless_slope<SpringWall>()});
 }
 
 void direct(benchmark::State& state) {

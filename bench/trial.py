@@ -181,7 +181,7 @@ def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, floa
     largest departure of what is rendered from it there. A stick's h / r counts as slope."""
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
     stick = _core.force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
-    low, high = (bound - np.copysign(stick, bound) for bound in renderable_slopes(device))
+    low, high = renderable_slopes(device, stick, model)
     forces = strokes(model, x)
     unchanged = np.ones(SAMPLES, dtype=bool)
     for force in forces:

@@ -300,6 +300,13 @@ void bind_model(py::module_& module) {
     type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
+        "require_slopes_within",
+        [](const ForceModel& model, double least, double largest) {
+            model.require_slopes_within({least, largest});
+        },
+        "least"_a, "largest"_a,
+        "ValueError if stored slope bounds are narrower than the slopes of this model.");
+    type.def(
         "slope_range",
         [](const ForceModel& model, std::optional<double> radius) {
             require_one_input(model.parameters());

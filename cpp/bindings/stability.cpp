@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "fields.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
+#include "palpate/stability/renderable_slopes.hpp"
 
 namespace palpate::bindings {
 
@@ -53,14 +55,40 @@ void bind_bounds(py::module_& module) {
         .def_property_readonly("loss_min", end(&ForceBounds::loss, &Interval::lower), "Smallest h.")
         .def_property_readonly("loss_max", end(&ForceBounds::loss, &Interval::upper), "Largest h.")
         .def_readonly("loss_per_play", &ForceBounds::loss_per_play, "max h / r")
-        .def_readonly("mean_force", &ForceBounds::mean_force, "|mean| over a period of a model that repeats.")
+        .def_readonly("mean_force", &ForceBounds::mean_force,
+                      "How much a limited force that repeats pushes on average, beyond its loss.")
         .def_readonly("drag", &ForceBounds::drag, "B_v = max |f(x, v) - f(x, 0)| / |v|.");
     define_by_fields(type, {"slope_min", "slope_max", "steepest", "sliding", "loss_min", "loss_max",
                             "loss_per_play", "mean_force", "drag", "hysteresis"});
+    constexpr double none = std::numeric_limits<double>::infinity();
     module.def(
-        "force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0,
-        "Proved bounds of a model of one position, or of position and velocity; play_radius in place of its\n"
-        "own where above 0.");
+        "force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0, "force_limit"_a = none,
+        "Proved bounds of a model of one position, or of position and velocity, on a device that limits its\n"
+        "force; play_radius in place of its own where above 0.");
+    module.def("balancing_shift", py::overload_cast<const ForceModel&, double>(&balancing_shift), "model"_a,
+               "force_limit"_a,
+               "Shift of a force that repeats with which the limited force does not push on average; 0 for "
+               "other\n"
+               "models. Add it to the bias of the network.");
+    module.def(
+        "renderable_slopes",
+        [](const DeviceProfile& device, double stick, double rising, double falling) {
+            const Interval slopes = renderable_slopes(device, stick, {rising, falling});
+            return std::pair{slopes.lower, slopes.upper};
+        },
+        "device"_a, "stick"_a = 0.0, py::kw_only(), "rising"_a = none, "falling"_a = none,
+        "(lowest, highest) slope that direct rendering is certified for; infinite where nothing limits "
+        "it.\n\n"
+        "First as steep a slope on both sides as is certified, but none steeper than `rising` and "
+        "`falling`;\n"
+        "then as steep a fall, and after it a rise, as is still certified. With hysteresis these are slopes\n"
+        "while sliding, and a stick adds h / r = `stick`.");
+    module.def("steepest_stick", &steepest_stick, "device"_a,
+               "Slope h / r that leaves half of what the device holds to sliding.");
+    module.def("narrowest_play", &narrowest_play, "sliding"_a, "device"_a, "least"_a, "most"_a,
+               "Narrowest play radius between `least` and `most` for which hysteresis is certified; infinite "
+               "if none\n"
+               "is. `sliding` bounds the model with a play so wide that sticking adds no slope.");
 }
 
 void bind_inequality(py::module_& module) {
@@ -168,13 +196,11 @@ void bind_stability(py::module_& module) {
         },
         "bounds"_a, "scheme"_a, "device"_a, "The same for any force within bounds.");
     module.def(
-        "coupling_need",
-        [](double stiffness, double damping, double period_s, int delay_samples) {
-            return coupling_need({stiffness, damping}, period_s, delay_samples);
-        },
-        "stiffness"_a, "damping"_a, "period_s"_a, "delay_samples"_a = 0,
-        "Device damping over the longest period that a coupling of K_c and B_c needs for any passive "
-        "object.");
+        "stiffest_coupling", &stiffest_coupling, py::kw_only(), "damping"_a, "falling"_a, "device"_a,
+        "share"_a = 1.0,
+        "Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is "
+        "none.\n"
+        "`damping` is B_c; `falling` the steepest fall of the object's force.");
     module.def(
         "felt_slope", &felt_slope, "slope"_a, "coupling_stiffness"_a,
         "K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.");

@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'bench_for', 'certify', 'certify_bounds', 'coupling_need', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'paper_sample_time_s', 'play', 'render', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'balancing_shift', 'bench_for', 'certify', 'certify_bounds', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'narrowest_play', 'paper_sample_time_s', 'play', 'render', 'renderable_slopes', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'steepest_stick', 'stiffest_coupling', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -139,6 +139,10 @@ class ForceModel:
         """
         Force at X (n, d), (n,); a hysteresis model takes the direction as one more column. A row with a
         value that is not finite gives NaN.
+        """
+    def require_slopes_within(self, least: typing.SupportsFloat | typing.SupportsIndex, largest: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        ValueError if stored slope bounds are narrower than the slopes of this model.
         """
     @typing.overload
     def slope(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -475,7 +479,7 @@ class ForceBounds:
     @property
     def mean_force(self) -> float:
         """
-        |mean| over a period of a model that repeats.
+        How much a limited force that repeats pushes on average, beyond its loss.
         """
     @property
     def sliding(self) -> float:
@@ -663,6 +667,11 @@ class LoopSettings:
     @property
     def rate_hz(self) -> float:
         ...
+def balancing_shift(model: ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Shift of a force that repeats with which the limited force does not push on average; 0 for other
+    models. Add it to the bias of the network.
+    """
 def bench_for(model: ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Bench:
     """
     The bench on which a model of one position is tried. An angle is tried on the default knob;
@@ -677,10 +686,6 @@ def certify(model: ForceModel, scheme: Scheme, device: DeviceProfile) -> Certifi
 def certify_bounds(bounds: ForceBounds, scheme: Scheme, device: DeviceProfile) -> Certificate:
     """
     The same for any force within bounds.
-    """
-def coupling_need(stiffness: typing.SupportsFloat | typing.SupportsIndex, damping: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex, delay_samples: typing.SupportsInt | typing.SupportsIndex = 0) -> float:
-    """
-    Device damping over the longest period that a coupling of K_c and B_c needs for any passive object.
     """
 def device_difference(certified: DeviceProfile, device: DeviceProfile) -> str:
     """
@@ -711,10 +716,10 @@ def fingerprint(model: ForceModel) -> str:
     """
     16 hexadecimal digits that change with every number of which the model's force is made.
     """
-def force_bounds(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> ForceBounds:
+def force_bounds(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
-    Proved bounds of a model of one position, or of position and velocity; play_radius in place of its
-    own where above 0.
+    Proved bounds of a model of one position, or of position and velocity, on a device that limits its
+    force; play_radius in place of its own where above 0.
     """
 def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
@@ -769,6 +774,11 @@ def motion_driven(model: ForceModel, scheme: Scheme, position: typing.Annotated[
     The force that would have been rendered while a recorded motion (n,) moves the device.
     Arrays (n,) by name: force, environment_position, evaluations, status.
     """
+def narrowest_play(sliding: ForceBounds, device: DeviceProfile, least: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Narrowest play radius between `least` and `most` for which hysteresis is certified; infinite if none
+    is. `sliding` bounds the model with a play so wide that sticking adds no slope.
+    """
 def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radius: typing.SupportsFloat | typing.SupportsIndex, start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
     """
     State (n,) of the play operator of a radius along a motion (n,), started at rest unless told
@@ -784,6 +794,14 @@ def render(model: ForceModel, scheme: Scheme, *, position_unit: str = 'rad', for
     `progress(ticks, position, force, lost)` is called ten times a second.
     A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.
     Returns the summary by name; ValueError where it is refused before anything moves.
+    """
+def renderable_slopes(device: DeviceProfile, stick: typing.SupportsFloat | typing.SupportsIndex = 0.0, *, rising: typing.SupportsFloat | typing.SupportsIndex = ..., falling: typing.SupportsFloat | typing.SupportsIndex = ...) -> tuple[float, float]:
+    """
+    (lowest, highest) slope that direct rendering is certified for; infinite where nothing limits it.
+    
+    First as steep a slope on both sides as is certified, but none steeper than `rising` and `falling`;
+    then as steep a fall, and after it a rise, as is still certified. With hysteresis these are slopes
+    while sliding, and a stick adds h / r = `stick`.
     """
 def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
     """
@@ -804,6 +822,15 @@ def solver_name(model: ForceModel, scheme: Scheme, period_s: typing.SupportsFloa
     """
     How the load line is solved: 'table' where certified tables answer, at least in part, else 'newton';
     None where a structure has no load line.
+    """
+def steepest_stick(device: DeviceProfile) -> float:
+    """
+    Slope h / r that leaves half of what the device holds to sliding.
+    """
+def stiffest_coupling(*, mass: bool, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
+    `damping` is B_c; `falling` the steepest fall of the object's force. With mass the force limit counts.
     """
 def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """

@@ -10,9 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "palpate/model/bounds.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/network.hpp"
+#include "palpate/solver/piecewise_force.hpp"
 
 namespace palpate::test {
 
@@ -50,6 +52,17 @@ inline NetworkParameters random_network(Random& random, std::size_t size, std::s
 inline Domain unit_domain(Continuation below = Continuation::Linear,
                           Continuation above = Continuation::Linear) {
     return {{0.0}, {1.0}, below, above, std::nullopt};
+}
+
+/// The steepest fall of f, edge lines included, within 1e-9 of max|f'|; negative where f rises everywhere.
+inline double steepest_fall(const PiecewiseForce& force) {
+    double least = slope_bounds(force.network, force.lower, force.upper, 1e-9).lower;
+    for (const auto* side : {&force.below, &force.above}) {
+        for (const OuterLine& line : *side) {
+            least = std::min(least, line.slope);
+        }
+    }
+    return -least;
 }
 
 /// f = stiffness * x, the environment every limit is known of.

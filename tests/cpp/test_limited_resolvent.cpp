@@ -23,6 +23,8 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
 /// The one root of c(f(y)) + p y = q by bisection.
 template <class E>
 double bisected(const LimitedEnvironment<E>& object, const typename E::State& state, LoadLine line) {
@@ -147,9 +149,10 @@ TEST(LimitedResolvent, NeverExceedsTheLimitBehindAMasslessCoupling) {
     // A spring of 200 N/m behind 300 N/m and 0.05 N s/m, limited to 2 N.
     const LimitedEnvironment object{test::Spring{200.0}, 2.0};
     const VirtualCoupling coupling{300.0, 0.05};
-    LoadLineSolver spring;
-    spring.least_slope = 200.0;
-    Massless structure{object, coupling, 1e-3, LimitedResolvent{spring}};
+    const PiecewiseForce spring{
+        {1, {}, {}, {}, {200.0}, 0.0}, -0.1, 0.1, false, {{infinity, 200.0}}, {{infinity, 200.0}}};
+    const double p = Massless<test::Spring>::load_line_slope(coupling, 1e-3);
+    Massless structure{object, coupling, 1e-3, LimitedResolvent{CertifiedSolver{spring, p}}};
     structure.reset(0.0);
     double last_position = 0.0;
     double last_device = 0.0;
@@ -176,7 +179,7 @@ TEST(LimitedResolvent, RefusesALoadLineThatIsNotFinite) {
     const LimitedEnvironment object{network, 1.0};
     const LimitedResolvent solver{Resolvent{network.curve(), 2000.0}};
     LimitedResolvent<Resolvent>::Memory memory{0.5};
-    for (const double q : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    for (const double q : {std::nan(""), infinity}) {
         EXPECT_EQ(solver.solve(object, {}, {2000.0, q}, memory).status, Status::NonFinite);
     }
     EXPECT_EQ(solver.solve(object, {}, {2000.0, 1000.0}, memory).status, Status::Ok);

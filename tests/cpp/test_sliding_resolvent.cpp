@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/sliding_resolvent.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -96,6 +99,89 @@ TEST(SlidingResolvent, NeedsTwoEvaluationsOrFewerWhereItSticks) {
     }
     EXPECT_LE(evaluations, 2 * steps);
     EXPECT_GT(evaluations, 0);
+}
+
+/// Rounding of f, and of s = (y - play) / r.
+double rounding_of(const HysteresisNetwork& pair, double x) {
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    const double loss = pair.loss().value_bounds().largest();
+    return jet_rounding(pair.force().parameters(), 1.4)[0] + jet_rounding(pair.loss().parameters(), 1.4)[0] +
+           8.0 * epsilon * (std::abs(x) + 1.0) * loss / pair.play_radius();
+}
+
+// Random jumps of q and of the play, for load lines that are unique by 1e-4 to 1: 10^6 steps in the full tier.
+TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    Random random{76};
+    long steps = 0;
+    long evaluations = 0;
+    long sticking = 0;
+    std::vector<std::size_t> cells;
+    for (int k = 0; k < cases(20); ++k) {
+        const auto continuation = k % 2 == 0 ? Continuation::Free : Continuation::Linear;
+        Domain domain = test::unit_domain(continuation, continuation);
+        if (k % 5 == 4) {
+            domain = {{0.1}, {1.1}, Continuation::Linear, Continuation::Linear, 1.0};
+        }
+        const auto wavelets = static_cast<std::size_t>(1 + k % 12);
+        // Every seventh loss falls below zero, which a model may but a passive object cannot.
+        LossParameters loss{std::vector<double>(wavelets), 0.0,
+                            uniform(random, k % 7 == 6 ? -0.1 : 0.3, k % 7 == 6 ? 0.1 : 1.0)};
+        for (double& weight : loss.weight) {
+            weight = uniform(random, -0.2, 0.2) / static_cast<double>(wavelets);
+        }
+        const double radius = k % 7 == 6 ? 0.1 : std::exp(uniform(random, -9.0, 0.0));
+        const HysteresisNetwork pair{test::random_network(random, wavelets), loss, domain, radius};
+        const double gain = std::max(0.0, -pair.loss().value_bounds().lower) / radius;
+        const double fall =
+            std::max(test::steepest_fall(piecewise(pair, 1.0)), test::steepest_fall(piecewise(pair, -1.0))) +
+            gain;
+        if (!(fall > 0.0)) {
+            continue;
+        }
+        const double p = fall * (1.0 + std::exp(uniform(random, std::log(1e-4), 0.0)));
+        const SlidingResolvent resolvent{pair, p};
+        ASSERT_TRUE(resolvent.unique(p)) << k << " p / fall = " << p / fall;
+        cells.push_back(resolvent.solver().cells());
+        SlidingResolvent::Memory memory{0.5};
+        CertifiedSolver::Memory alone{0.5};
+        auto state = pair.start(0.5);
+        for (int j = 0; j < 500; ++j) {
+            // A jump of the play too; or to where the play turns from sticking to sliding; or a short way.
+            if (j % 3 == 0) {
+                state = pair.start(uniform(random, -0.3, 1.4));
+            }
+            const double turn = state.play + (j % 2 == 0 ? radius : -radius);
+            const double x = j % 4 == 0   ? uniform(random, -0.3, 1.4)
+                             : j % 4 == 1 ? turn + radius * uniform(random, -1e-3, 1e-3)
+                                          : state.play + radius * uniform(random, -1.5, 1.5);
+            const double q = pair.at(x, state).force + p * x;
+            for (const Solution& solution : {resolvent.solve(pair, state, {p, q}, memory),
+                                             resolvent.solver().solve(pair, state, {p, q}, alone)}) {
+                ASSERT_EQ(solution.status, Status::Ok) << k << " " << j;
+                ASSERT_LE(solution.evaluations, 4) << k << " " << j;
+                const EnvironmentSample there = pair.at(solution.position, state);
+                const double steepest = p + std::abs(there.slope) + loss.bias / radius;
+                const double residual = there.force + p * solution.position - q;
+                ASSERT_LE(std::abs(residual), 1.1e-12 * steepest + 2.0 * rounding_of(pair, x) +
+                                                  8.0 * epsilon * (std::abs(there.force) + std::abs(q)))
+                    << k << " " << j << " " << x << " " << solution.position;
+                ++steps;
+                evaluations += solution.evaluations;
+            }
+            sticking += std::abs(x - state.play) < radius ? 2 : 0;
+            pair.advance(x, state);
+        }
+    }
+    ASSERT_GT(steps, cases(14) * 1000);
+    EXPECT_GT(sticking, steps / 4);
+    EXPECT_LT(sticking, steps * 3 / 4);
+    std::sort(cells.begin(), cells.end());
+    RecordProperty("steps", std::to_string(steps));
+    RecordProperty("evaluations_per_step", std::to_string(static_cast<double>(evaluations) / steps));
+    RecordProperty("cells_median", std::to_string(cells[cells.size() / 2]));
+    RecordProperty("cells_most", std::to_string(cells.back()));
+    EXPECT_LE(cells.back(), 2000U);
 }
 
 TEST(SlidingResolvent, LeavesToNewtonWhatIsNotUnique) {

@@ -112,7 +112,7 @@ def test_everything_that_a_model_carries_comes_back(tmp_path: Path) -> None:
             below="free",
             mass=0.1,
             damping=0.2,
-            slope_bounds=(-1.0, 2.0),
+            slope_bounds=(-1e6, 2e6),
             plan=PLAN,
             notes={"who": "bench 3"},
             fit=Fit("hysteresis", "fresh", 0.1, N, 20, [step]),  # type: ignore[list-item]

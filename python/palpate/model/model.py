@@ -268,7 +268,7 @@ class Model(ForceModel):
         file: ModelFile = checked(content)
         held_out_every = file.notes.get(_HELD_OUT, 0)
         bounds = file.slope_bounds
-        return cls(
+        model = cls(
             kind=file.kind,
             inputs=file.inputs,
             units=file.units.model_dump(),
@@ -293,6 +293,12 @@ class Model(ForceModel):
             notes=file.notes,
             created_by=file.created_by,
         )
+        if bounds is not None:
+            try:
+                model.require_slopes_within(bounds.min, bounds.max)
+            except ValueError as error:
+                raise InputError(str(error)) from None
+        return model
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model file; it appears under its name only when it is complete.

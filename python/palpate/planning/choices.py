@@ -6,12 +6,10 @@ They are proposals. Whether they hold is for the certificate to say.
 
 from __future__ import annotations
 
-import math
-
 from .. import _core
 from .._core import DeviceProfile, ForceBounds, Scheme
 from ..model import Model
-from .slope_limit import sliding_bounds
+from .slope_limit import sliding_bounds, sliding_slopes
 
 SPARE = 0.95
 """Share of what the device allows that is used where nothing else sets a number [-]"""
@@ -25,6 +23,9 @@ USUAL_PLAY = 0.01
 _ENCODER_STEPS = 4
 """A narrower play would be switched by the encoder instead of by the hand [encoder steps]"""
 
+_WANTED = 1.02
+"""Slope that is asked of a device over that of the model: a network is fitted just below its limits [-]"""
+
 _STABLE_SHARES = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
 """Coupling stiffness tried for the explicit structure, over the stiffest that the device can hold [-]"""
 _STABLE_DAMPINGS = (0.1, 0.25, 0.5, 1.0)
@@ -33,64 +34,39 @@ _STABLE_RESERVES = (1.1, 1.5, 2.5, 5.0)
 """Slope limit of the explicit structure over the slope that it has to meet [-]"""
 
 
-def friction_slope(device: DeviceProfile, mean_force: float = 0.0) -> float:
-    """Steepest slope whose encoder noise the device's friction swallows: f_c >= L Delta/2 + Delta_F/2."""
-    if device.encoder_step == 0.0:
-        return math.inf
-    return 2.0 * (device.coulomb_friction - 0.5 * device.force_step - mean_force) / device.encoder_step
+def renderable_slopes(
+    device: DeviceProfile, stick: float = 0.0, model: Model | None = None
+) -> tuple[float, float]:
+    """(lowest, highest) slope that direct rendering is certified for, shared out as the model needs them.
 
-
-def renderable_slopes(device: DeviceProfile, stick: float = 0.0) -> tuple[float, float]:
-    """(lowest, highest) slope that direct rendering is certified for: b >= T M/2 + n_d T L and friction.
-
-    With hysteresis those of sliding: a stick adds `stick` = h/r, to M and L once and to friction twice.
+    With hysteresis these are slopes while sliding, and a stick adds `stick` = h/r.
     """
-    held = device.viscous_damping / device.longest_period_s
-    friction = friction_slope(device) - 2.0 * stick
-    highest = min(held / (0.5 + device.late_samples) - stick, friction)
-    return (-highest if device.late_samples else -friction), highest
+    if model is None:
+        return _core.renderable_slopes(device, stick)
+    low, high = sliding_slopes(model)
+    return _core.renderable_slopes(
+        device, stick, rising=max(0.0, _WANTED * high), falling=max(0.0, -_WANTED * low)
+    )
 
 
-def steepest_stick(device: DeviceProfile) -> float:
-    """The slope h/r that leaves half of what the device holds to sliding; what is more of h is left out."""
-    held = device.viscous_damping / device.longest_period_s / (0.5 + device.late_samples)
-    return min(0.5 * held, 0.25 * friction_slope(device))
+def coupling_for(device: DeviceProfile, damping: float, falling: float = 0.0) -> float:
+    """Returns the stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
 
-
-def coupling_for(device: DeviceProfile, damping: float) -> float:
-    """Stiffest coupling that the device can hold, less a reserve, for a given coupling damping.
-
-    0 where the damping alone is too much.
+    `falling` is the steepest fall of an object's force. 0 if the damping alone is too much.
     """
-    available = SPARE * device.viscous_damping / device.longest_period_s
-
-    def fits(stiffness: float) -> bool:
-        return _core.coupling_need(stiffness, damping, device.period_s, device.late_samples) <= available
-
-    low, high = 0.0, 2.0 * available
-    if high <= 0.0 or not fits(1e-9 * high):
-        return 0.0
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low
+    return _core.stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
 
 
 def play_radius_for(model: Model, device: DeviceProfile) -> float:
-    """Narrowest certified play radius r for direct rendering; infinite where there is none.
+    """Narrowest certified play radius for direct rendering, at least 4 encoder steps.
 
-    r = max(4 Delta, max h / (2 b / T - max(g' + |h'|))), with the delay's and the encoder's share of damping
-    and friction taken off as well.
+    Infinite if none is certified up to `LONGEST_PLAY`.
     """
-    sliding = sliding_bounds(model)
-    delay = device.late_samples
-    held = device.viscous_damping / device.longest_period_s
-    room = (held - 0.5 * max(0.0, sliding.slope_max) - delay * sliding.sliding) / (0.5 + delay)
-    room = min(room, 0.5 * (friction_slope(device, sliding.mean_force) - sliding.sliding))
-    if room <= 0.0:
-        return math.inf
-    # A hair wider: bounds are computed once more for the certificate, and rounded.
-    return max(_ENCODER_STEPS * device.encoder_step, 1.000001 * sliding.loss_max / room)
+    longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
+    narrowest = _ENCODER_STEPS * device.encoder_step
+    radius = _core.narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
+    # Bounds are computed once more for the certificate, and rounded.
+    return radius if radius == narrowest else 1.000001 * radius
 
 
 def usual_play_radius(model: Model, device: DeviceProfile) -> float:

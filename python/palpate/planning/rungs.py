@@ -17,7 +17,6 @@ from .choices import (
     explicit_scheme,
     play_radius_for,
     renderable_slopes,
-    steepest_stick,
     usual_play_radius,
 )
 from .plan import Plan
@@ -93,12 +92,13 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
         return "a coupling was asked for"
     if not wishes.limited:
         return _NOT_LIMITED
-    low, high = renderable_slopes(device)
+    low, high = renderable_slopes(device, model=model)
     if high <= 0.0:
         return _no_slope(device)
-    rendered = _balanced(model)
     limited = (
-        _hysteresis_limited(rendered, device, wishes) if model.hysteretic else _within(rendered, low, high)
+        _hysteresis_limited(_balanced(model, device), device, wishes)
+        if model.hysteretic
+        else _within(model, low, high, device)
     )
     if limited is None:
         return f"no network was found whose slopes lie between {low:.4g} and {high:.4g}"
@@ -113,10 +113,13 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         return "no coupling was asked for, and none makes a steeper slope possible"
     damping = wishes.coupling_damping or 0.0
     stiffness = wishes.coupling_stiffness
+    radius = wishes.play_radius or usual_play_radius(model, device)
     low, high = renderable_slopes(device)
     if stiffness is None:
-        stiffness = coupling_for(device, damping)
-        if damping == 0.0 and not model.hysteretic:
+        static = damping == 0.0 and not model.hysteretic
+        falling = 0.0 if static else max(0.0, -_core.force_bounds(model, radius).slope_min)
+        stiffness = coupling_for(device, damping, falling)
+        if static:
             stiffness = min(stiffness, SPARE * high)
     if stiffness <= 0.0:
         return _no_slope(device)
@@ -125,16 +128,16 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         coupling_stiffness=stiffness,
         coupling_damping=damping,
         compensated=not model.hysteretic,
-        play_radius=wishes.play_radius or usual_play_radius(model, device),
+        play_radius=radius,
     )
     if model.hysteretic:
         return Plan(model, scheme).certified_for(device)
     highest = _TAKEN_OUT * stiffness
-    balanced = _balanced(model)
+    balanced = _balanced(model, device)
     low, high = low if damping == 0.0 else -math.inf, min(highest, high)
     if not wishes.limited and not (balanced is model and _fits(model, low, high)):
         return _NOT_LIMITED
-    limited = _within(balanced, low, high)
+    limited = _within(balanced, low, high, device)
     if limited is None:
         return f"no network was found whose slopes lie below {highest:.4g} = {_TAKEN_OUT} K_c"
     return Plan(model, scheme, limited=None if limited is model else limited).certified_for(device)
@@ -154,7 +157,7 @@ def explicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     """The paper's structure: stable at best."""
     radius = wishes.play_radius or usual_play_radius(model, device)
     scheme = explicit_scheme(
-        _core.force_bounds(model, radius),
+        _core.force_bounds(model, radius, device.force_limit),
         device,
         mass=wishes.mass,
         damping=wishes.damping,
@@ -209,9 +212,10 @@ def _direct_scheme(model: Model, device: DeviceProfile, wishes: Wishes) -> Schem
     return Scheme(structure="direct", play_radius=radius)
 
 
-def _within(model: Model, low: float, high: float) -> Model | None:
-    """The model itself where its slopes lie within limits, else the nearest that does."""
-    return model if _fits(model, low, high) else limit_slopes(model, low, high)
+def _within(model: Model, low: float, high: float, device: DeviceProfile) -> Model | None:
+    """The model itself where its slopes lie within limits, else the nearest that does; balanced."""
+    limited = model if _fits(model, low, high) else limit_slopes(model, low, high)
+    return None if limited is None else _balanced(limited, device)
 
 
 def _fits(model: Model, low: float, high: float) -> bool:
@@ -219,16 +223,10 @@ def _fits(model: Model, low: float, high: float) -> bool:
     return found[0] >= low and found[1] <= high
 
 
-def _balanced(model: Model) -> Model:
-    """A model that repeats must not push on average, or it is a motor: its mean force is taken off."""
-    if model.period is None:
-        return model
-    lower = float(model.lower[0])
-    side = {"direction": 1.0} if model.hysteretic else {}
-    turn = model.energy(lower + model.period, **side) - model.energy(lower, **side)
-    if _core.force_bounds(model, model.period if model.hysteretic else 0.0).mean_force == 0.0:
-        return model
-    return model.with_network(bias=model.bias - turn / model.period)
+def _balanced(model: Model, device: DeviceProfile) -> Model:
+    """The model, shifted if it repeats: limited by the device, its force must not push on average."""
+    shift = _core.balancing_shift(model, device.force_limit)
+    return model.with_network(bias=model.bias + shift) if shift else model
 
 
 def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Model:
@@ -242,16 +240,17 @@ def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> 
         kept, refused = 0.0, 1.0
         for _ in range(10):
             share = 0.5 * (kept + refused)
-            kept, refused = (share, refused) if holds(scale_loss(candidate, share)) else (kept, share)
-        return scale_loss(candidate, max(kept, _LEAST_LOSS))
+            scaled = _balanced(scale_loss(candidate, share), device)
+            kept, refused = (share, refused) if holds(scaled) else (kept, share)
+        return _balanced(scale_loss(candidate, max(kept, _LEAST_LOSS)), device)
 
     radius = wishes.play_radius or model.play_radius
     if radius is None:
         radius = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
-    stick = min(_core.force_bounds(model, radius).loss_per_play, steepest_stick(device))
-    limited = _within(model, *renderable_slopes(device, stick)) or model
+    stick = min(_core.force_bounds(model, radius).loss_per_play, _core.steepest_stick(device))
+    limited = _within(model, *renderable_slopes(device, stick, model), device) or model
     found = [limited if holds(limited) else as_much_loss_as_holds(limited)]
-    if limited is not model and holds(scale_loss(model, _LEAST_LOSS)):
+    if limited is not model and holds(_balanced(scale_loss(model, _LEAST_LOSS), device)):
         found.append(as_much_loss_as_holds(model))
     exact = Scheme(structure="direct")
     return min(found, key=lambda candidate: static_force_error(model, candidate, exact).rms)

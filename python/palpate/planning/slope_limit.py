@@ -10,6 +10,7 @@ wavelets, so that elsewhere the model stays what it was and the limits are certi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -58,10 +59,10 @@ _WIDE = 1e9
 
 
 @lru_cache(maxsize=8)
-def sliding_bounds(model: Model) -> ForceBounds:
+def sliding_bounds(model: Model, force_limit: float = math.inf) -> ForceBounds:
     """Proved bounds while sliding, continuations included: of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
-    return _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0)
+    return _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
 
 
 def sliding_slopes(model: Model) -> tuple[float, float]:

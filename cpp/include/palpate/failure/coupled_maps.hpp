@@ -71,7 +71,8 @@ inline constexpr double coupling_time = 0.2e-3;
 /// The stiffest coupling that a device bears whatever stands behind it: b > K_c T / 2 + B_c, and what it becomes
 /// with delay.
 [[nodiscard]] inline double coupling_limit(const DeviceProfile& device) noexcept {
-    const double need = coupling_need({1.0, coupling_time}, device.period_s, device.late_samples());
+    const double need = coupling_need({1.0, coupling_time}, device.period_s, device.whole_delay_samples(),
+                                      device.delay_fraction());
     return device.viscous_damping / (device.period_s * need);
 }
 

@@ -13,6 +13,7 @@
 #include "palpate/failure/trials.hpp"
 #include "palpate/readable.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/stability/held_force.hpp"
 
 namespace palpate {
 
@@ -35,9 +36,9 @@ namespace palpate {
     return oscillates_with(Direct{LinearObject{stiffness}}, device, heavy, stiffness, ticks);
 }
 
-/// K <= 2b / ((1 + 2 n_d) T): Colgate and Schenkel 1997, with delay Diolaiti et al. 2006.
-[[nodiscard]] inline double direct_limit(const DeviceProfile& device) noexcept {
-    return 2.0 * device.viscous_damping / ((1.0 + 2.0 * device.delay_s / device.period_s) * device.period_s);
+/// The stiffest spring that is certified for a device without steps: its need is in proportion to its slope.
+[[nodiscard]] inline double direct_limit(const DeviceProfile& device) {
+    return device.viscous_damping / (device.longest_period_s() * device_need(device, {1.0, 0.0}));
 }
 
 /// A limit over the damping of the device, a line for each delay: `limit(device)` says theory, and it is searched

@@ -57,7 +57,7 @@ namespace palpate {
         const auto bound = [&](double spring) {
             ForceBounds bounds;
             bounds.slope = {spring, spring};
-            return 2.0 * friction / detail::massless_gain(bounds, coupling, smooth_knob().period_s);
+            return 2.0 * friction / massless_gain(bounds, coupling, smooth_knob().period_s);
         };
         const auto fails = [&](double spring, double step) {
             DeviceProfile knob = smooth_knob();

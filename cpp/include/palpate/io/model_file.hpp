@@ -194,6 +194,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     if (const detail::JsonField bounds = file["slope_bounds"]; !bounds.is_null()) {
         bounds.only({"min", "max"});
         bounds["min"].require(bounds["min"].number() <= bounds["max"].number(), "at most slope_bounds.max");
+        read.model.require_slopes_within({bounds["min"].number(), bounds["max"].number()});
     }
     detail::check_data(file["data"]);
     read.data_sha256 = file["data"]["sha256"].words();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 #include <variant>
 
@@ -11,6 +12,7 @@
 #include "palpate/model/network.hpp"
 #include "palpate/model/radial_network.hpp"
 #include "palpate/model/velocity_network.hpp"
+#include "palpate/readable.hpp"
 
 namespace palpate {
 
@@ -76,6 +78,24 @@ class ForceModel {
         const double loss = hysteresis()->loss().slope_bounds().largest();
         const double stuck = radius ? hysteresis()->loss().value_bounds().largest() / *radius : 0.0;
         return {common.lower - loss, common.upper + loss + stuck};
+    }
+
+    /// Throws std::invalid_argument if stored bounds are narrower than the slopes of this model. Another release may
+    /// have bounded them less sharply, by at most 1 % of the steepest.
+    void require_slopes_within(Interval stored) const {
+        if (parameters().dimension != 1) {
+            return;
+        }
+        const Interval slopes = slope_bounds();
+        const double slack = 0.01 * slopes.largest();
+        const auto sentence = [](const char* name, double value, const char* side, double bound) {
+            return std::string("slope_bounds.") + name + " is " + readable(value) + ": must be " + side +
+                   " " + readable(bound) + ", the bound of this network's slope";
+        };
+        detail::require(stored.lower <= slopes.lower + slack,
+                        sentence("min", stored.lower, "at most", slopes.lower));
+        detail::require(stored.upper >= slopes.upper - slack,
+                        sentence("max", stored.upper, "at least", slopes.upper));
     }
 
     /// The narrowest width 1 / alpha of its wavelets; the travel when it has none (d = 1).

@@ -79,7 +79,7 @@ class CompensatedResolvent {
     /// where it does by x: x - f(x)/K_c rises with x.
     [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && felt_.unique(p); }
     /// The search for a force of which nothing is certified.
-    [[nodiscard]] LoadLineSolver uncertified() const noexcept { return felt_.uncertified(); }
+    [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return felt_.uncertified(); }
 
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const Compensated<E>& environment,

@@ -14,6 +14,7 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/model/limited_environment.hpp"
 #include "palpate/readable.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
@@ -23,6 +24,7 @@
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 #include "palpate/solver/resolvent.hpp"
 #include "palpate/solver/sliding_resolvent.hpp"
@@ -136,10 +138,13 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
 /// Calls `visit` with the structure that the scheme asks for, built over the model's environment. The one place
 /// that prepares a model for the loop: curves become certified polynomials and load lines certified tables, each
 /// where that can be proved, in a few milliseconds.
-/// `force_limit`: of the device [N or N*m]; structures with a state of their own need it inside their solution.
+///
+/// `force_limit`: of the device [N or N*m], infinite for none. Massless objects and objects with mass have it inside
+/// their solution, so that object and device get the same force. The direct and the explicit structure do not know
+/// it: the guards clip their force, and a linear bound of the explicit structure holds below the limit only.
 template <class Visitor>
-auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s,
-                    [[maybe_unused]] double force_limit, Visitor visit) {
+auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, double force_limit,
+                    Visitor visit) {
     validate(scheme, given);
     if (const VelocityNetwork* force = given.velocity()) {
         return visit(DirectVelocity{*force, period_s});
@@ -147,23 +152,26 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const auto build = [&](auto environment, auto solver_of) {
         using E = decltype(environment);
-        using Solver = decltype(solver_of(0.0));
         switch (scheme.structure) {
             case StructureKind::Direct:
                 return visit(Direct{std::move(environment)});
             case StructureKind::Massless: {
                 const double p = Massless<E>::load_line_slope(scheme.coupling, period_s);
-                return visit(
-                    Massless<E, Solver>{std::move(environment), scheme.coupling, period_s, solver_of(p)});
+                if (std::isfinite(force_limit)) {
+                    return visit(Massless{LimitedEnvironment{std::move(environment), force_limit},
+                                          scheme.coupling, period_s, LimitedResolvent{solver_of(p)}});
+                }
+                return visit(Massless{std::move(environment), scheme.coupling, period_s, solver_of(p)});
             }
             case StructureKind::Implicit: {
                 const double p = Implicit<E>::load_line_slope(scheme.inertia, scheme.coupling, period_s);
-                return visit(Implicit<E, Solver>{std::move(environment), scheme.inertia, scheme.coupling,
-                                                 period_s, solver_of(p)});
+                const double alone = Implicit<E>::load_line_slope(scheme.inertia, {0.0, 0.0}, period_s);
+                return visit(Implicit{std::move(environment), scheme.inertia, scheme.coupling, period_s,
+                                      solver_of(p), force_limit, solver_of(alone)});
             }
             case StructureKind::EnergyConsistent:
                 return visit(EnergyConsistent{std::move(environment), scheme.inertia, scheme.coupling,
-                                              period_s, 1e-2 * model.finest_width()});
+                                              period_s, 1e-2 * model.finest_width(), true, force_limit});
             case StructureKind::Explicit:
                 break;
         }

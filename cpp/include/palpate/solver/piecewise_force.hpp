@@ -83,6 +83,21 @@ template <class Slope>
     return force;
 }
 
+/// The loss h of a hysteresis pair, in the same pieces.
+[[nodiscard]] inline PiecewiseForce piecewise_loss(const HysteresisNetwork& pair) {
+    PiecewiseForce loss = piecewise(pair, 0.0);
+    loss.network = pair.loss().parameters();
+    const PiecewiseForce press = piecewise(pair, 1.0);
+    const auto subtract = [](std::vector<OuterLine>& slopes, const std::vector<OuterLine>& of_press) {
+        for (std::size_t k = 0; k < slopes.size(); ++k) {
+            slopes[k].slope = of_press[k].slope - slopes[k].slope;
+        }
+    };
+    subtract(loss.below, press.below);
+    subtract(loss.above, press.above);
+    return loss;
+}
+
 /// The force multiplied by a factor.
 [[nodiscard]] inline PiecewiseForce scaled(PiecewiseForce force, double factor) {
     for (double& weight : force.network.weight) {

@@ -13,6 +13,7 @@
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/derivatives.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/solver/certified_solver.hpp"
 #include "palpate/solver/inverse_table.hpp"
 #include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
@@ -20,35 +21,6 @@
 #include "palpate/solver/rising.hpp"
 
 namespace palpate {
-
-/// What is certified of a force so that a numerical search may stop early; where the solution is not unique, the
-/// search steps over no wavelet.
-[[nodiscard]] inline LoadLineSolver certified_solver(const PiecewiseForce& force) {
-    LoadLineSolver solver;
-    const double travel = force.upper - force.lower;
-    solver.longest_step = 0.25 * travel;
-    for (const double alpha : force.network.alpha) {
-        solver.longest_step = std::min(solver.longest_step, 0.25 / alpha);
-    }
-    solver.least_slope = slope_bounds(force.network, force.lower, force.upper).lower;
-    for (const auto* side : {&force.below, &force.above}) {
-        for (const OuterLine& line : *side) {
-            solver.least_slope = std::min(solver.least_slope, line.slope);
-        }
-    }
-    if (!force.periodic) {
-        constexpr int cuts = 256;
-        solver.curvature = 0.0;
-        for (int k = 0; k < cuts; ++k) {
-            const double from = force.lower + travel * k / cuts;
-            solver.curvature =
-                std::max(solver.curvature, derivative_bounds(force.network, from, from + travel / cuts)[2]);
-        }
-        solver.smooth_from = force.lower;
-        solver.smooth_to = force.upper;
-    }
-    return solver;
-}
 
 /// A stretch over which F(y) = f(y) + p y rises from `values.lower` to `values.upper`: one solution for every q
 /// in between, by table, on a line, or else by Newton's method between its ends.
@@ -88,13 +60,14 @@ struct Branch {
 /// one the step walks in the direction of -residual to the first root. From a rising branch that is simple: while
 /// q is above its highest F, on to the next; while it is below its lowest, back.
 ///
-/// Near a fold, and where the error asked for cannot be certified, a short branch has no table but a bracket for
-/// Newton's method; where not even the folds can be told, all is left to `LoadLineSolver`.
+/// Near a fold, and where the error asked for cannot be certified, a short branch has no table. A load line with
+/// one solution is solved there by `CertifiedSolver`, others by Newton's method between the branch's ends. Where
+/// not even the folds can be told, all is left to `CertifiedSolver`.
 class Resolvent {
   public:
     /// What the last step leaves to the next: the branch it ended on.
     struct Memory {
-        WarmStart newton;
+        CertifiedSolver::Memory newton;
         std::size_t branch = 0;  ///< 0: not known
         double turns = 0.0;      ///< of a knob
 
@@ -103,7 +76,7 @@ class Resolvent {
     };
 
     Resolvent(const PiecewiseForce& force, double p, const ResolventOptions& options = {})
-        : solver_{certified_solver(force)}, slope_{p}, period_{force.upper - force.lower} {
+        : solver_{force, p}, slope_{p}, period_{force.upper - force.lower} {
         if (std::isfinite(p)) {
             branch_out(force, options);
         }
@@ -130,11 +103,11 @@ class Resolvent {
     }
     /// Those of one turn, from left to right. The first is none: it stands for not knowing.
     [[nodiscard]] const std::vector<Branch>& branches() const noexcept { return branches_; }
-    [[nodiscard]] const LoadLineSolver& solver() const noexcept { return solver_; }
+    [[nodiscard]] const CertifiedSolver& solver() const noexcept { return solver_; }
     /// Whether every load line of this slope is certified to have one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return solver_.unique(p); }
     /// The search for a force of which nothing is certified.
-    [[nodiscard]] LoadLineSolver uncertified() const noexcept { return solver_.uncertified(); }
+    [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return solver_.uncertified(); }
 
     /// Inlined, so that a step pays for what it uses of the answer.
     template <Environment E>
@@ -148,6 +121,16 @@ class Resolvent {
             return answer(memory.newton.position, q, false);
         }
         return elsewhere(environment, state, line, memory);
+    }
+
+    /// The one solution where a table or a line gives it without an evaluation; NaN elsewhere.
+    [[nodiscard, gnu::always_inline]] inline Solution look_up(LoadLine line, Memory& memory) const noexcept {
+        const Branch& branch = branches_[memory.branch];
+        const double q = line.intercept;
+        if (branch.table.covers(q) && memory.turns == 0.0 && line.slope == slope_) {
+            return answer(branch.table.at(q), q, false);
+        }
+        return look_further(line, memory);
     }
 
     /// From a start, without memory.
@@ -177,30 +160,60 @@ class Resolvent {
             }
             return solution;
         }
+        if (unique(slope_)) {
+            Solution solution = look_further(line, memory);
+            if (std::isnan(solution.position)) {
+                return solver_.solve(environment, state, line, memory.newton);
+            }
+            memory.newton = CertifiedSolver::Memory{solution.position};
+            return solution;
+        }
         Memory next = memory;
         if (next.branch == 0) {
             place(environment, state, line, next);
         }
         walk(line.intercept, next);
-        const Branch& branch = branches_[next.branch];
-        const double turned = period_ * next.turns;
-        const double q =
-            std::clamp(line.intercept - slope_ * turned, branch.values.lower, branch.values.upper);
-        Solution solution;
-        if (branch.table.covers(q)) {
-            solution = answer(branch.table.at(q) + turned, line.intercept, false);
-        } else if (branch.line_slope > 0.0) {
-            solution = answer(branch.on_line(q), q, true);
-        } else {
-            solution = solver_.solve(environment, state, line,
-                                     branch.first_guess(q, next.newton.position - turned) + turned,
-                                     {branch.positions.lower + turned, branch.positions.upper + turned});
+        Solution solution = on_branch(line.intercept, next);
+        if (std::isnan(solution.position)) {
+            const Branch& branch = branches_[next.branch];
+            const double turned = period_ * next.turns;
+            const double q =
+                std::clamp(line.intercept - slope_ * turned, branch.values.lower, branch.values.upper);
+            solution = uncertified().solve(
+                environment, state, line, branch.first_guess(q, next.newton.position - turned) + turned,
+                {branch.positions.lower + turned, branch.positions.upper + turned});
         }
         if (solution.status != Status::NonFinite) {
-            next.newton = WarmStart{solution.position};
+            next.newton = CertifiedSolver::Memory{solution.position};
             memory = next;
         }
         return solution;
+    }
+
+    /// The same on any branch.
+    [[nodiscard, gnu::noinline]] Solution look_further(LoadLine line, Memory& memory) const noexcept {
+        if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept))) {
+            constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+            return answer(nowhere, nowhere, false);
+        }
+        memory.branch = std::max(memory.branch, std::size_t{1});
+        walk(line.intercept, memory);
+        return on_branch(line.intercept, memory);
+    }
+
+    /// By the table or line of the branch that is remembered; NaN where it has neither.
+    [[nodiscard]] Solution on_branch(double intercept, const Memory& memory) const noexcept {
+        const Branch& branch = branches_[memory.branch];
+        const double turned = period_ * memory.turns;
+        const double q = std::clamp(intercept - slope_ * turned, branch.values.lower, branch.values.upper);
+        if (branch.table.covers(q)) {
+            return answer(branch.table.at(q) + turned, intercept, false);
+        }
+        if (branch.line_slope > 0.0) {
+            return answer(branch.on_line(q), q, true);
+        }
+        constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+        return answer(nowhere, nowhere, false);
     }
 
     /// The branch that holds the last position; where F falls, the one that -residual leads to.
@@ -339,7 +352,7 @@ class Resolvent {
         }
     }
 
-    LoadLineSolver solver_;
+    CertifiedSolver solver_;
     double slope_;
     double period_;
     bool repeats_ = false;

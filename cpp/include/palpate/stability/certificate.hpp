@@ -121,28 +121,32 @@ namespace detail {
     std::vector<Inequality> lines = detail::inequalities_behind_a_coupling(bounds, scheme, device);
     if (bounds.drag > 0.0) {
         lines.push_back({"velocity-coupling", "force of velocity behind a coupling", "B_v = 0", 0.0,
-                         bounds.drag, Basis::None, "docs/certificate.md"});
+                         bounds.drag, Basis::None, "use direct rendering"});
     }
     return lines;
 }
 
 namespace detail {
 
-/// The longest period for which every line holds, all else as it is: right sides grow with it in proportion.
-[[nodiscard]] inline double longest_period(const std::vector<Inequality>& lines, const ForceBounds& bounds,
-                                           const Scheme& scheme, const DeviceProfile& device) {
-    constexpr double most = 100.0;  // of the longest period asked for: as good as any
-    DeviceProfile later = device;
-    later.jitter_s += device.longest_period_s();
-    const std::vector<Inequality> doubled = inequalities_of(bounds, scheme, later);
-    double factor = most;
-    for (std::size_t k = 0; k < lines.size(); ++k) {
-        const double growth = doubled[k].right - lines[k].right;
-        if (growth > 0.0) {
-            factor = std::min(factor, 1.0 + lines[k].margin() / growth);
-        }
+/// The longest period for which every line holds, all else equal; at most 100 times the longest one asked for.
+[[nodiscard]] inline double longest_period(const ForceBounds& bounds, const Scheme& scheme,
+                                           const DeviceProfile& device) {
+    const auto holds = [&](double factor) {
+        DeviceProfile later = device;
+        later.jitter_s = factor * device.longest_period_s() - device.period_s;
+        const std::vector<Inequality> lines = inequalities_of(bounds, scheme, later);
+        return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+    };
+    double low = 1.0;
+    double high = 100.0;
+    if (holds(high)) {
+        return high * device.longest_period_s();
     }
-    return factor * device.longest_period_s();
+    for (int k = 0; k < 50; ++k) {
+        const double middle = 0.5 * (low + high);
+        (holds(middle) ? low : high) = middle;
+    }
+    return low * device.longest_period_s();
 }
 
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
@@ -195,7 +199,7 @@ namespace detail {
     if (all([](const Inequality& line) { return line.holds(); })) {
         const bool proved = all([](const Inequality& line) { return line.rests_on != Basis::Linear; });
         certificate.verdict = proved ? Verdict::Certified : Verdict::StableLocally;
-        certificate.longest_period_s = detail::longest_period(lines, certificate.bounds, scheme, device);
+        certificate.longest_period_s = detail::longest_period(certificate.bounds, scheme, device);
     }
     certificate.why = detail::reason(lines, certificate.verdict);
     certificate.inequalities = std::move(lines);
@@ -215,7 +219,8 @@ namespace detail {
                                          const DeviceProfile& device) {
     validate(device);
     validate(scheme, model);
-    Certificate certificate = certify(force_bounds(model, scheme.play_radius), scheme, device);
+    Certificate certificate =
+        certify(force_bounds(model, scheme.play_radius, device.force_limit), scheme, device);
     certificate.model = fingerprint(model);
     certificate.fingerprint = fingerprint_of(certificate);
     return certificate;

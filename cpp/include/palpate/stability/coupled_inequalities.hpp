@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
@@ -11,6 +11,7 @@
 #include "palpate/rendering/inertia.hpp"
 #include "palpate/stability/coupling_need.hpp"
 #include "palpate/stability/direct_inequalities.hpp"
+#include "palpate/stability/encoder_gain.hpp"
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/inequality.hpp"
 
@@ -18,43 +19,31 @@ namespace palpate {
 
 namespace detail {
 
-/// What holds for every passive object behind a coupling.
-[[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, const DeviceProfile& device) {
-    const double need =
-        device.longest_period_s() * coupling_need(coupling, device.period_s, device.late_samples());
-    if (device.late_samples() == 0) {
-        return {"damping-coupling",
-                "viscous damping against the held coupling",
-                "b > K_c T / 2 + B_c",
-                device.viscous_damping,
-                need,
-                Basis::Proved,
-                "Colgate, Stanley and Brown 1995; docs/certificate.md",
-                true};
-    }
+/// A delay as texts name it.
+[[nodiscard]] inline bool late(const DeviceProfile& device) noexcept {
+    return device.late_samples() > 0;
+}
+
+/// A line beyond which nothing is known, and what to do there.
+[[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double known,
+                                        double value, const char* cure) {
+    return {id, name, formula, known, value, Basis::None, cure};
+}
+
+/// Damping for a coupling and an object behind it whose force falls with a slope of at most `falling`; for 0 with or
+/// without a force limit.
+[[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
+                                                    const DeviceProfile& device) {
     return {"damping-coupling",
-            "viscous damping against the held, late coupling",
-            "b >= T max sin^2((n_d + 1) theta / 2) (A^2 + K_c^2 / 4 cot^2(theta / 2)) / A",
+            late(device) ? "viscous damping against the held, late coupling"
+                         : "viscous damping against the held coupling",
+            late(device) ? "b >= T (s_ / 2 + max |H - s_|^2 / (2 (K_c + 2 B_c / T - s_)))"
+                         : "b >= K_c T / 2 + B_c",
             device.viscous_damping,
-            need,
+            device.longest_period_s() * coupling_need(coupling, device.period_s, device.whole_delay_samples(),
+                                                      device.delay_fraction(), falling),
             Basis::Proved,
-            "docs/certificate.md"};
-}
-
-/// A line that says that nothing is known beyond it.
-[[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double value) {
-    return {id, name, formula, 0.0, value, Basis::None, "no bound is known"};
-}
-
-/// What the proof of a coupled structure asks of an object whose force falls: `room` is how steeply it may.
-inline void add_falling(std::vector<Inequality>& lines, const ForceBounds& bounds,
-                        const DeviceProfile& device, double room, const char* formula) {
-    lines.push_back({"falling-slope-coupling", "falling force behind the coupling", formula, room,
-                     bounds.falling(), Basis::Proved, "docs/certificate.md"});
-    if (device.late_samples() > 0) {
-        lines.push_back(unknown("falling-slope-delay", "a force that falls, with delay",
-                                "known for s_ = 0 only", bounds.falling()));
-    }
+            "Colgate, Stanley and Brown 1995; docs/certificate.md"};
 }
 
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
@@ -64,11 +53,12 @@ inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) 
     }
 }
 
-/// Behind a coupling no bound is known for what encoder steps do to a mass, or to a play.
+/// No bound is known for the effect of encoder steps on this object.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
-                                const DeviceProfile& device, const char* name) {
+                                const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name,
-                            "known for an encoder without steps, Delta = 0, only", device.encoder_step));
+                            "known for an encoder without steps, Delta = 0, only", 0.0, device.encoder_step,
+                            cure));
     DeviceProfile smooth = device;
     smooth.encoder_step = 0.0;
     Inequality friction = friction_inequality(smooth, 0.0, bounds.mean_force, "0");
@@ -77,43 +67,68 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
     lines.push_back(friction);
 }
 
+inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const ForceBounds& bounds,
+                                          const DeviceProfile& device) {
+    add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling",
+                        "leave the mass out (mass 0, damping 0)");
+}
+
 /// p + min f' > 0: the load line has one solution.
 [[nodiscard]] inline Inequality uniqueness(double p, double falling, const char* formula) {
     return {"unique-solution", "one solution of the load line", formula, p, falling,
             Basis::Proved,     "docs/certificate.md",           true};
 }
 
-/// gamma: what an error of the encoder can become of in the force of a massless object.
-[[nodiscard]] inline double massless_gain(const ForceBounds& bounds, VirtualCoupling coupling,
-                                          double period_s) noexcept {
-    const double falling = bounds.falling();
-    if (falling >= coupling.stiffness) {
-        return std::numeric_limits<double>::infinity();
-    }
-    const double beta = coupling.damping / period_s;
-    const double p = coupling.stiffness + beta;
-    const double carried = std::max(1.0, falling / (coupling.stiffness - falling));
-    double gain = 0.0;
-    for (const double slope : {-falling, bounds.rising()}) {
-        gain = std::max(gain, std::abs(slope) * (p + beta * carried) / (p + slope));
-    }
-    return gain;
+/// True if the force of a coupling to a mass can reach the limit. It has no bound, because a hand can move any
+/// distance in a sample.
+[[nodiscard]] inline bool limit_acts(const DeviceProfile& device) noexcept {
+    return std::isfinite(device.force_limit);
 }
 
 }  // namespace detail
 
-/// An object without mass behind a coupling. Without coupling damping a static one is a static force F(x) of
-/// slope K_c f' / (K_c + f').
+/// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
+/// object whose force falls with a slope of at most `falling`; 0 if there is none.
+[[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
+                                              double share) {
+    constexpr double finer = 0.97;
+    constexpr double softest = 1e-9;
+    constexpr int halvings = 40;
+    DeviceProfile spared = device;
+    spared.viscous_damping *= share;
+    const auto fits = [&](double stiffness) {
+        return detail::coupling_inequality({stiffness, damping}, falling, spared).holds();
+    };
+    const double most = 2.0 * spared.viscous_damping / device.longest_period_s();
+    double low = most;
+    while (low > softest * most && !fits(low)) {
+        low *= finer;
+    }
+    if (!(low > softest * most)) {
+        return 0.0;
+    }
+    double high = low / finer;
+    for (int k = 0; k < halvings; ++k) {
+        const double middle = 0.5 * (low + high);
+        (fits(middle) ? low : high) = middle;
+    }
+    return low;
+}
+
+/// An object without mass behind a coupling, its force limited: slopes of the limited force are those of the force or
+/// 0. Without coupling damping a static one is a static force F(x) of slope K_c f' / (K_c + f').
 [[nodiscard]] inline std::vector<Inequality> massless_inequalities(const ForceBounds& bounds,
                                                                    VirtualCoupling coupling,
                                                                    const DeviceProfile& device) {
     const double p = coupling.stiffness + coupling.damping / device.period_s;
     std::vector<Inequality> lines;
+    detail::add_loss(lines, bounds);
+    lines.push_back(
+        detail::uniqueness(p, bounds.falling(), coupling.damping == 0.0 ? "K_c > s_" : "K_c + B_c / T > s_"));
+    if (!lines.back().holds()) {
+        return lines;
+    }
     if (coupling.damping == 0.0 && !bounds.hysteresis) {
-        lines.push_back(detail::uniqueness(p, bounds.falling(), "K_c > s_"));
-        if (!lines.front().holds()) {
-            return lines;
-        }
         ForceBounds felt = bounds;
         felt.slope = {felt_slope(bounds.slope.lower, coupling.stiffness),
                       std::isfinite(bounds.slope.upper) ? felt_slope(bounds.slope.upper, coupling.stiffness)
@@ -125,17 +140,16 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
         }
         return lines;
     }
-    detail::add_loss(lines, bounds);
-    lines.push_back(detail::coupling_inequality(coupling, device));
-    detail::add_falling(lines, bounds, device, p, "K_c + B_c / T >= s_");
-    lines.push_back(detail::uniqueness(p, bounds.falling(), "K_c + B_c / T > s_"));
+    lines.push_back(detail::coupling_inequality(coupling, bounds.falling(), device));
     if (bounds.hysteresis) {
-        detail::add_no_quantisation(lines, bounds, device, "encoder steps and a play behind a coupling");
+        detail::add_no_quantisation(lines, bounds, device, "encoder steps and a play behind a coupling",
+                                    "use direct rendering");
     } else if (bounds.falling() >= coupling.stiffness) {
-        detail::add_no_quantisation(lines, bounds, device, "encoder steps and a force that falls with K_c");
+        detail::add_no_quantisation(lines, bounds, device,
+                                    "encoder steps and a force that falls at least as steeply as K_c",
+                                    "use direct rendering");
     } else {
-        lines.push_back(detail::friction_inequality(device,
-                                                    detail::massless_gain(bounds, coupling, device.period_s),
+        lines.push_back(detail::friction_inequality(device, massless_gain(bounds, coupling, device.period_s),
                                                     bounds.mean_force, "gamma Delta / 2"));
     }
     return lines;
@@ -146,29 +160,53 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
                                                                    VirtualCoupling coupling,
                                                                    const DeviceProfile& device) {
     const double T = device.period_s;
-    const double room = coupling.stiffness + (coupling.damping + 2.0 * inertia.damping) / T;
-    const double p = coupling.stiffness + (coupling.damping + inertia.damping + inertia.mass / T) / T;
+    const double damped = 2.0 * inertia.damping / T;
+    const double alone = (inertia.damping + inertia.mass / T) / T;
+    const double coupled = coupling.stiffness + coupling.damping / T;
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
-    lines.push_back(detail::coupling_inequality(coupling, device));
-    detail::add_falling(lines, bounds, device, room, "K_c + (B_c + 2 B_o) / T >= s_");
-    lines.push_back(detail::uniqueness(p, bounds.falling(), "p > s_"));
-    detail::add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling");
+    if (detail::limit_acts(device)) {
+        lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
+        lines.push_back(detail::unknown(
+            "falling-slope-limit", "falling force of an object with mass, with a force limit",
+            "known for s_ <= 2 B_o / T", damped, bounds.falling(), "use the energy-consistent structure"));
+        lines.push_back(detail::uniqueness(alone, bounds.falling(), "m / T^2 + B_o / T > s_"));
+        detail::add_no_quantisation_of_a_mass(lines, bounds, device);
+        return lines;
+    }
+    lines.push_back({"falling-slope-coupling", "falling force behind the coupling",
+                     "K_c + (B_c + 2 B_o) / T >= s_", coupled + damped, bounds.falling(), Basis::Proved,
+                     "docs/certificate.md"});
+    lines.push_back(detail::coupling_inequality(coupling, std::max(0.0, bounds.falling() - damped), device));
+    lines.push_back(detail::uniqueness(coupled + alone, bounds.falling(), "p > s_"));
+    if (!bounds.hysteresis && bounds.slope.lower == bounds.slope.upper) {
+        lines.push_back(detail::friction_inequality(device,
+                                                    implicit_gain(bounds.slope.lower, inertia, coupling, T),
+                                                    bounds.mean_force, "||g||_1 Delta / 2"));
+    } else {
+        detail::add_no_quantisation_of_a_mass(lines, bounds, device);
+    }
     return lines;
 }
 
-/// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope.
+/// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope, and at any
+/// solution of the step.
 [[nodiscard]] inline std::vector<Inequality> energy_consistent_inequalities(const ForceBounds& bounds,
                                                                             Inertia inertia,
                                                                             VirtualCoupling coupling,
                                                                             const DeviceProfile& device) {
     const double T = device.period_s;
-    const double p = coupling.stiffness + (coupling.damping + inertia.damping + 2.0 * inertia.mass / T) / T;
+    const bool limited = detail::limit_acts(device);
+    const double alone = (inertia.damping + 2.0 * inertia.mass / T) / T;
+    const double coupled = coupling.stiffness + coupling.damping / T;
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
-    lines.push_back(detail::coupling_inequality(coupling, device));
-    lines.push_back(detail::uniqueness(p, 0.5 * bounds.falling(), "p > s_ / 2"));
-    detail::add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling");
+    lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
+    lines.push_back({"solution-exists", "a solution of every step",
+                     limited ? "2 m / T^2 + B_o / T > s_ / 2" : "p > s_ / 2",
+                     limited ? alone : alone + coupled, 0.5 * bounds.falling(), Basis::Proved,
+                     "docs/certificate.md", true});
+    detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     return lines;
 }
 

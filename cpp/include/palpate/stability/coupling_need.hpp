@@ -50,13 +50,14 @@ template <class Need>
 
 }  // namespace detail
 
-/// The device damping, over the longest period, that a coupling without a force limit of its own needs if it is held
-/// for a sample and n + tau samples late, whatever object stands behind it whose force falls with a slope of at most
-/// s. With beta = B_c / T, H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)),
+/// The device damping, over the longest period, that a coupling needs if it is held for a sample and n + tau samples
+/// late, whatever object stands behind it whose force falls with a slope of at most s. With beta = B_c / T,
+/// H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)),
 ///
-///     s / 2 + max over theta of |H_n - s|^2 / (2 (K_c + 2 beta - s)),   s < K_c + beta.
+///     s / 2 + max over theta of |H_n - s|^2 / (2 (K_c + 2 beta - s)),   s <= K_c + beta.
 ///
-/// Without delay that is K_c / 2 + beta for each s. Infinite where nothing is proved.
+/// Without delay that is K_c / 2 + beta for each s. A force limit on the coupling itself leaves it as it is if s = 0.
+/// Infinite where nothing is proved.
 [[nodiscard]] inline double coupling_need(VirtualCoupling coupling, double period_s, int whole,
                                           double fraction = 0.0, double falling = 0.0) noexcept {
     const double stiffness = coupling.stiffness;
@@ -65,7 +66,7 @@ template <class Need>
     if (!(held > 0.0)) {
         return 0.0;
     }
-    if (!(falling < stiffness + damping)) {
+    if (!(falling <= stiffness + damping)) {
         return std::numeric_limits<double>::infinity();
     }
     return std::max(held, detail::need_up_to(whole, fraction, [&](int n, double phi) {
@@ -78,23 +79,6 @@ template <class Need>
                             2.0 * falling * sum * (real * std::cos(n * phi) + imaginary * std::sin(n * phi)) +
                             falling * falling;
                         return 0.5 * falling + 0.5 * square / (2.0 * held - falling);
-                    }));
-}
-
-/// The same for a coupling with a force limit inside the solution, and an object behind it that takes in what it
-/// stores:
-///
-///     max over theta of sin^2((n + 1) theta / 2) (K_c / (2 sin^2(theta / 2)) + beta).
-///
-/// It is never below that of a coupling without a limit.
-[[nodiscard]] inline double limited_coupling_need(VirtualCoupling coupling, double period_s, int whole,
-                                                  double fraction = 0.0) noexcept {
-    const double half = 0.5 * coupling.stiffness;
-    const double damping = coupling.damping / period_s;
-    return std::max(half + damping, detail::need_up_to(whole, fraction, [&](int n, double phi) {
-                        const double sine = std::sin(phi);
-                        const double sum = detail::sum_of_delays(n, phi);
-                        return sum * sum * (half + damping * sine * sine);
                     }));
 }
 

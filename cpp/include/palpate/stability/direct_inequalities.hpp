@@ -6,68 +6,84 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/stability/force_bounds.hpp"
+#include "palpate/stability/held_force.hpp"
 #include "palpate/stability/inequality.hpp"
 
 namespace palpate {
 
 namespace detail {
 
-/// How large an error of the force the device's friction swallows, and how large it can be: `gain` times half an
-/// encoder step, half a force step, and the mean force of a model that repeats.
+/// Friction that covers the errors of the force: `gain` times half an encoder step, half a force step, and the mean
+/// push of a model that repeats.
 [[nodiscard]] inline Inequality friction_inequality(const DeviceProfile& device, double gain,
                                                     double mean_force, const std::string& formula) {
-    // An encoder that is not quantised asks nothing of any slope, however steep.
+    // An encoder without steps needs nothing, however steep the force.
     const double encoder = device.encoder_step > 0.0 ? 0.5 * gain * device.encoder_step : 0.0;
     return {"friction-steps",
             "Coulomb friction against encoder and force steps",
-            "f_c >= " + formula + " + Delta_F / 2" + (mean_force > 0.0 ? " + |mean f|" : ""),
+            "f_c >= " + formula + " + Delta_F / 2" + (mean_force > 0.0 ? " + |mean c(f)|" : ""),
             device.coulomb_friction,
             encoder + 0.5 * device.force_step + mean_force,
             Basis::Proved,
             "Abbott and Okamura 2005; Diolaiti et al. 2006; docs/certificate.md"};
 }
 
+/// Damping that covers hold and delay of a force with these slopes, and B_v of its dependence on velocity.
+[[nodiscard]] inline Inequality hold_inequality(const DeviceProfile& device, SlopeRange slopes, double drag,
+                                                const std::string& formula) {
+    const double T = device.longest_period_s();
+    const bool late = device.late_samples() > 0;
+    return {"damping-hold", "viscous damping against hold and delay", formula, device.viscous_damping,
+            // Velocities are differences over the nominal period.
+            T * device_need(device, slopes) + T / device.period_s * drag, Basis::Proved,
+            late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
+}
+
 }  // namespace detail
 
-/// A static force held for a sample, any motion within it: b >= T M / 2 + n_d T L, where M and L are of f'.
+/// A static force held for a sample, any motion within it: M and s_ bound the slopes of f, B is `device_need`.
 [[nodiscard]] inline std::vector<Inequality> direct_inequalities(const ForceBounds& bounds,
                                                                  const DeviceProfile& device) {
-    const double T = device.longest_period_s();
-    return {
-        {"damping-hold", "viscous damping against hold and delay", "b >= T M / 2 + n_d T L",
-         device.viscous_damping, T * (0.5 * bounds.rising() + device.whole_delay_samples() * bounds.steepest),
-         Basis::Proved, "Colgate and Schenkel 1997; Diolaiti et al. 2006; docs/certificate.md"},
-        detail::friction_inequality(device, bounds.steepest, bounds.mean_force, "L Delta / 2")};
+    return {detail::hold_inequality(device, {bounds.rising(), bounds.falling()}, 0.0,
+                                    device.late_samples() > 0 ? "b >= T B(M, s_, t_d)" : "b >= T M / 2"),
+            detail::friction_inequality(device, bounds.steepest, bounds.mean_force, "L Delta / 2")};
 }
 
 /// A force with hysteresis, f = g + s h with a play of radius r, rendered directly: while it sticks h / r adds to
-/// its slope, and the play can be wrong by an encoder step too.
+/// its slope. The encoder is wrong in x and in the play. Without delay the play of the reading counts as exact, for
+/// a little more slope.
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
                                                                      const DeviceProfile& device) {
-    const double T = device.longest_period_s();
-    return {
-        {"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0, Basis::Proved,
-         "docs/certificate.md"},
-        {"damping-hold", "viscous damping against hold and delay", "b >= T M_h / 2 + n_d T L_h",
-         device.viscous_damping, T * (0.5 * bounds.rising() + device.whole_delay_samples() * bounds.steepest),
-         Basis::Proved, "docs/certificate.md"},
+    const Inequality loss{
+        "loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
+        Basis::Proved,      "docs/certificate.md"};
+    const bool late = device.late_samples() > 0;
+    const auto hold = [&](double more, const std::string& added) {
+        return detail::hold_inequality(device, {bounds.rising() + more, bounds.falling() + more}, 0.0,
+                                       late ? "b >= T B(M_h, s_h, t_d)" : "b >= T (M_h" + added + ") / 2");
+    };
+    const Inequality both =
         detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.loss_per_play, bounds.mean_force,
-                                    "(max(|g'| + |h'|) + 2 max h / r) Delta / 2")};
+                                    "(max(|g'| + |h'|) + 2 max h / r) Delta / 2");
+    if (both.holds() || late || !(2.0 * bounds.play_radius() >= device.encoder_step)) {
+        return {loss, hold(0.0, ""), both};
+    }
+    const double more = 0.5 * bounds.sliding * device.encoder_step / bounds.play_radius();
+    return {loss, hold(more, " + e"),
+            detail::friction_inequality(device, bounds.sliding + more + bounds.loss_per_play,
+                                        bounds.mean_force, "(max(|g'| + |h'|) + e + max h / r) Delta / 2")};
 }
 
 /// A force f(x, v) of position and velocity rendered directly, the velocity a backward difference or a mean of
-/// several: M and L are of f(., 0), L_x = max |df/dx| is over all v.
+/// several: M and s_ are of f(., 0), L_x = max |df/dx| is over all v.
 [[nodiscard]] inline std::vector<Inequality> velocity_inequalities(const ForceBounds& bounds,
                                                                    const DeviceProfile& device) {
-    const double T = device.longest_period_s();
-    const double late = T / device.period_s;  // differences are taken over the nominal period
-    return {
-        {"damping-hold", "viscous damping against hold and delay", "b >= T M / 2 + n_d T L + B_v T / period",
-         device.viscous_damping,
-         T * (0.5 * bounds.rising() + device.whole_delay_samples() * bounds.steepest) + late * bounds.drag,
-         Basis::Proved, "docs/certificate.md"},
-        detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.drag / device.period_s, 0.0,
-                                    "L_x Delta / 2 + B_v Delta / T")};
+    return {detail::hold_inequality(
+                device, {bounds.rising(), bounds.falling()}, bounds.drag,
+                std::string(device.late_samples() > 0 ? "b >= T B(M, s_, t_d)" : "b >= T M / 2") +
+                    " + B_v T / period"),
+            detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.drag / device.period_s, 0.0,
+                                        "L_x Delta / 2 + B_v Delta / T")};
 }
 
 }  // namespace palpate

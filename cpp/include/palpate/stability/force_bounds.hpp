@@ -25,20 +25,22 @@ struct ForceBounds {
     double loss_per_play = 0.0;  ///< max h/r
     double mean_force = 0.0;     ///< what the limited force pushes on average over a period, beyond its loss
     double drag = 0.0;           ///< B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone
-    double loss_slope = 0.0;     ///< max |h'|
-    double play_radius = 0.0;    ///< r; 0 without hysteresis
 
     /// M = max(0, max f'); NaN stays NaN
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
     /// s_ = max(0, -min f'); NaN stays NaN
     [[nodiscard]] double falling() const noexcept { return slope.lower >= 0.0 ? 0.0 : -slope.lower; }
 
+    /// r, as loss and loss_per_play give it; infinite without a loss
+    [[nodiscard]] double play_radius() const noexcept {
+        return loss_per_play > 0.0 ? loss.upper / loss_per_play : std::numeric_limits<double>::infinity();
+    }
+
     /// Whether every bound is a number. Nothing is certified of one that is not.
     [[nodiscard]] bool finite() const noexcept {
         return std::isfinite(slope.lower) && std::isfinite(slope.upper) && std::isfinite(steepest) &&
                std::isfinite(sliding) && std::isfinite(loss.lower) && std::isfinite(loss.upper) &&
-               std::isfinite(loss_per_play) && std::isfinite(loss_slope) && std::isfinite(play_radius) &&
-               std::isfinite(mean_force) && std::isfinite(drag);
+               std::isfinite(loss_per_play) && std::isfinite(mean_force) && std::isfinite(drag);
     }
 };
 
@@ -146,8 +148,6 @@ struct SlopeReading {
         bounds.steepest = std::max({bounds.steepest, slide.largest(), rising_stick, falling_stick});
     }
     bounds.loss = loss_bounds(h.parameters(), g.lower(), g.upper());
-    bounds.loss_slope = over_domain(0.0, 1.0, 0.0).largest();
-    bounds.play_radius = radius;
     if (!g.periodic()) {
         for (const auto& [line, loss] : {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
             const Interval slopes = line_slopes(line);
@@ -162,7 +162,6 @@ struct SlopeReading {
                             std::max(bounds.slope.upper, slopes.upper + loss_slope + stick + rounding)};
             bounds.sliding = std::max(bounds.sliding, slide);
             bounds.steepest = std::max(bounds.steepest, slide + stick);
-            bounds.loss_slope = std::max(bounds.loss_slope, loss_slope);
         }
     }
     bounds.loss_per_play = std::max(0.0, bounds.loss.upper) / radius;

@@ -3,13 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
+
+#include "palpate/device/device_profile.hpp"
 
 namespace palpate {
 
@@ -55,49 +57,87 @@ namespace detail {
     return most;
 }
 
-/// A causal filter q_k = sum of taps[j - 1] d_{k-j}, j = 1 to N, seen at `resolution` N + 1 frequencies.
+/// Q = sum of taps[j - 1] z^-j at z = exp(i theta), conjugated; by the recurrence of cos and sin of j theta.
+[[nodiscard]] inline std::complex<double> response(std::span<const double> taps, double theta) noexcept {
+    const double twice = 2.0 * std::cos(theta);
+    std::complex<double> before = 1.0;
+    std::complex<double> now{0.5 * twice, std::sin(theta)};
+    std::complex<double> sum;
+    for (const double tap : taps) {
+        sum += tap * now;
+        before = std::exchange(now, twice * now - before);
+    }
+    return sum;
+}
+
+/// Sum of |taps|.
+[[nodiscard]] inline double size_of(std::span<const double> taps) noexcept {
+    double size = 0.0;
+    for (const double tap : taps) {
+        size += std::abs(tap);
+    }
+    return size;
+}
+
+/// How the maximum over frequency of a trigonometric polynomial of degree N is found from `resolution` N + 1 values.
+enum class Maximum {
+    Likely,  ///< by a parabola through the largest value and its neighbours
+    Proved,  ///< never below the true maximum, rounding included
+};
+
+/// The maximum of value(k) over k = 0 to last. `size` bounds the polynomial less its mean.
+template <class Value>
+[[nodiscard]] double maximum_of(Maximum kind, int resolution, std::size_t last, double size, Value value) {
+    std::size_t at = 0;
+    double largest = value(0);
+    for (std::size_t k = 1; k <= last; ++k) {
+        if (const double here = value(k); here > largest) {
+            largest = here;
+            at = k;
+        }
+    }
+    if (kind == Maximum::Proved) {
+        // Riesz: near its maximum the polynomial stays above a cosine of N theta, and the nearest frequency seen is
+        // at most pi / (2 resolution N) away.
+        return largest + (1.0 - std::cos(0.5 * std::numbers::pi / resolution) + 1e-12) * size;
+    }
+    if (at == 0 || at == last) {
+        return largest;
+    }
+    const double rise = value(at + 1) - value(at - 1);
+    const double bend = 2.0 * largest - value(at + 1) - value(at - 1);
+    return bend > 0.0 ? largest + 0.125 * rise * rise / bend : largest;
+}
+
+/// A causal filter q_k = sum of taps[j - 1] d_{k-j}, j = 1 to N, at `resolution` N + 1 frequencies.
 class FilterGain {
   public:
-    FilterGain(std::span<const double> taps, int resolution)
-        : size_{std::transform_reduce(taps.begin(), taps.end(), 0.0, std::plus<>{},
-                                      [](double tap) { return std::abs(tap); })} {
-        const auto points = static_cast<std::size_t>(resolution) * std::max<std::size_t>(1, taps.size());
-        real_.reserve(points + 1);
-        square_.reserve(points + 1);
-        for (std::size_t k = 0; k <= points; ++k) {
-            const double theta = std::numbers::pi * static_cast<double>(k) / static_cast<double>(points);
-            double real = 0.0;
-            double imaginary = 0.0;
-            for (std::size_t j = 0; j < taps.size(); ++j) {
-                const double phase = theta * static_cast<double>(j + 1);
-                real += taps[j] * std::cos(phase);
-                imaginary += taps[j] * std::sin(phase);
-            }
-            real_.push_back(real);
-            square_.push_back(real * real + imaginary * imaginary);
+    FilterGain(std::span<const double> taps, Maximum kind, int resolution)
+        : kind_{kind}, resolution_{resolution}, size_{size_of(taps)} {
+        const auto last = static_cast<std::size_t>(resolution) * std::max<std::size_t>(1, taps.size());
+        for (std::size_t k = 0; k <= last; ++k) {
+            const std::complex<double> Q =
+                response(taps, std::numbers::pi * static_cast<double>(k) / static_cast<double>(last));
+            real_.push_back(Q.real());
+            square_.push_back(std::norm(Q));
         }
-        // Riesz: near its maximum a trigonometric polynomial of degree N stays above a cosine of N theta; the nearest
-        // frequency seen is at most pi / (2 resolution N) away.
-        miss_ = 1.0 - std::cos(0.5 * std::numbers::pi / resolution);
     }
 
     /// Sum of |taps|, an upper bound of |Q|.
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// max over theta of l Re Q + gamma |Q|^2; never below the true maximum, rounding included.
+    /// max over theta of l Re Q + gamma |Q|^2.
     [[nodiscard]] double most(double l, double gamma) const noexcept {
-        double largest = -std::numeric_limits<double>::infinity();
-        for (std::size_t k = 0; k < real_.size(); ++k) {
-            largest = std::max(largest, l * real_[k] + gamma * square_[k]);
-        }
-        return largest + (miss_ + 1e-13) * (std::abs(l) + gamma * size_) * size_;
+        return maximum_of(kind_, resolution_, real_.size() - 1, (std::abs(l) + gamma * size_) * size_,
+                          [&](std::size_t k) { return l * real_[k] + gamma * square_[k]; });
     }
 
   private:
+    Maximum kind_;
+    int resolution_;
+    double size_;
     std::vector<double> real_;
     std::vector<double> square_;
-    double size_;
-    double miss_ = 0.0;
 };
 
 /// Least value of a convex function between two ends, and where.
@@ -131,19 +171,23 @@ template <class Function>
     return at_left <= at_right ? Least{left, at_left} : Least{right, at_right};
 }
 
-/// min over l and gamma of cost(gain, l, gamma), convex in both: sought with few frequencies, told with many. Every
-/// l and gamma gives a proof, so the search decides only how tight the result is.
-template <class Cost>
+/// min over l and gamma of cost(gain, l, gamma), convex in both. Every l and gamma is a proof, so the search may use
+/// likely maxima; what is returned uses proved ones. A little weight on l and gamma makes the search end at the same
+/// place on every machine.
+template <class Gain = FilterGain, class Cost>
 [[nodiscard]] double least_cost(std::span<const double> taps, SlopeRange slopes, Cost cost) {
-    const FilterGain rough{taps, 64};
+    constexpr double weight = 1e-8;
+    const Gain rough{taps, Maximum::Likely, 64};
     const double slope = slopes.rising + slopes.falling;
     const double highest = 8.0 * slope / rough.size();
-    double gamma = highest;
-    const Least best = least_between(-slope, slope, [&](double l) {
-        return least_between(0.0, highest, [&](double g) { return cost(rough, l, g); }).value;
-    });
-    gamma = least_between(0.0, highest, [&](double g) { return cost(rough, best.at, g); }).at;
-    return cost(FilterGain{taps, 2048}, best.at, gamma) * (1.0 + 1e-13);
+    const auto least_over_gamma = [&](double l) {
+        return least_between(0.0, highest, [&](double gamma) {
+            return cost(rough, l, gamma) +
+                   weight * (l * l / slope + slope * (gamma / highest) * (gamma / highest));
+        });
+    };
+    const double l = least_between(-slope, slope, [&](double at) { return least_over_gamma(at).value; }).at;
+    return cost(Gain{taps, Maximum::Proved, 2048}, l, least_over_gamma(l).at) * (1.0 + 1e-13);
 }
 
 }  // namespace detail
@@ -155,10 +199,7 @@ template <class Cost>
 ///
 /// n samples of delay are n taps of 1; a force with hysteresis may be delayed only (docs/certificate.md).
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, SlopeRange slopes) {
-    double size = 0.0;
-    for (const double tap : taps) {
-        size += std::abs(tap);
-    }
+    const double size = detail::size_of(taps);
     const double simple = held_need(size, slopes);
     if (!(slopes.steepest() > 0.0) || !std::isfinite(simple) || size == 0.0) {
         return simple;
@@ -204,6 +245,115 @@ namespace detail {
     const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
     const double need = filtered_need(taps, slopes);
     return fraction > 0.0 ? std::max(need, detail::split_sample_need(whole, fraction, slopes)) : need;
+}
+
+namespace detail {
+
+/// A causal filter in both parts of a sample: Q of the command of this sample and (1 + Q) / z of the one before.
+class SplitGain {
+  public:
+    SplitGain(std::span<const double> taps, Maximum kind, int resolution)
+        : kind_{kind}, resolution_{resolution}, size_{1.0 + size_of(taps)} {
+        const std::size_t last = static_cast<std::size_t>(resolution) * (taps.size() + 1);
+        for (std::size_t k = 0; k <= last; ++k) {
+            const double theta = std::numbers::pi * static_cast<double>(k) / static_cast<double>(last);
+            now_.push_back(response(taps, theta));
+            before_.push_back((1.0 + now_.back()) * std::polar(1.0, theta));
+        }
+    }
+
+    [[nodiscard]] double size() const noexcept { return size_; }
+
+    /// Largest eigenvalue over all frequencies of the form of both parts, with a gamma for each.
+    [[nodiscard]] double most(double fraction, SlopeRange slopes, double l, double gamma_first,
+                              double gamma_second) const noexcept {
+        const double rest = 1.0 - fraction;
+        const double first = step_energy(slopes, l, gamma_first);
+        const double second = step_energy(slopes, l, gamma_second);
+        const auto eigenvalue = [&](std::size_t k) {
+            const std::complex<double> Q = now_[k];
+            const std::complex<double> other = std::conj(1.0 + Q);
+            const double wide = gamma_first * std::norm(other);
+            const double one =
+                fraction * (first + l * before_[k].real() + wide + gamma_second * std::norm(other));
+            const double two = rest * (second + l * Q.real() + wide + gamma_second * std::norm(Q));
+            const double across =
+                fraction * rest * std::norm(0.5 * l * (before_[k] + other) + wide + gamma_second * other * Q);
+            return 0.5 * (one + two + std::sqrt((one - two) * (one - two) + 4.0 * across));
+        };
+        return maximum_of(kind_, resolution_, now_.size() - 1,
+                          (2.0 * std::abs(l) + (gamma_first + gamma_second) * size_) * size_, eigenvalue);
+    }
+
+  private:
+    Maximum kind_;
+    int resolution_;
+    double size_;
+    std::vector<std::complex<double>> now_;
+    std::vector<std::complex<double>> before_;
+};
+
+}  // namespace detail
+
+/// The same for a static force whose command, computed at x_k - q_k, acts a further fraction tau of a sample late:
+/// during the first part of a sample, in which the handle moves by alpha, the command before. Each part is a step of
+/// its own, alpha^2 h(q' / alpha) and beta^2 h((q + alpha) / beta), against B (alpha^2 / tau + beta^2 / (1 - tau)).
+[[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes) {
+    if (!(fraction > 0.0) || !(slopes.steepest() > 0.0) || !std::isfinite(slopes.rising + slopes.falling)) {
+        return filtered_need(taps, slopes);
+    }
+    const auto least = [&](double gamma_first, double gamma_second) {
+        return detail::least_cost<detail::SplitGain>(
+            taps, slopes, [&](const detail::SplitGain& gain, double l, double gamma) {
+                return gain.most(fraction, slopes, l, gamma_first * gamma, gamma_second * gamma);
+            });
+    };
+    return std::min(least(fraction, 1.0 - fraction), least(std::sqrt(fraction), std::sqrt(1.0 - fraction)));
+}
+
+namespace detail {
+
+/// The need with samples at k period + u_k, 0 <= u_k <= jitter, and each command acting `delay` after its sample:
+/// the smaller of R(Lambda) and the line for n samples of delay with what the rest of the delay, at most a time
+/// nu T from the n-th sample, adds.
+[[nodiscard]] inline double jittered_need(double delay, double period, double jitter, SlopeRange slopes) {
+    const double T = period + jitter;
+    if (delay <= period - jitter) {  // within its own sample
+        return delayed_need(0, delay / T, slopes);
+    }
+    // Lambda^2 T: what the delay that begins at one sample has in common with all others, itself included.
+    double common = delay;
+    for (int j = 1; j * period < delay + jitter; ++j) {
+        const double rest = delay - j * period;
+        common += std::min(delay, rest + jitter) + std::max(0.0, rest);
+    }
+    const double simple = held_need(std::sqrt(common / T), slopes);
+    const int whole = static_cast<int>(std::lround(delay / period));
+    if (jitter >= period || whole == 0 || !(slopes.steepest() > 0.0) || !std::isfinite(simple)) {
+        return simple;
+    }
+    const double off = std::abs(delay - whole * period);
+    const double span = off + jitter + std::max(0.0, jitter - off);
+    const double nu = (off + jitter) * std::ceil(span / (period - jitter)) / T;
+    const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
+    const double eta = std::sqrt(nu) / whole;
+    const double sharp = least_cost(taps, slopes, [&](const FilterGain& gain, double l, double gamma) {
+        return step_energy(slopes, l, gamma) + gain.most(l, gamma * (1.0 + eta)) +
+               gamma * (1.0 + 1.0 / eta) * nu + std::abs(l) * std::sqrt(nu);
+    });
+    return std::min(simple, sharp);
+}
+
+}  // namespace detail
+
+/// b / T that a held force needs on a device, static or with hysteresis; T is the longest time between two samples.
+/// The device class: samples are taken at k period_s + u_k with 0 <= u_k <= jitter_s (the loop keeps to absolute
+/// times), and each command acts delay_s after its own sample. A device that counts its delay in samples needs no
+/// more with jitter than without.
+[[nodiscard]] inline double device_need(const DeviceProfile& device, SlopeRange slopes) {
+    const bool steady = device.jitter_s == 0.0 || device.late_samples() == 0;
+    return steady ? delayed_need(device.whole_delay_samples(), device.delay_fraction(), slopes)
+                  : detail::jittered_need(device.delay_s, device.period_s, device.jitter_s, slopes);
 }
 
 }  // namespace palpate

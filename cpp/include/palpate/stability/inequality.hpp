@@ -44,10 +44,12 @@ struct Inequality {
     }
 };
 
-/// "viscous damping: b >= T M / 2 + n_d T L needs 0.075, there is 0.06, short by 0.015"
+/// "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a known bound has its
+/// cure as source.
 [[nodiscard]] inline std::string shortfall(const Inequality& line) {
     if (line.rests_on == Basis::None) {
-        return line.name + ": " + line.formula + ", and it is " + readable(line.right);
+        return line.name + ": " + line.formula + (line.left != 0.0 ? " = " + readable(line.left) : "") +
+               ", and it is " + readable(line.right) + "; " + line.source;
     }
     return line.name + ": " + line.formula + " needs " + readable(line.right) + ", there is " +
            readable(line.left) + ", short by " + readable(-line.margin());

@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "palpate/model/bounds.hpp"
+#include "palpate/model/derivatives.hpp"
+#include "palpate/model/environment.hpp"
+#include "palpate/model/hysteresis.hpp"
+#include "palpate/model/parameters.hpp"
+#include "palpate/solver/load_line.hpp"
+#include "palpate/solver/newton.hpp"
+#include "palpate/solver/piecewise_force.hpp"
+#include "palpate/status.hpp"
+
+namespace palpate {
+
+/// Solves f(y) + p y = q in at most four evaluations, for every start and every q, where p is certified to make
+/// F(y) = f(y) + p y rise. Where it is not, `LoadLineSolver` searches from the last position.
+///
+/// On load the line is cut into cells of width w with
+///
+///     w max|F''| <= min F' / 4,                                                                        (C)
+///
+/// certified by Taylor's formula about the middle of each cell, and F is stored at their borders. Cells over the
+/// whole line prove that F rises. A step finds the cell of q among the border values, interpolates linearly and
+/// takes Newton's steps inside the cell:
+/// - The interpolation misses F by at most w^2 max|F''| / 8, and the position by w/32.
+/// - A step turns an error e into at most c e^2, c = max|F''| / (2 min F') <= 1/(8w). Errors: w/32, w/2^13,
+///   w/2^29, w/2^61. Clamping to the cell, which holds the solution, increases none.
+/// - A correction d shows the error before it: e <= |d| + c e^2 <= |d| + e/8, so that after it at most
+///   (64/49) c d^2 is left. What leaves a residual below rounding needs no evaluation to confirm it.
+///
+/// Where q stays in the cell of the last step, one evaluation more comes first, where the last tangent predicts
+/// the solution. Most steps of a slow motion end with it, because it leaves less than `tolerance`.
+///
+/// A hysteresis has three sheets: F with g + h (pressing), with g - h (releasing) and with g + (y - play) h / r
+/// (sticking). Each rises and obeys (C), the last for all |y - play| <= r + w at once, so that one partition serves
+/// every `play`. F is the median of the three, and the median of their interpolations, or of their Newton steps, is
+/// as near as each of them is to its own sheet. For at the solution two sheets are >= q and two are <= q: two of the
+/// steps end below it but for c e^2, and two above it.
+class CertifiedSolver {
+  public:
+    /// What the last step leaves to the next: its solution as a function of q, and its cell.
+    struct Memory {
+        double position = 0.0;    ///< the last solution
+        double at_zero = 0.0;     ///< what its tangent predicts for q = 0
+        double compliance = 0.0;  ///< its 1 / F'
+        std::size_t cell = none;
+        double turned = 0.0;  ///< whole turns of a knob up to that cell [m or rad]
+
+        Memory() = default;
+        explicit Memory(double at) noexcept : position{at} {}
+    };
+
+    CertifiedSolver(const PiecewiseForce& force, double p) : CertifiedSolver{force, silent(force), 0.0, p} {}
+    CertifiedSolver(const HysteresisNetwork& pair, double p)
+        : CertifiedSolver{piecewise(pair, 0.0), piecewise_loss(pair), pair.play_radius(), p} {}
+
+    [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
+    /// Whether every load line of this slope is certified to have one solution.
+    [[nodiscard]] bool unique(double p) const noexcept { return p >= least_slope_; }
+    /// The search for a force of which nothing is certified.
+    [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return search_; }
+    [[nodiscard]] std::size_t cells() const noexcept { return borders_.empty() ? 0 : borders_.size() - 1; }
+
+    template <Environment E>
+    [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
+                                                            const typename E::State& state, LoadLine line,
+                                                            Memory& memory) const noexcept {
+        if (memory.cell != none && unique(line.slope)) {
+            const Cell cell = cell_at(memory.cell, memory.turned);
+            const double play = play_of(state);
+            if (holds(memory.cell, memory.turned, line, play)) {
+                const double y =
+                    std::clamp(memory.at_zero + line.intercept * memory.compliance, cell.low, cell.high);
+                const Trial trial = newton(environment, state, line, y, cell);
+                const double left = left_by(trial.correction, cell.curvature);
+                if (left <= tolerance_) {
+                    return found(trial, line, 1, memory);
+                }
+                const double start = 32.0 * left <= cell.high - cell.low
+                                         ? trial.position
+                                         : interpolated(memory.cell, memory.turned, line, play);
+                return descend(environment, state, line, start, 1, memory);
+            }
+        }
+        return from_borders(environment, state, line, memory);
+    }
+
+    /// The search from the last position, as for a force of which nothing is certified.
+    template <Environment E>
+    [[nodiscard]] Solution search(const E& environment, const typename E::State& state, LoadLine line,
+                                  Memory& memory) const noexcept {
+        const Solution solution = search_.solve(environment, state, line, memory.position);
+        if (solution.status != Status::NonFinite) {
+            memory = Memory{solution.position};
+        }
+        return solution;
+    }
+
+  private:
+    static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
+    static constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+    /// A border between cells, with c of the cell above it.
+    struct Border {
+        double position;
+        double force;  ///< f, or g of a hysteresis
+        double loss;   ///< h
+        double curvature;
+    };
+
+    /// Cell k lies below border k and above the one before it; the outermost two are half-lines.
+    struct Cell {
+        double low;
+        double high;
+        double curvature;
+    };
+
+    /// A stretch over which force and loss are networks; a line is one without wavelets.
+    struct Piece {
+        Interval positions;
+        NetworkParameters force;
+        NetworkParameters loss;
+    };
+
+    /// Where a step of Newton's method leads.
+    struct Trial {
+        double position;
+        double correction;
+        double compliance;  ///< 1 / F' where it was evaluated
+        double steepest;    ///< largest F' there of any sheet
+        EnvironmentSample sample;
+    };
+
+    CertifiedSolver(const PiecewiseForce& force, const PiecewiseForce& loss, double radius, double p)
+        : radius_{radius},
+          by_radius_{radius > 0.0 ? 1.0 / radius : 0.0},
+          travel_{force.upper - force.lower},
+          period_{force.periodic ? travel_ : 0.0},
+          tolerance_{1e-13 * travel_} {
+        search_.longest_step = 0.25 * travel_;
+        for (const double alpha : force.network.alpha) {
+            search_.longest_step = std::min(search_.longest_step, 0.25 / alpha);
+        }
+        if (radius > 0.0) {
+            search_.longest_step = std::min(search_.longest_step, 0.5 * radius);
+        }
+        if (std::isfinite(p)) {
+            cut(pieces_of(force, loss), p);
+        }
+    }
+
+    template <class State>
+    [[nodiscard]] static double play_of(const State& state) noexcept {
+        if constexpr (requires { state.play; }) {
+            return state.play;
+        } else {
+            return 0.0;
+        }
+    }
+
+    /// What a step of Newton's method leaves of the error it shows.
+    [[nodiscard]] static double left_by(double correction, double curvature) noexcept {
+        return 64.0 / 49.0 * curvature * (correction * correction);
+    }
+
+    [[nodiscard]] static double median(double a, double b, double c) noexcept {
+        return std::max(std::min(a, b), std::min(std::max(a, b), c));
+    }
+
+    /// Whether a play operator may stick at some position of the cell.
+    [[nodiscard]] bool may_stick(const Cell& cell, double play) const noexcept {
+        return radius_ > 0.0 && cell.low < play + radius_ && cell.high > play - radius_;
+    }
+
+    /// 1 where the cell lies above the positions that stick, -1 where it lies below.
+    [[nodiscard]] double direction(const Cell& cell, double play) const noexcept {
+        return cell.low >= play + radius_ ? 1.0 : -1.0;
+    }
+
+    /// F at a border, sliding or sticking, where a knob has turned so far.
+    [[nodiscard]] double value(const Border& border, double turned, double p, double play) const noexcept {
+        const double y = border.position + turned;
+        const double s = std::clamp((y - play) * by_radius_, -1.0, 1.0);
+        return border.force + s * border.loss + p * y;
+    }
+
+    [[nodiscard]] Cell cell_at(std::size_t k, double turned) const noexcept {
+        return {k == 0 ? -infinity : borders_[k - 1].position + turned,
+                k == borders_.size() ? infinity : borders_[k].position + turned,
+                k == 0 ? 0.0 : borders_[k - 1].curvature};
+    }
+
+    /// Whether the solution lies in cell k.
+    [[nodiscard]] bool holds(std::size_t k, double turned, LoadLine line, double play) const noexcept {
+        return (k == 0 || value(borders_[k - 1], turned, line.slope, play) <= line.intercept) &&
+               (k == borders_.size() || line.intercept < value(borders_[k], turned, line.slope, play));
+    }
+
+    /// Newton's method from y, clamped to the cell. Evaluated some units in the last place beside the borders,
+    /// because f' may jump there.
+    template <class E, class State>
+    [[nodiscard, gnu::always_inline]] inline Trial newton(const E& environment, const State& state,
+                                                          LoadLine line, double y,
+                                                          const Cell& cell) const noexcept {
+        const double margin = 4.0 * epsilon * (std::abs(y) + travel_);
+        y = std::fmax(std::fmin(y, cell.high - margin), cell.low + margin);
+        const auto clamped = [&](double to) { return std::clamp(to, cell.low, cell.high); };
+        const double sum = line.slope * y - line.intercept;
+        if constexpr (requires { state.play; }) {
+            const auto g = environment.force().at(y);
+            const auto h = environment.loss().at(y);
+            constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+            Trial trial{0.0, 0.0, 0.0, 0.0, {g.value, unknown, unknown, environment.force().extrapolated(y)}};
+            const auto step = [&](double s, double gain) {
+                const double slope = line.slope + g.slope + s * h.slope + gain;
+                trial.steepest = std::max(trial.steepest, slope);
+                trial.compliance = 1.0 / slope;
+                return y - (g.value + s * h.value + sum) * trial.compliance;
+            };
+            if (may_stick(cell, state.play)) {
+                const double press = step(1.0, 0.0);
+                const double pressing = trial.compliance;
+                const double release = step(-1.0, 0.0);
+                const double releasing = trial.compliance;
+                const double stick = step((y - state.play) * by_radius_, h.value * by_radius_);
+                trial.position = median(press, release, stick);
+                trial.compliance = trial.position == stick   ? trial.compliance
+                                   : trial.position == press ? pressing
+                                                             : releasing;
+            } else {
+                trial.position = step(direction(cell, state.play), 0.0);
+            }
+            trial.position = clamped(trial.position);
+            trial.correction = trial.position - y;
+            return trial;
+        } else {
+            const EnvironmentSample sample = environment.at(y, state);
+            const double slope = line.slope + sample.slope;
+            const double compliance = 1.0 / slope;
+            const double position = clamped(y - (sample.force + sum) * compliance);
+            return {position, position - y, compliance, slope, sample};
+        }
+    }
+
+    [[nodiscard]] static Solution found(const Trial& trial, LoadLine line, int evaluations,
+                                        Memory& memory) noexcept {
+        memory.position = trial.position;
+        memory.at_zero = trial.position - line.intercept * trial.compliance;
+        memory.compliance = trial.compliance;
+        return {trial.position,
+                {line.intercept - line.slope * trial.position, trial.sample.slope, trial.sample.energy,
+                 trial.sample.extrapolated},
+                0.0,
+                evaluations,
+                Status::Ok};
+    }
+
+    template <Environment E>
+    [[nodiscard, gnu::noinline]] Solution from_borders(const E& environment, const typename E::State& state,
+                                                       LoadLine line, Memory& memory) const noexcept {
+        if (!(unique(line.slope) && std::isfinite(line.intercept))) {
+            return search(environment, state, line, memory);
+        }
+        const double play = play_of(state);
+        Memory next = memory;
+        locate(line, play, next);
+        const Solution solution =
+            descend(environment, state, line, interpolated(next.cell, next.turned, line, play), 0, next);
+        if (solution.status != Status::NonFinite) {
+            memory = next;
+        }
+        return solution;
+    }
+
+    /// Newton's method from at most w/32 beside the solution, in the cell that is remembered.
+    template <Environment E>
+    [[nodiscard, gnu::noinline]] Solution descend(const E& environment, const typename E::State& state,
+                                                  LoadLine line, double y, int evaluations,
+                                                  Memory& memory) const noexcept {
+        constexpr int most = 3;
+        const Cell cell = cell_at(memory.cell, memory.turned);
+        for (int steps = 1;; ++steps) {
+            const Trial trial = newton(environment, state, line, y, cell);
+            if (!std::isfinite(trial.position)) {
+                return {y, trial.sample, trial.position, evaluations + steps, Status::NonFinite};
+            }
+            const double left = left_by(trial.correction, cell.curvature);
+            y = trial.position;
+            const double size =
+                std::abs(trial.sample.force) + std::abs(line.slope * y) + std::abs(line.intercept);
+            if (left * trial.steepest <= 4.0 * epsilon * size || steps == most) {
+                return found(trial, line, evaluations + steps, memory);
+            }
+        }
+    }
+
+    /// The cell of the solution, by the values at the borders alone.
+    void locate(LoadLine line, double play, Memory& memory) const noexcept {
+        const Border& first = borders_.front();
+        const auto lies_below = [&](const Border& border) {
+            return value(border, memory.turned, line.slope, play) <= line.intercept;
+        };
+        memory.turned = 0.0;
+        if (period_ > 0.0) {
+            double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
+                                      (line.slope * period_));
+            memory.turned = turns * period_;
+            // A loss, or rounding, may be worth some turns.
+            constexpr int farthest = 4;
+            for (int k = 0; k < farthest && !lies_below(first); ++k) {
+                memory.turned = --turns * period_;
+            }
+            for (int k = 0; k < farthest && lies_below(borders_.back()); ++k) {
+                memory.turned = ++turns * period_;
+            }
+        }
+        memory.cell = static_cast<std::size_t>(
+            std::partition_point(borders_.begin(), borders_.end(), lies_below) - borders_.begin());
+    }
+
+    /// Where the chords of the sheets over cell k reach q.
+    [[nodiscard]] double interpolated(std::size_t k, double turned, LoadLine line,
+                                      double play) const noexcept {
+        const Cell cell = cell_at(k, turned);
+        const bool half_line = k == 0 || k == borders_.size();
+        const Border& from = borders_[k == 0 ? 0 : k - 1];
+        const Border& to = borders_[half_line ? 0 : k];
+        const double end_slope = line.slope + (k == 0 ? slope_below_ : slope_above_);
+        const double y = from.position + turned;
+        const auto chord = [&](double at_from, double at_to, double gain) {
+            const double missing = line.intercept - (from.force + at_from + line.slope * y);
+            if (half_line) {
+                return y + missing / (end_slope + gain);
+            }
+            const double width = to.position - from.position;
+            return y + width * missing / (to.force - from.force + at_to - at_from + line.slope * width);
+        };
+        double start = 0.0;
+        if (may_stick(cell, play)) {
+            const double from_s = (y - play) * by_radius_;
+            const double to_s = (to.position + turned - play) * by_radius_;
+            start = median(chord(from.loss, to.loss, 0.0), chord(-from.loss, -to.loss, 0.0),
+                           chord(from_s * from.loss, to_s * to.loss, from.loss * by_radius_));
+        } else {
+            const double s = direction(cell, play);
+            start = chord(s * from.loss, s * to.loss, 0.0);
+        }
+        return std::clamp(start, cell.low, cell.high);
+    }
+
+    [[nodiscard]] static NetworkParameters straight(double slope, double at_zero) {
+        return {1, {}, {}, {}, {slope}, at_zero};
+    }
+
+    /// The loss of a force without memory, in the same pieces.
+    [[nodiscard]] static PiecewiseForce silent(const PiecewiseForce& force) {
+        PiecewiseForce loss = scaled(force, 0.0);
+        loss.network = straight(0.0, 0.0);
+        return loss;
+    }
+
+    /// From left to right; on both sides the last line reaches to infinity.
+    [[nodiscard]] static std::vector<Piece> pieces_of(const PiecewiseForce& force,
+                                                      const PiecewiseForce& loss) {
+        std::vector<Piece> pieces;
+        const auto add_lines = [&](const std::vector<OuterLine>& of_force,
+                                   const std::vector<OuterLine>& of_loss, double y, double outward) {
+            double g = jet(force.network, y)[0];
+            double h = jet(loss.network, y)[0];
+            for (std::size_t k = 0; k < of_force.size(); ++k) {
+                const double end = y + outward * of_force[k].length;
+                const double g_slope = of_force[k].slope;
+                const double h_slope = of_loss[k].slope;
+                pieces.push_back({{std::min(y, end), std::max(y, end)},
+                                  straight(g_slope, g - g_slope * y),
+                                  straight(h_slope, h - h_slope * y)});
+                g += g_slope * (end - y);
+                h += h_slope * (end - y);
+                y = end;
+            }
+        };
+        add_lines(force.below, loss.below, force.lower, -1.0);
+        std::reverse(pieces.begin(), pieces.end());
+        pieces.push_back({{force.lower, force.upper}, force.network, loss.network});
+        add_lines(force.above, loss.above, force.upper, 1.0);
+        return pieces;
+    }
+
+    /// c of a cell of which (C) is certified for every sheet; infinite where it is not.
+    [[nodiscard]] double certified_curvature(const Piece& piece, double from, double to,
+                                             double p) const noexcept {
+        const double reach = std::max(std::abs(from), std::abs(to));
+        const double middle = 0.5 * (from + to);
+        const double radius = 0.5 * (to - from);
+        const Expansion g{derivatives(piece.force, middle), derivatives_rounding(piece.force, reach),
+                          derivative_bounds(piece.force, from, to)};
+        const Expansion h{derivatives(piece.loss, middle), derivatives_rounding(piece.loss, reach),
+                          derivative_bounds(piece.loss, from, to)};
+        if (!(radius_ > 0.0)) {
+            return sheet_curvature(g, h, 0.0, 0.0, radius, p);
+        }
+        const double s = 1.0 + 2.0 * radius * by_radius_;
+        return std::max({sheet_curvature(g, h, 1.0, 0.0, radius, p),
+                         sheet_curvature(g, h, -1.0, 0.0, radius, p),
+                         sheet_curvature(g, h, s, by_radius_, radius, p),
+                         sheet_curvature(g, h, -s, by_radius_, radius, p)});
+    }
+
+    /// A network about the middle of a cell.
+    struct Expansion {
+        Derivatives middle;
+        Derivatives rounding;
+        DerivativeBounds over;
+    };
+
+    /// The same of g + s h, and with by_radius of the sheet that sticks, whose s grows with y. Both bounds are
+    /// linear in s, so that s and -s are enough for all in between.
+    [[nodiscard]] static double sheet_curvature(const Expansion& g, const Expansion& h, double s,
+                                                double by_radius, double radius, double p) noexcept {
+        // Derivative n of f in the middle, and what rounding may add to it.
+        std::array<double, 5> f{};
+        std::array<double, 5> rounding{};
+        for (std::size_t n = 1; n < f.size(); ++n) {
+            const double times = static_cast<double>(n) * by_radius;
+            f[n] = g.middle[n] + s * h.middle[n] + times * h.middle[n - 1];
+            rounding[n] =
+                g.rounding[n] + std::abs(s) * h.rounding[n] + times * h.rounding[n - 1] +
+                8.0 * epsilon *
+                    (std::abs(g.middle[n]) + std::abs(s * h.middle[n]) + times * std::abs(h.middle[n - 1]));
+        }
+        const double fifth = g.over[5] + std::abs(s) * h.over[5] + 5.0 * by_radius * h.over[4];
+        const double r = radius;
+        double lowest = -std::abs(f[2]) * r + 0.5 * f[3] * r * r;
+        if (f[3] > 0.0 && std::abs(f[2]) < f[3] * r) {
+            lowest = -0.5 * f[2] * f[2] / f[3];
+        }
+        const double least = p + f[1] + lowest - r * r * r * (std::abs(f[4]) / 6.0 + fifth * r / 24.0) -
+                             (rounding[1] + 8.0 * epsilon * std::abs(p) +
+                              r * (rounding[2] + r * (0.5 * rounding[3] + r * rounding[4] / 6.0)));
+        const double most =
+            std::abs(f[2]) + rounding[2] +
+            r * (std::abs(f[3]) + rounding[3] + r * (0.5 * (std::abs(f[4]) + rounding[4]) + r * fifth / 6.0));
+        return least > 0.0 && 8.0 * r * most <= least ? 0.5 * most / least : infinity;
+    }
+
+    /// Cells from left to right, each about as wide as can be certified; none at all where one cannot.
+    void cut(const std::vector<Piece>& pieces, double p) {
+        constexpr std::size_t most_cells = 4096;
+        constexpr double narrowest = 1e-12;
+        const auto border = [](const Piece& piece, double y, double curvature) {
+            return Border{y, jet(piece.force, y)[0], jet(piece.loss, y)[0], curvature};
+        };
+        std::vector<Border> borders;
+        double width = 0.125 * travel_;
+        for (const Piece& piece : pieces) {
+            const auto [lower, upper] = piece.positions;
+            if (!std::isfinite(lower) || !std::isfinite(upper)) {
+                // F is a line, because no loss changes out there.
+                const double edge = std::isfinite(lower) ? lower : upper;
+                const double slope = piece.force.linear[0];
+                const double gain = by_radius_ * jet(piece.loss, edge)[0];
+                if (!(p + slope + std::min(0.0, gain) > 0.0) || piece.loss.linear[0] != 0.0) {
+                    return;
+                }
+                (std::isfinite(lower) ? slope_above_ : slope_below_) = slope;
+                continue;
+            }
+            for (double from = lower; from < upper;) {
+                const double to = upper - from > 1.01 * width ? from + width : upper;
+                const double curvature = certified_curvature(piece, from, to, p);
+                if (curvature < infinity) {
+                    borders.push_back(border(piece, from, curvature));
+                    from = to;
+                    width *= 1.5;
+                } else {
+                    width = 0.8 * std::min(width, to - from);
+                }
+                if (!(width > narrowest * travel_) || borders.size() > most_cells) {
+                    return;
+                }
+            }
+        }
+        const auto last = std::find_if(pieces.rbegin(), pieces.rend(), [](const Piece& piece) {
+            return std::isfinite(piece.positions.lower) && std::isfinite(piece.positions.upper);
+        });
+        borders.push_back(border(*last, last->positions.upper, 0.0));
+        borders_ = std::move(borders);
+        least_slope_ = p;
+    }
+
+    LoadLineSolver search_;
+    double radius_;     ///< r of a hysteresis; else 0
+    double by_radius_;  ///< 1 / r; else 0
+    double travel_;
+    double period_;     ///< of a knob; else 0
+    double tolerance_;  ///< of the position
+    double slope_below_ = 0.0;
+    double slope_above_ = 0.0;
+    double least_slope_ = infinity;  ///< p for which the cells are certified; larger ones are as well
+    std::vector<Border> borders_;
+};
+
+}  // namespace palpate

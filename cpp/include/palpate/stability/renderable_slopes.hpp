@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "palpate/device/device_profile.hpp"
+#include "palpate/stability/direct_inequalities.hpp"
+#include "palpate/stability/force_bounds.hpp"
+#include "palpate/stability/held_force.hpp"
+#include "palpate/stability/inequality.hpp"
+
+namespace palpate {
+
+namespace detail {
+
+/// The largest value in [0, most] for which a condition holds that holds for every smaller value.
+template <class Holds>
+[[nodiscard]] double largest_that_holds(double most, Holds holds) {
+    if (holds(most)) {
+        return most;
+    }
+    double low = 0.0;
+    double high = most;
+    // First the order of magnitude, then 50 bits.
+    for (double guess = most; low == 0.0 && guess > 1e-18 * most; guess *= 0.125) {
+        (holds(guess) ? low : high) = guess;
+    }
+    for (int k = 0; k < 50; ++k) {
+        const double middle = 0.5 * (low + high);
+        (holds(middle) ? low : high) = middle;
+    }
+    return low;
+}
+
+/// True if direct rendering of a force with these slopes is certified; with hysteresis, h / r = stick.
+[[nodiscard]] inline bool holds_directly(const DeviceProfile& device, SlopeRange sliding, double stick) {
+    ForceBounds bounds;
+    bounds.slope = {-sliding.falling, sliding.rising + stick};
+    bounds.sliding = sliding.steepest();
+    bounds.steepest = bounds.sliding + stick;
+    bounds.loss_per_play = stick;
+    const std::vector<Inequality> lines =
+        stick > 0.0 ? hysteresis_inequalities(bounds, device) : direct_inequalities(bounds, device);
+    return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+}
+
+/// Above every slope that matters, far below where numbers end.
+[[nodiscard]] inline double beyond_every_slope(const DeviceProfile& device) noexcept {
+    return 1e9 * (1.0 + device.viscous_damping / device.period_s);
+}
+
+}  // namespace detail
+
+/// The slopes that direct rendering is certified for: the inverse of its inequalities.
+///
+/// First the steepest k for which slopes of -k and k hold together, neither counted steeper than `wanted`. Then
+/// slopes may fall, and after that rise, as steeply as is still certified: falling slopes cost less. With hysteresis
+/// these are slopes while sliding; a stick adds h / r = `stick`. An end that nothing limits is infinite.
+[[nodiscard]] inline Interval renderable_slopes(const DeviceProfile& device, double stick = 0.0,
+                                                SlopeRange wanted = {
+                                                    std::numeric_limits<double>::infinity(),
+                                                    std::numeric_limits<double>::infinity()}) {
+    constexpr double inside = 1.0 - 1e-5;
+    const double most = detail::beyond_every_slope(device);
+    const auto holds = [&](double rising, double falling) {
+        return detail::holds_directly(device, {rising, falling}, stick);
+    };
+    const double both = detail::largest_that_holds(
+        most, [&](double k) { return holds(std::min(k, wanted.rising), std::min(k, wanted.falling)); });
+    // Not at the very edge, where rounding would hide what is left for the other side.
+    double rising = inside * std::min(both, wanted.rising);
+    double falling = inside * std::min(both, wanted.falling);
+    falling = std::max(falling, inside * detail::largest_that_holds(most, [&](double k) {
+                                    return holds(rising, std::max(k, falling));
+                                }));
+    rising = std::max(rising, detail::largest_that_holds(
+                                  most, [&](double k) { return holds(std::max(k, rising), falling); }));
+    const auto end = [&](double slope) {
+        return slope < inside * inside * most ? slope : std::numeric_limits<double>::infinity();
+    };
+    return {-end(falling), end(rising)};
+}
+
+/// The slope h / r that leaves half of what the device holds to sliding.
+[[nodiscard]] inline double steepest_stick(const DeviceProfile& device) {
+    return detail::largest_that_holds(detail::beyond_every_slope(device), [&](double stick) {
+        return detail::holds_directly(device, {stick, stick}, stick);
+    });
+}
+
+/// The narrowest play radius for which hysteresis is certified, at least `least`; infinite if none is. `sliding`:
+/// bounds of the model with a play so wide that sticking adds no slope.
+[[nodiscard]] inline double narrowest_play(const ForceBounds& sliding, const DeviceProfile& device,
+                                           double least, double most) {
+    const auto holds = [&](double radius) {
+        ForceBounds bounds = sliding;
+        bounds.loss_per_play = std::max(0.0, sliding.loss.upper) / radius;
+        bounds.slope.upper += bounds.loss_per_play;
+        bounds.steepest = sliding.sliding + bounds.loss_per_play;
+        const std::vector<Inequality> lines = hysteresis_inequalities(bounds, device);
+        return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+    };
+    if (least > 0.0 && holds(least)) {
+        return least;
+    }
+    if (!holds(most)) {
+        return std::numeric_limits<double>::infinity();
+    }
+    double wide = most;
+    double narrow = least;
+    for (int k = 0; k < 60; ++k) {
+        const double middle = narrow > 0.0 ? std::sqrt(narrow * wide) : 0.5 * wide;
+        (holds(middle) ? wide : narrow) = middle;
+    }
+    return wide;
+}
+
+}  // namespace palpate

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "palpate/stability/certificate.hpp"
+#include "palpate/stability/renderable_slopes.hpp"
+
+namespace palpate {
+namespace {
+
+DeviceProfile device(double delay, double encoder_step = 0.0) {
+    DeviceProfile profile;
+    profile.viscous_damping = 0.06;
+    profile.coulomb_friction = 0.01;
+    profile.encoder_step = encoder_step;
+    profile.delay_s = delay * profile.period_s;
+    return profile;
+}
+
+Scheme direct_scheme() {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    return scheme;
+}
+
+TEST(DirectLines, JitterCostsTheLongerPeriodAndTheSamplesThatComeCloser) {
+    DeviceProfile late = device(1.0);
+    const double steady = device_need(late, {1.0, 1.0});
+    EXPECT_NEAR(steady, 1.5, 1e-12);
+    late.jitter_s = 1e-9;
+    EXPECT_NEAR(device_need(late, {1.0, 1.0}), steady, 1e-5);
+    late.jitter_s = 1e-4;
+    // Windows of 1 ms; a neighbour before or after shares at most 0.1 ms: Lambda^2 = 1.1 / 1.1.
+    EXPECT_NEAR(device_need(late, {1.0, 1.0}), 1.5, 1e-9);
+    late.delay_s = 2e-3;  // Lambda^2 = (2 + 1.1 + 1 + 0.1) / 1.1
+    EXPECT_NEAR(device_need(late, {1.0, 1.0}), 0.5 + std::sqrt(4.2 / 1.1), 1e-9);
+    late.delay_s = 0.0;
+    EXPECT_DOUBLE_EQ(device_need(late, {1.0, 5.0}), 0.5);
+}
+
+TEST(DirectLines, ALittleJitterCostsAFallingForceLittle) {
+    DeviceProfile late = device(2.0);
+    const double steady = device_need(late, {0.0, 1.0});
+    late.jitter_s = 1e-8;
+    EXPECT_NEAR(device_need(late, {0.0, 1.0}), steady, 0.01);
+    late.jitter_s = 1e-3;
+    EXPECT_LE(device_need(late, {0.0, 1.0}), held_need(2.0, {0.0, 1.0}));
+}
+
+TEST(DirectLines, JitterWithinTheSampleKeepsTheLineOfAFraction) {
+    DeviceProfile late = device(0.25);
+    late.jitter_s = 1e-4;
+    EXPECT_DOUBLE_EQ(device_need(late, {1.0, 0.5}), delayed_need(0, 0.25 / 1.1, {1.0, 0.5}));
+}
+
+TEST(DirectLines, RenderableSlopesAreCertifiedAndNotLessThanWithEqualSides) {
+    for (const double delay : {0.0, 0.25, 1.0, 2.0}) {
+        for (const double step : {0.0, 1e-4, 4e-4}) {
+            const DeviceProfile profile = device(delay, step);
+            const Interval any = renderable_slopes(profile);
+            ForceBounds bounds;
+            bounds.slope = {std::max(any.lower, -1e6), any.upper};
+            bounds.steepest = bounds.sliding = step > 0.0 ? bounds.slope.largest() : 0.0;
+            const auto certified = [&] { return certify(bounds, direct_scheme(), profile).certified(); };
+            EXPECT_TRUE(certified()) << delay << " " << step;
+            bounds.slope.upper *= 1.001;
+            bounds.steepest = bounds.sliding = step > 0.0 ? bounds.slope.largest() : 0.0;
+            EXPECT_FALSE(certified()) << delay << " " << step;
+            const double equal =
+                profile.viscous_damping / profile.period_s /
+                delayed_need(profile.whole_delay_samples(), profile.delay_fraction(), {1, 1});
+            const double friction =
+                step > 0.0 ? 2.0 * profile.coulomb_friction / step : std::numeric_limits<double>::infinity();
+            EXPECT_GE(any.upper, 0.9999 * std::min(equal, friction));
+            EXPECT_LE(any.lower, -0.9999 * std::min(equal, friction));
+        }
+    }
+}
+
+TEST(DirectLines, AForceThatFallsGetsTheRoomThatItsRiseLeaves) {
+    const DeviceProfile late = device(1.0);
+    const Interval rises = renderable_slopes(late, 0.0, {100.0, 1.0});
+    const Interval falls = renderable_slopes(late, 0.0, {1.0, 1000.0});
+    EXPECT_NEAR(rises.upper, 40.0, 0.01);
+    EXPECT_LT(rises.lower, -79.0);
+    EXPECT_LT(falls.lower, -115.0);
+    EXPECT_GE(falls.upper, 0.9999);
+}
+
+TEST(DirectLines, NarrowestPlayIsJustCertified) {
+    ForceBounds sliding;
+    sliding.hysteresis = true;
+    sliding.slope = {-5.0, 10.0};
+    sliding.sliding = sliding.steepest = 10.0;
+    sliding.loss = {0.0, 0.1};
+    for (const double delay : {0.0, 0.5, 1.0}) {
+        for (const double step : {0.0, 2e-4}) {
+            const DeviceProfile profile = device(delay, step);
+            const double radius = narrowest_play(sliding, profile, 4.0 * step, 1.0);
+            const auto certified = [&](double r) {
+                ForceBounds bounds = sliding;
+                bounds.loss_per_play = 0.1 / r;
+                bounds.slope.upper += 0.1 / r;
+                return certify(bounds, direct_scheme(), profile).certified();
+            };
+            EXPECT_TRUE(certified(radius)) << delay << " " << step;
+            EXPECT_FALSE(certified(0.999 * radius)) << delay << " " << step;
+        }
+    }
+    sliding.slope.upper = sliding.sliding = 1000.0;
+    EXPECT_TRUE(std::isinf(narrowest_play(sliding, device(0.0), 0.0, 1.0)));
+}
+
+/// Without delay the play of the reading counts as exact: h / r enters the friction once.
+TEST(DirectLines, EncoderOfHysteresisCountsTheStickOnce) {
+    ForceBounds bounds;
+    bounds.hysteresis = true;
+    bounds.slope = {-10.0, 60.0};
+    bounds.sliding = 20.0;
+    bounds.loss = {0.0, 1.0};
+    bounds.loss_per_play = 40.0;
+    DeviceProfile profile = device(0.0, 1e-3);
+    const double more = 20.0 * 1e-3 / (2.0 * 0.025);
+    profile.viscous_damping = 0.5e-3 * (60.0 + more) * (1.0 + 1e-12);
+    profile.coulomb_friction = (20.0 + more + 40.0) * 0.5e-3 * (1.0 + 1e-12);
+    const Scheme direct = direct_scheme();
+    EXPECT_TRUE(certify(bounds, direct, profile).certified());
+    profile.coulomb_friction *= 0.999;
+    EXPECT_FALSE(certify(bounds, direct, profile).certified());
+    profile.coulomb_friction = (20.0 + 80.0) * 0.5e-3;
+    profile.viscous_damping = 0.5e-3 * 60.0;  // with twice the stick no slope is added
+    EXPECT_TRUE(certify(bounds, direct, profile).certified());
+    profile.coulomb_friction *= 0.99;
+    EXPECT_FALSE(certify(bounds, direct, profile).certified());
+    bounds.loss_per_play = bounds.loss.upper / 0.4e-3;  // a play of less than half a step
+    profile.coulomb_friction = (20.0 + 1.5 * bounds.loss_per_play) * 0.5e-3;
+    profile.viscous_damping = 10.0;
+    EXPECT_FALSE(certify(bounds, direct, profile).certified());
+}
+
+}  // namespace
+}  // namespace palpate
