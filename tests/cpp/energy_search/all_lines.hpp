@@ -26,8 +26,8 @@ namespace palpate::energy_search {
                              [draw, n](test::Random& random) { return draw(random, n); }});
         };
         using R = test::Random;
-        const auto behind = [](StructureKind kind, bool firm) {
-            return [kind, firm](R& random, int delay) { return draw_coupled(random, kind, delay, firm); };
+        const auto behind = [](StructureKind kind, Regime regime) {
+            return [kind, regime](R& random, int delay) { return draw_coupled(random, kind, delay, regime); };
         };
         damping("direct", n <= 1, draw_direct);
         damping("hysteresis", n <= 1, draw_hysteresis);
@@ -38,12 +38,14 @@ namespace palpate::energy_search {
         damping("softening", false, draw_softening);
         damping("ramp", false, draw_ramp);
         damping("massless, no damper", false, draw_spring_behind_coupling);
-        damping("massless", false, behind(StructureKind::Massless, false));
-        damping("implicit", false, behind(StructureKind::Implicit, false));
-        damping("energy-consistent", false, behind(StructureKind::EnergyConsistent, false));
-        damping("massless, firm object", n == 0, behind(StructureKind::Massless, true));
-        damping("implicit, firm object", n == 0, behind(StructureKind::Implicit, true));
-        damping("energy-consistent, firm object", n == 0, behind(StructureKind::EnergyConsistent, true));
+        damping("massless", false, behind(StructureKind::Massless, Regime::Usual));
+        damping("implicit", false, behind(StructureKind::Implicit, Regime::Usual));
+        damping("energy-consistent", false, behind(StructureKind::EnergyConsistent, Regime::Usual));
+        damping("massless, firm object", n == 0, behind(StructureKind::Massless, Regime::Firm));
+        damping("implicit, firm object", n == 0, behind(StructureKind::Implicit, Regime::Firm));
+        damping("energy-consistent, firm object", n == 0, behind(StructureKind::EnergyConsistent, Regime::Firm));
+        damping("implicit, limited", false, behind(StructureKind::Implicit, Regime::Limited));
+        damping("energy-consistent, limited", false, behind(StructureKind::EnergyConsistent, Regime::Limited));
         friction("wheel, mean", false, [](R& random, int delay) { return draw_wheel(random, delay, true); });
         friction("wheel of wavelets, mean", false,
                  [](R& random, int delay) { return draw_network_wheel(random, delay, true); });

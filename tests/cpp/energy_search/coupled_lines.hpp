@@ -66,10 +66,15 @@ struct CoupledScene {
            readable(scene.device.force_limit);
 }
 
-/// A coupling and an inertia about the size of the object's slopes. A `firm` object hardly moves: it is much stiffer
+/// What is tried: objects about as stiff as the coupling, objects that hardly move, or coupling forces far beyond a
+/// force limit.
+enum class Regime { Usual, Firm, Limited };
+
+/// A coupling and an inertia about the size of the object's slopes. A firm object hardly moves: it is much stiffer
 /// than the coupling, or heavy.
 [[nodiscard]] inline Scheme random_coupling(test::Random& random, StructureKind structure, double slope,
-                                            double period, bool firm) {
+                                            double period, Regime regime) {
+    const bool firm = regime == Regime::Firm;
     Scheme scheme;
     scheme.structure = structure;
     scheme.coupling.stiffness =
@@ -80,7 +85,9 @@ struct CoupledScene {
                           : scheme.coupling.stiffness * period * std::exp(test::uniform(random, -3.0, 1.0));
     scheme.inertia.mass =
         scheme.coupling.stiffness * period * period *
-        std::exp(firm ? test::uniform(random, 9.0, 14.0) : test::uniform(random, -3.0, 7.0));
+        std::exp(firm                        ? test::uniform(random, 9.0, 14.0)
+                                   : regime == Regime::Limited ? test::uniform(random, 3.0, 8.0)
+                                                               : test::uniform(random, -3.0, 7.0));
     scheme.inertia.damping =
         random() % 2 == 0 ? 0.0
                           : scheme.coupling.stiffness * period * std::exp(test::uniform(random, -3.0, 1.0));
@@ -137,8 +144,8 @@ template <class Structure>
 }
 
 [[nodiscard]] inline std::optional<Trial> draw_coupled(test::Random& random, StructureKind kind, double delay,
-                                                       bool firm) {
-    const bool network = random() % 3 == 0;
+                                                       Regime regime) {
+    const bool network = regime != Regime::Limited && random() % 3 == 0;
     const bool hysteresis = random() % 3 == 0;
     CoupledScene scene;
     scene.device = random_device(random, delay);
@@ -160,6 +167,9 @@ template <class Structure>
         scene.places.high = high;
         scene.places.finest = 1e-2 * step;
         scene.places.widest = 3.0 * (high - low) * std::max(1.0, slope / scene.scheme.coupling.stiffness);
+        if (regime == Regime::Limited) {
+            scene.places.widest = 40.0 * scene.device.force_limit / scene.scheme.coupling.stiffness;
+        }
     };
     constexpr int starts = 6;
     constexpr int steps = 60;
@@ -168,7 +178,7 @@ template <class Structure>
                                             : ForceModel{small_network(random), test::unit_domain()};
         const double slope = std::max(1.0, model.slope_bounds().largest());
         limit_by(random, scene.device, slope * test::uniform(random, 0.05, 0.5));
-        scene.scheme = random_coupling(random, kind, slope, scene.device.period_s, firm);
+        scene.scheme = random_coupling(random, kind, slope, scene.device.period_s, regime);
         const auto need = certified(model);
         scene.slopes = force_bounds(model).slope;
         if (!need || need->damping <= 0.0) {
@@ -186,8 +196,15 @@ template <class Structure>
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     const Slopes slopes = random_slopes(random);
     const Pieces g = closed_pieces(random, count, step, slopes);
-    scene.scheme = random_coupling(random, kind, std::max(slopes.M, slopes.s), scene.device.period_s, firm);
-    limit_by(random, scene.device, largest_of(g.points()));
+    scene.scheme = random_coupling(random, kind, std::max(slopes.M, slopes.s), scene.device.period_s, regime);
+    if (regime == Regime::Limited) {
+        scene.device.force_limit = largest_of(g.points()) * test::uniform(random, 0.2, 2.0);
+    } else {
+        limit_by(random, scene.device, largest_of(g.points()));
+    }
+    if (scene.device.force_limit > 1e8) {
+        scene.device.force_limit = std::numeric_limits<double>::infinity();
+    }
     const double period = scene.device.period_s;
     placed(0.0, step * count, step, std::max(slopes.M, slopes.s), [&](double x) { return g.at(x).value; });
     const auto build = [&](const auto& object, const ForceBounds& bounds) -> std::optional<Trial> {
