@@ -42,7 +42,7 @@ int main(int count, char** words) {
         std::sort(measured.begin(), measured.end());
         const double seconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        std::printf("%-28s %5d %7zu %8.3f %8.3f %6zu%s %9zu %6.1f\n", line.name.c_str(), line.delay, scenes,
+        std::printf("%-28s %5.2f %7zu %8.3f %8.3f %6zu%s %9zu %6.1f\n", line.name.c_str(), line.delay, scenes,
                     measured.at(scenes / 2), measured.back(), failures, line.tight ? " (t)" : "    ",
                     violations, seconds);
         std::fflush(stdout);

@@ -46,7 +46,7 @@ template <class MeanOf>
 }
 
 /// A wheel of straight pieces. Slow turning in many short moves tries the mean force, jumps try the damping.
-[[nodiscard]] inline std::optional<Trial> draw_wheel(test::Random& random, int delay, bool slowly) {
+[[nodiscard]] inline std::optional<Trial> draw_wheel(test::Random& random, double delay, bool slowly) {
     const int cells = 8 + static_cast<int>(random() % 9);
     const double turn = 1.0;
     const double size = std::exp(test::uniform(random, -1.0, 2.0));
@@ -80,7 +80,7 @@ template <class MeanOf>
         return std::nullopt;
     }
     HeldScene scene;
-    const int nodes = slowly ? 3000 : delay == 0 ? 48 : delay == 1 ? 24 : 12;
+    const int nodes = slowly ? 3000 : samples_of(delay) == 0 ? 48 : samples_of(delay) == 1 ? 24 : 12;
     scene.read = even_grid(0.0, turn / nodes, nodes, slowly ? 1 : nodes, true);
     scene.table = table_of(Direct{PieceObject{wheel}}, scene.read, 0, sent_on(device));
     scene.held =
@@ -89,7 +89,7 @@ template <class MeanOf>
 }
 
 /// A wheel of a few wavelets, as the core certifies it.
-[[nodiscard]] inline std::optional<Trial> draw_network_wheel(test::Random& random, int delay, bool slowly) {
+[[nodiscard]] inline std::optional<Trial> draw_network_wheel(test::Random& random, double delay, bool slowly) {
     const NetworkParameters network = small_network(random);
     Domain domain = test::unit_domain();
     domain.period = 1.0;
@@ -106,7 +106,7 @@ template <class MeanOf>
     }
     const double mean = mean_over(1.0, [&](double x) { return clipped(curve.at(x).value, device); });
     HeldScene scene;
-    const int nodes = slowly ? 3000 : delay == 0 ? 48 : delay == 1 ? 24 : 12;
+    const int nodes = slowly ? 3000 : samples_of(delay) == 0 ? 48 : samples_of(delay) == 1 ? 24 : 12;
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, slowly ? 1 : nodes, true);
     scene.table = with_structure(
         model, scheme, device.period_s, device.force_limit,
@@ -128,7 +128,7 @@ template <class MeanOf>
 }
 
 /// A force that is made softer at any time, more than once, and never harder again. On a wheel or on pieces.
-[[nodiscard]] inline std::optional<Trial> draw_softening(test::Random& random, int delay) {
+[[nodiscard]] inline std::optional<Trial> draw_softening(test::Random& random, double delay) {
     const bool wheel = random() % 2 == 0;
     const int nodes = wheel ? 1500 : 40;
     const int cells = wheel ? 8 + static_cast<int>(random() % 9) : nodes - 1;
@@ -161,7 +161,7 @@ template <class MeanOf>
     };
     auto shared = std::make_shared<Softening>();
     HeldScene& scene = shared->scene;
-    scene.read = even_grid(0.0, wheel ? 1.0 / nodes : step, nodes, wheel ? 1 : delay == 0 ? nodes : 3, wheel);
+    scene.read = even_grid(0.0, wheel ? 1.0 / nodes : step, nodes, wheel ? 1 : samples_of(delay) == 0 ? nodes : 3, wheel);
     scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
     scene.need = {need->damping / device.longest_period_s(), need->friction, device.whole_delay_samples(),
                   device.delay_fraction()};
@@ -188,8 +188,8 @@ template <class MeanOf>
 
 /// A force that rises from nothing over the first samples. The hand may take out, once, the most that the object
 /// can hold.
-[[nodiscard]] inline std::optional<Trial> draw_ramp(test::Random& random, int delay) {
-    const Fineness fine = random_fineness(random, delay);
+[[nodiscard]] inline std::optional<Trial> draw_ramp(test::Random& random, double delay) {
+    const Fineness fine = random_fineness(random, samples_of(delay));
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     const Pieces pieces{0.0, step, random_forces(random, fine.nodes, step, random_slopes(random))};
     DeviceProfile device = random_device(random, delay);

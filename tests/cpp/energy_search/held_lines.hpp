@@ -26,6 +26,9 @@ struct Fineness {
     int reach = 23;
 };
 
+/// Number of remembered positions for a delay in samples.
+[[nodiscard]] inline int samples_of(double delay) { return static_cast<int>(std::ceil(delay)); }
+
 [[nodiscard]] inline Fineness random_fineness(test::Random& random, int memory) {
     if (random() % 2 == 0) {
         constexpr int fine[] = {400, 200, 100, 40};
@@ -86,8 +89,8 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
 
 /// A static force of straight pieces, rendered directly or through a coupling without damper.
 [[nodiscard]] inline std::optional<Trial> draw_static_pieces(test::Random& random, const Scheme& scheme,
-                                                             int delay) {
-    const Fineness fine = random_fineness(random, delay);
+                                                             double delay) {
+    const Fineness fine = random_fineness(random, samples_of(delay));
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     const Pieces pieces{0.0, step, random_forces(random, fine.nodes, step, random_slopes(random))};
     DeviceProfile device = random_device(random, delay);
@@ -126,8 +129,8 @@ template <class Force>
 }
 
 /// A network of position by any structure whose force depends on the present position alone.
-[[nodiscard]] inline std::optional<Trial> draw_static_network(test::Random& random, int delay, bool coupled) {
-    const Fineness fine = random_fineness(random, delay);
+[[nodiscard]] inline std::optional<Trial> draw_static_network(test::Random& random, double delay, bool coupled) {
+    const Fineness fine = random_fineness(random, samples_of(delay));
     const ForceModel model{small_network(random), test::unit_domain()};
     const NetworkCurve& curve = model.network()->curve();
     const auto force = [&](double x) { return curve.at(x).value; };
@@ -166,27 +169,27 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-[[nodiscard]] inline std::optional<Trial> draw_direct(test::Random& random, int delay) {
+[[nodiscard]] inline std::optional<Trial> draw_direct(test::Random& random, double delay) {
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
     return random() % 2 == 0 ? draw_static_pieces(random, scheme, delay)
                              : draw_static_network(random, delay, false);
 }
 
-[[nodiscard]] inline std::optional<Trial> draw_spring_behind_coupling(test::Random& random, int delay) {
+[[nodiscard]] inline std::optional<Trial> draw_spring_behind_coupling(test::Random& random, double delay) {
     return draw_static_network(random, delay, true);
 }
 
 /// g and h of straight pieces; the play a whole number of nodes.
-[[nodiscard]] inline std::optional<Trial> draw_hysteresis_pieces(test::Random& random, int delay) {
+[[nodiscard]] inline std::optional<Trial> draw_hysteresis_pieces(test::Random& random, double delay) {
     const bool far = random() % 2 == 0;
-    const int nodes = far ? (delay == 0   ? 60
-                             : delay == 1 ? 40
+    const int nodes = far ? (samples_of(delay) == 0   ? 60
+                             : samples_of(delay) == 1 ? 40
                                           : 24)
-                          : (delay == 0   ? 20
-                             : delay == 1 ? 14
+                          : (samples_of(delay) == 0   ? 20
+                             : samples_of(delay) == 1 ? 14
                                           : 8);
-    const int reach = far ? (delay == 2 ? 2 : 3) : nodes - 1;
+    const int reach = far ? (samples_of(delay) == 2 ? 2 : 3) : nodes - 1;
     const int radius = 1 + static_cast<int>(random() % 4);
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     std::vector<double> h = random_forces(random, nodes, step, random_slopes(random));
@@ -230,9 +233,9 @@ template <class Force>
     return {network, loss, test::unit_domain(), radius};
 }
 
-[[nodiscard]] inline std::optional<Trial> draw_hysteresis_network(test::Random& random, int delay) {
-    const int nodes = delay == 0 ? 40 : delay == 1 ? 30 : 14;
-    const int reach = delay == 0 ? 39 : delay == 1 ? 8 : 4;
+[[nodiscard]] inline std::optional<Trial> draw_hysteresis_network(test::Random& random, double delay) {
+    const int nodes = samples_of(delay) == 0 ? 40 : samples_of(delay) == 1 ? 30 : 14;
+    const int reach = samples_of(delay) == 0 ? 39 : samples_of(delay) == 1 ? 8 : 4;
     const int radius = 1 + static_cast<int>(random() % 6);
     const double width = std::exp(test::uniform(random, -4.0, -0.5));
     const double step = width / (nodes - 1);
@@ -262,15 +265,15 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-[[nodiscard]] inline std::optional<Trial> draw_hysteresis(test::Random& random, int delay) {
+[[nodiscard]] inline std::optional<Trial> draw_hysteresis(test::Random& random, double delay) {
     return random() % 3 != 0 ? draw_hysteresis_pieces(random, delay) : draw_hysteresis_network(random, delay);
 }
 
 /// A force of position and velocity: a straight line in both, or a few wavelets.
-[[nodiscard]] inline std::optional<Trial> draw_velocity(test::Random& random, int delay) {
+[[nodiscard]] inline std::optional<Trial> draw_velocity(test::Random& random, double delay) {
     const bool far = random() % 2 == 0;
-    const int nodes = far ? 60 : (delay == 0 ? 16 : delay == 1 ? 9 : 6);
-    const int reach = far ? (delay == 2 ? 1 : 2) : nodes - 1;
+    const int nodes = far ? 60 : (samples_of(delay) == 0 ? 16 : samples_of(delay) == 1 ? 9 : 6);
+    const int reach = far ? (samples_of(delay) == 2 ? 1 : 2) : nodes - 1;
     DeviceProfile device = random_device(random, delay);
     const double width = std::exp(test::uniform(random, -4.0, 0.0));
     const double step = width / (nodes - 1);
@@ -303,14 +306,14 @@ template <class Force>
 }
 
 /// An encoder with steps: the handle is anywhere within the count that is read.
-[[nodiscard]] inline std::optional<Trial> draw_encoder(test::Random& random, int delay, bool hysteresis) {
-    const int counts = hysteresis   ? (delay == 0   ? 14
-                                       : delay == 1 ? 8
+[[nodiscard]] inline std::optional<Trial> draw_encoder(test::Random& random, double delay, bool hysteresis) {
+    const int counts = hysteresis   ? (samples_of(delay) == 0   ? 14
+                                       : samples_of(delay) == 1 ? 8
                                                     : 4)
-                       : delay == 0 ? 24
-                       : delay == 1 ? 12
+                       : samples_of(delay) == 0 ? 24
+                       : samples_of(delay) == 1 ? 12
                                     : 6;
-    const int within = delay == 0 ? 2 : 1;
+    const int within = samples_of(delay) == 0 ? 2 : 1;
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     DeviceProfile device = random_device(random, delay);
     device.encoder_step = step;
@@ -348,8 +351,8 @@ template <class Force>
 }
 
 /// A command with steps, on short moves about a place where its rounding changes.
-[[nodiscard]] inline std::optional<Trial> draw_force_step(test::Random& random, int delay) {
-    const Fineness fine = random_fineness(random, delay);
+[[nodiscard]] inline std::optional<Trial> draw_force_step(test::Random& random, double delay) {
+    const Fineness fine = random_fineness(random, samples_of(delay));
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     std::vector<double> forces = random_forces(random, fine.nodes, step, random_slopes(random));
     DeviceProfile device = random_device(random, delay);

@@ -52,7 +52,7 @@ enum class Part { Damping, Friction };
 /// A line of the certificate and the scenes that try it.
 struct Line {
     std::string name;
-    int delay = 0;  ///< whole samples
+    double delay = 0.0;  ///< [samples]
     Part part = Part::Damping;
     bool tight = false;  ///< some motion comes close to the bound in at least half of the scenes
     std::function<std::optional<Trial>(test::Random&)> draw;
