@@ -6,7 +6,7 @@
 #   make control      build palpate-control, the real-time program: build/control/palpate-control
 #   make test-full    the same tests with long counts, under the sanitizers, and as installed  (an hour)
 #   make bench        all benchmarks, JSON in build/bench/
-#   make lint | format | stubs | clean
+#   make lint | format | stubs | output | clean
 #
 # Paths are relative on purpose: the folder may have a space in its name.
 
@@ -38,7 +38,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree hold absolute paths: in a folder that was moved, start again.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs output \
         setup clean moved
 
 help:
@@ -125,6 +125,10 @@ format: setup
 
 stubs: setup
 	$(python) tools/stubs.py
+
+# The example output in README.md and docs/.
+output: setup
+	$(python) tools/example_output.py
 
 clean:
 	rm -rf build dist demo .venv .pytest_cache .mypy_cache .ruff_cache

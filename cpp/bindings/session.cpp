@@ -23,6 +23,14 @@ using namespace py::literals;
 
 namespace {
 
+/// What energy a rendering gave; None where no bound is known.
+py::dict energy_of(const LoopReport& loop) {
+    const py::object stored =
+        std::isfinite(loop.most_stored) ? py::object(py::float_(loop.most_stored)) : py::none();
+    return py::dict("given_in_ramp_J"_a = loop.given_in_ramp, "given_J"_a = loop.given,
+                    "most_stored_J"_a = stored, "sentence"_a = energy_text(loop));
+}
+
 py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const std::string& position_unit,
                           const std::string& force_unit, double rate_hz, double duration_s,
                           std::string record, bool force, const std::string& model_name,
@@ -68,7 +76,9 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
     const std::vector<std::string> notes =
         close_record(outlets, report, settings.loop, units, metadata, record, force, expected);
     watcher.rethrow();
-    return summary_of(report, settings.loop, outlets, record, notes, expected);
+    py::dict summary = summary_of(report, settings.loop, outlets, record, notes, expected);
+    summary["energy"] = energy_of(report.loop);
+    return summary;
 }
 
 }  // namespace

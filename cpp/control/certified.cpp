@@ -22,6 +22,7 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 
 void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.slew_s = 0.0;
+    guards.certified = true;
     loop.tolerated = 0;
     loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
     loop.longest_period_s = certificate.longest_period_s;

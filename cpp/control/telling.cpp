@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <iostream>
 #include <string>
@@ -129,6 +130,11 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
                                {"lost_records", report.lost_records + file.refused()},
                                {"telemetry_sent", outlets.telemetry.sent()},
                                {"telemetry_dropped", outlets.telemetry.dropped()},
+                               {"energy", {{"given_in_ramp_J", loop.given_in_ramp},
+                                           {"given_J", loop.given},
+                                           {"most_stored_J", std::isfinite(loop.most_stored)
+                                                                 ? nlohmann::json(loop.most_stored)
+                                                                 : nlohmann::json()}}},
                                {"without", report.refused}};
         if (!device.json.is_null()) {
             summary.update(device.json);
@@ -154,7 +160,8 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
               << "period     " << percentiles(loop.timing.period) << " (the longest gap)\n"
               << "late by    " << percentiles(loop.timing.lateness) << "\n"
               << "ticks      " << counted << "\n"
-              << "samples    " << loop.lost_samples << " lost, " << loop.repeated_samples << " repeated\n";
+              << "samples    " << loop.lost_samples << " lost, " << loop.repeated_samples << " repeated\n"
+              << "energy     " << energy_text(loop) << "\n";
     for (const auto& [title, text] : device.lines) {
         std::cout << title << std::string(title.size() < 11 ? 11 - title.size() : 1, ' ') << text << "\n";
     }

@@ -155,7 +155,7 @@ TEST(CertifiedScenes, KeepTheirEnergyWithForcesOfVelocity) {
         scene.device = *enough;
         scene.steepest = test::steepest_place(scene.model);
         scene.start = std::max(device.encoder_step, 1e-3) * std::round(test::uniform(random, 0.0, 100.0));
-        const EnergyRange range = energy_range(force);
+        const EnergyRange range = energy_range(force, 1e9);
         scene.held = resting_energy(force, scene.start) - range.least + quadrature;
         scene.largest = std::max(std::abs(range.least), std::abs(range.largest));
         with_a_random_hand(random, scene, [&](auto hand, const char* name) {

@@ -111,7 +111,9 @@ Account account_of(S structure, const CoupledScene& scene, const Parts& parts) {
     Account account;
     structure.reset(x);
     for (const auto& [before, after] : parts) {
-        forces.push_back(structure.step(x).force);
+        const Rendered rendered = structure.step(x);
+        EXPECT_TRUE(rendered.status == Status::Ok || rendered.status == Status::Limited);
+        forces.push_back(rendered.force);
         const std::size_t now = forces.size() - 1 - static_cast<std::size_t>(whole);
         const double work = forces[now - 1] * before + forces[now] * after;
         const double loss = scene.device.viscous_damping *
@@ -125,18 +127,17 @@ Account account_of(S structure, const CoupledScene& scene, const Parts& parts) {
 }
 
 Account account_of(const CoupledScene& scene, const Parts& parts) {
-    const LoadLineSolver solver{.longest_step = 0.05};
     const Scheme& scheme = scene.scheme;
     const double limit = scene.device.force_limit;
     switch (scheme.structure) {
         case StructureKind::Massless:
             return account_of(Massless{LimitedEnvironment{scene.object, limit}, scheme.coupling, 1.0,
-                                       LimitedResolvent{LoadLineSolver{.longest_step = 0.05,
-                                                                       .least_slope = scene.slopes.lower}}},
+                                       LimitedResolvent{LoadLineSolver{}}},
                               scene, parts);
         case StructureKind::Implicit:
-            return account_of(Implicit{scene.object, scheme.inertia, scheme.coupling, 1.0, solver, limit},
-                              scene, parts);
+            return account_of(
+                Implicit{scene.object, scheme.inertia, scheme.coupling, 1.0, LoadLineSolver{}, limit}, scene,
+                parts);
         default:
             return account_of(EnergyConsistent{scene.object, scheme.inertia, scheme.coupling, 1.0, 1e-3,
                                                scene.switched, limit},

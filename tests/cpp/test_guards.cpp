@@ -74,7 +74,7 @@ TEST(Guards, TouchNoForceOfTheComparisonScene) {
     }
     const DeviceProfile device;
     Guards guards = guards_of(settings_for(device), wall(60.0), direct(), period);
-    guards.tank = EnergyTank{{held, device.viscous_damping, 0.0, device.encoder_step, period}};
+    guards.tank = EnergyTank{{{.within = held}, 0.9 * device.viscous_damping, 0.0, period}};
     const auto forces = [&](const Guards& used) {
         SimulatedDevice knob{device};
         EXPECT_TRUE(knob.open());
@@ -139,9 +139,9 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
 }
 
 TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
-    EnergyTank tank{TankSettings{1.0, 0.0, 0.0, 0.0, period}};
+    EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, period}};
     double force = -2.0;
-    tank.book(-1.0, 1.0);  // of 1.25: the reserve is left
+    tank.book(-1.0, 1.0);  // what the object holds; the reserve of 0.25 is left
     EXPECT_EQ(tank.apply(force), Status::Ok);
     tank.book(-0.15, 1.0);
     EXPECT_EQ(tank.apply(force), Status::Drained);
@@ -151,14 +151,60 @@ TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
     EXPECT_EQ(tank.apply(force), Status::Drained);
     EXPECT_NEAR(force, 0.0, 1e-12);
     tank.book(3.0, 1.0);  // no fuller than full
-    EXPECT_NEAR(tank.level(), 1.25, 1e-12);
-    EXPECT_NEAR(tank.lowest(), 0.0, 1e-12);
+    EXPECT_NEAR(tank.given(), 0.0, 1e-12);
+    EXPECT_NEAR(tank.most_given(), 1.25, 1e-12);
 }
 
-TEST(EnergyTank, DoesNotChargeWhatTheDeviceCertainlyTook) {
-    EnergyTank tank{TankSettings{1.0, 0.06, 0.02, 0.01, period}};
-    tank.book(-10.0, 0.03);
-    EXPECT_NEAR(tank.level(), 1.25 - 0.3 + 0.9 * (0.06 * 0.02 * 0.02 / period + 0.02 * 0.02), 1e-12);
+TEST(EnergyTank, DoesNotChargeWhatTheDeviceTakes) {
+    EnergyTank tank{TankSettings{{.within = 1.0}, 0.06, 0.02, period}};
+    tank.book(-30.0, 0.02);
+    EXPECT_NEAR(tank.given(), 0.6 - (0.06 * 0.02 * 0.02 / period + 0.02 * 0.02), 1e-12);
+}
+
+TEST(StoredEnergy, GrowsWithWhereItHasBeen) {
+    StoredEnergy stored{{.within = 1.0,
+                         .lower = 0.0,
+                         .upper = 1.0,
+                         .force_limit = 5.0,
+                         .stiffness = 50.0,
+                         .mass = 0.02,
+                         .period_s = period}};
+    stored.visit(0.5, 0.45);
+    EXPECT_EQ(stored.most(), 1.0);
+    stored.visit(0.51, 0.46);
+    EXPECT_NEAR(stored.most(), 1.0 + 0.5 * 0.02 * 10.0 * 10.0, 1e-9);
+    stored.visit(-0.3, -0.2);
+    EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3 + 0.5 * 0.02 * 660.0 * 660.0, 1e-6);
+    stored = StoredEnergy{{.within = 1.0, .force_limit = 5.0, .stiffness = 50.0}};
+    stored.visit(0.0, 0.4);  // stretched by 0.3 more than the limit stretches it
+    EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3, 1e-12);
+}
+
+TEST(ReadMotion, MovesNoFartherThanTheHandleMust) {
+    test::Random random{4};
+    for (int k = 0; k < test::cases(200); ++k) {
+        const double step = std::exp(test::uniform(random, -6.0, 0.0));
+        ReadMotion motion{step};
+        double at = test::uniform(random, -1.0, 1.0);
+        double true_way = 0.0;
+        double read_way = 0.0;
+        const double reach = step * std::exp(test::uniform(random, -3.0, 2.0));
+        (void)motion.to(step * std::round(at / step));
+        for (int tick = 0; tick < 500; ++tick) {
+            const double moved = reach * test::uniform(random, -1.0, 1.0);
+            at += moved;
+            true_way += std::abs(moved);
+            read_way += std::abs(motion.to(step * std::round(at / step)));
+            ASSERT_LE(read_way, true_way + 0.5 * step + 1e-12);
+        }
+    }
+    ReadMotion motion{1.0};
+    EXPECT_TRUE(std::isnan(motion.to(3.0)));
+    EXPECT_EQ(motion.to(4.0), 0.5);
+    EXPECT_EQ(motion.to(3.0), 0.0);
+    EXPECT_EQ(motion.to(2.0), -1.0);
+    motion.interrupt();
+    EXPECT_TRUE(std::isnan(motion.to(7.0)));
 }
 
 TEST(EnergyTank, WithoutSizeHasNoEnd) {
@@ -171,10 +217,13 @@ TEST(EnergyTank, WithoutSizeHasNoEnd) {
 
 TEST(EnergyTank, IsSizedByTheModelAndItsCoupling) {
     const ForceModel model = wall(100.0);
-    EXPECT_NEAR(most_energy(model, direct(), 5.0), 0.5, 1e-9);
+    EXPECT_NEAR(most_energy(model, direct(), 20.0), 0.5, 1e-6);
+    EXPECT_NEAR(most_energy(model, direct(), 5.0), 0.125 + 0.25, 1e-6);  // of the clipped force
     Scheme coupled;
     coupled.coupling.stiffness = 50.0;
-    EXPECT_NEAR(most_energy(model, coupled, 5.0), 0.5 + 0.5 * 25.0 / 50.0, 1e-9);
+    EXPECT_NEAR(most_energy(model, coupled, 5.0), 0.375 + 0.5 * 25.0 / 50.0, 1e-6);
+    coupled.compensated = true;
+    EXPECT_NEAR(most_energy(model, coupled, 5.0), 0.375 + 25.0 / 50.0, 1e-6);
     const ForceModel motor{NetworkParameters{1, {}, {}, {}, {0.0}, 1.0}, {{0.0}, {1.0}, {}, {}, 1.0}};
     EXPECT_TRUE(std::isinf(most_energy(motor, direct(), 5.0)));
 }

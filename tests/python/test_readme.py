@@ -62,6 +62,12 @@ def test_all_commands_but_make_run_in_their_order(bench: Path) -> None:
         assert answer.returncode == 0, f"{shlex.join(words)}: {answer.stdout}{answer.stderr}"
 
 
+def test_example_output_is_what_the_programs_print() -> None:
+    tool = ROOT / "tools" / "example_output.py"
+    answer = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+
+
 def test_every_target_of_make_exists() -> None:
     targets = set(
         re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "palpate/device/device.hpp"
@@ -17,7 +16,7 @@ struct Tick {
     Reading reading;             ///< what the force was computed from
     Rendered rendered;           ///< what the structure made of it
     Command command;             ///< what was sent, after the guards
-    Status status = Status::Ok;  ///< the first thing that was not Ok on the way
+    Status status = Status::Ok;  ///< the most serious thing that was not Ok on the way
 };
 
 /// One tick of rendering: read, compute, limit, send. No allocation, lock, exception, log or system call but
@@ -45,11 +44,11 @@ class Controller {
         const Status believed = guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
         Tick tick{reading_, {}, {}, believed};
         if (sends_force(believed)) {
-            observe();
             tick.rendered = structure_.step(reading_.position);
+            observe(tick.rendered.environment_position);
             tick.status = guarded(tick.rendered, tick.command.force, believed);
         } else {
-            last_position_ = std::numeric_limits<double>::quiet_NaN();
+            guards_.motion.interrupt();
         }
         guards_.slew.sent(tick.command.force);
         reading_ = device_.exchange(tick.command);
@@ -67,28 +66,30 @@ class Controller {
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
   private:
-    /// What the tick that ended did, where both its ends are known.
-    void observe() noexcept {
-        const double moved = reading_.position - last_position_;
-        last_position_ = reading_.position;
+    /// Books the tick that ended, if both its ends are known. A ramp can give energy once, so the account of what the
+    /// rendering gives begins when it is over.
+    void observe(double object) noexcept {
+        const double moved = guards_.motion.to(reading_.position);
+        guards_.tank.visit(reading_.position, object);
         if (std::isfinite(moved * reading_.applied)) {
             guards_.tank.book(reading_.applied, moved);
-            guards_.observer.book(reading_.applied, moved);
+            (guards_.ramp.is_over() ? guards_.observer : guards_.at_start).book(reading_.applied, moved);
         }
     }
 
-    /// The order of every output: ramp and softening, limit, slew, tank. The limit answers for numbers that are
-    /// none.
+    /// The order of every output: limit, softening, ramp, slew, tank. The limit comes first, because only a scaled
+    /// clipped force is passive; a clipped scaled one of a model that repeats can be a motor. It also replaces numbers
+    /// that are not finite.
     [[nodiscard]] Status guarded(const Rendered& rendered, double& force, Status believed) noexcept {
-        const double scale = guards_.buzz.scale();
-        const Status softened = scale < 1.0 ? Status::Softened : Status::Ok;
-        force = scale * rendered.force;
-        const Status ramped = guards_.ramp.apply(force);
+        force = rendered.force;
         const Status limited = guards_.limit.apply(force);
+        const Status softened = guards_.buzz.apply(force);
+        const Status ramped = guards_.ramp.apply(force);
         const Status slewed = guards_.slew.apply(force);
         const Status drained = guards_.tank.apply(force);
         guards_.buzz.watch(reading_.position, force);
-        for (const Status status : {rendered.status, ramped, limited, slewed, drained, softened}) {
+        // What says that the rendering gave energy comes before what says that the device is weak.
+        for (const Status status : {rendered.status, ramped, drained, softened, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;
             }
@@ -100,7 +101,6 @@ class Controller {
     S structure_;
     Guards guards_;
     Reading reading_;
-    double last_position_ = std::numeric_limits<double>::quiet_NaN();  ///< that was believed
 };
 
 }  // namespace palpate

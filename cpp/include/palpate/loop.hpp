@@ -84,7 +84,9 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double least_energy = 0.0;  ///< the least that the rendering had taken in at any time [J]
+    double given_in_ramp = 0.0;  ///< most energy that the motor had given, net, during the ramp at the start [J]
+    double given = 0.0;          ///< the same since its end [J]
+    double most_stored = 0.0;    ///< upper bound of the energy that the rendering stored above its least [J]
     std::uint64_t buzzes = 0;   ///< each made the object softer
 };
 
@@ -174,7 +176,9 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
-    report.least_energy = controller.guards().observer.least();
+    report.given_in_ramp = -controller.guards().at_start.least();
+    report.given = -controller.guards().observer.least();
+    report.most_stored = controller.guards().tank.stored().most();
     report.buzzes = controller.guards().buzz.buzzes();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <string>
@@ -60,6 +61,16 @@ namespace palpate {
     return "stopped because the loop did not hold its rate: less than " +
            readable(settings.lowest_rate_share * settings.rate_hz) + " Hz of " + readable(settings.rate_hz) +
            " Hz for half a second";
+}
+
+/// What energy a rendering gave, net, in one line; the ramp at the start can give what the object holds once, so it is
+/// told by itself.
+[[nodiscard]] inline std::string energy_text(const LoopReport& report) {
+    const std::string stored = std::isfinite(report.most_stored)
+                                   ? "the object held at most " + readable(report.most_stored) + " J"
+                                   : "no bound is known of what the object held";
+    return "gave at most " + readable(report.given_in_ramp) + " J during the ramp and " +
+           readable(report.given) + " J after it; " + stored;
 }
 
 /// "massless, compensated, K_c = 100, B_c = 0.02"

@@ -112,6 +112,7 @@ def render(
         f"{summary['missed_deadlines']} deadlines missed",
         "period": _percentiles(summary["period"]),
         "late by": _percentiles(summary["lateness"]),
+        "energy": summary["energy"]["sentence"],
         "ticks": ", ".join(f"{count} {word}" for word, count in summary["ticks_by_status"].items()),
     }
     if record is not None:

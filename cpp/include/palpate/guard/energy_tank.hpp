@@ -5,62 +5,67 @@
 #include <cmath>
 #include <limits>
 
+#include "palpate/guard/stored_energy.hpp"
 #include "palpate/status.hpp"
 
 namespace palpate {
 
 /// What an energy tank may count on.
 struct TankSettings {
-    double capacity = std::numeric_limits<double>::infinity();  ///< the most the object can give [J]
-    double damping = 0.0;       ///< b of the device, which takes what the motor gave [N*s/m or N*m*s/rad]
-    double friction = 0.0;      ///< f_c, likewise [N or N*m]
-    double encoder_step = 0.0;  ///< a motion below it says nothing [m or rad]
+    StoredEnergySettings stored;  ///< the most the object can give
+    double damping = 0.0;         ///< credited, of the device's b [N*s/m or N*m*s/rad]
+    double friction = 0.0;        ///< credited, of the device's f_c [N or N*m]
     double period_s = 1e-3;
 };
 
-/// A store that every joule a rendering gives is paid from. It is full at the start, with what the object can
-/// give and a reserve of a quarter above it. What the handle puts in fills it again, up to the brim, and nine
-/// tenths of what the device certainly took are not charged,
+/// Store that every joule a rendering gives is paid from. What it has given since it was last full is
 ///
-///     E_k = min(brim, E_{k-1} + F d + 0.9 (b d_r^2 / T + f_c d_r)),   d = x_k - x_{k-1},   d_r = max(0, |d| - step).
+///     G_k = max(0, G_{k-1} - F u - b u^2 / T - f_c |u|),
 ///
-/// Not all of it: a steady buzz gives exactly what the device takes. An object that generates nothing never
-/// reaches the reserve. Within it all forces fade with the level, those against the handle too: one that is held
-/// too long turns it round and gives after all. What is given beyond the losses therefore ends with the brim.
+/// F the force that acted, u the motion that the readings prove (`ReadMotion`), b and f_c what is credited of the
+/// device's damping and friction. u is the motion of a handle that the encoder can have read like this. A certificate
+/// holds for every motion, so for this one: without delay no stretch of it gives more than the object held at its start,
+/// and G stays below the bound W of `StoredEnergy`. With full credit a certified rendering never drains the tank. With
+/// delay this holds if the forces on their way at the start of the stretch add less than W leaves.
+///
+/// Where nothing is certified nine tenths are credited, because a steady limit cycle gives exactly what the device takes,
+/// and W is that of the domain. Above W all forces fade, over a reserve of W / 4, those against the handle too: one that is held too long turns it round and
+/// gives after all. What is given beyond the credited losses therefore ends with W and the reserve.
 class EnergyTank {
   public:
     EnergyTank() = default;
     explicit EnergyTank(const TankSettings& settings) noexcept
-        : settings_{settings},
-          reserve_{0.25 * settings.capacity},
-          level_{settings.capacity + reserve_},
-          lowest_{level_} {}
+        : settings_{settings}, stored_{settings.stored}, reserve_{0.25 * settings.stored.within} {}
 
+    /// Where handle and object are now, and how far the handle moved while `applied` acted.
     void book(double applied, double moved) noexcept {
-        const double surely = std::max(0.0, std::abs(moved) - settings_.encoder_step);
-        const double lost = surely * (settings_.damping * surely / settings_.period_s + settings_.friction);
-        level_ = std::min(settings_.capacity + reserve_, level_ + applied * moved + credited * lost);
-        lowest_ = std::min(lowest_, level_);
+        const double lost =
+            (settings_.damping * std::abs(moved) / settings_.period_s + settings_.friction) * std::abs(moved);
+        given_ = std::max(0.0, given_ - applied * moved - lost);
+        most_given_ = std::max(most_given_, given_);
     }
+    void visit(double handle, double object) noexcept { stored_.visit(handle, object); }
 
     [[nodiscard]] Status apply(double& force) const noexcept {
-        if (level_ >= reserve_ || force == 0.0) {
+        const double beyond = given_ - stored_.most();
+        if (!(beyond > 0.0) || force == 0.0) {
             return Status::Ok;
         }
-        force *= std::max(0.0, level_) / reserve_;
+        force *= std::max(0.0, 1.0 - beyond / reserve_);
         return Status::Drained;
     }
 
-    [[nodiscard]] double level() const noexcept { return level_; }
-    [[nodiscard]] double lowest() const noexcept { return lowest_; }
+    /// G now, and its largest [J]
+    [[nodiscard]] double given() const noexcept { return given_; }
+    [[nodiscard]] double most_given() const noexcept { return most_given_; }
+    [[nodiscard]] const StoredEnergy& stored() const noexcept { return stored_; }
 
   private:
-    static constexpr double credited = 0.9;
-
     TankSettings settings_;
+    StoredEnergy stored_;
     double reserve_ = std::numeric_limits<double>::infinity();
-    double level_ = std::numeric_limits<double>::infinity();
-    double lowest_ = std::numeric_limits<double>::infinity();
+    double given_ = 0.0;
+    double most_given_ = 0.0;
 };
 
 }  // namespace palpate

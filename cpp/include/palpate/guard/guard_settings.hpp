@@ -28,10 +28,16 @@ struct GuardSettings {
     double device_damping = 0.0;   ///< b that the device is known to have [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< f_c likewise [N or N*m]
     double encoder_step = 0.0;     ///< [m or rad]
+    /// A certificate holds for this run: the energy tank counts on all of the device's damping and friction, and on what
+    /// the object stores beyond its domain.
+    bool certified = false;
 };
 
 inline constexpr double longest_guard_s =
     3600.0;  ///< of ramp_s and frozen_s; whole samples must fit an integer
+
+/// Share of the device's damping and friction that the energy tank counts on where nothing is certified.
+inline constexpr double uncertified_credit = 0.9;
 
 /// Shaking faster than this is no hand's doing.
 inline constexpr double slowest_buzz_hz = 20.0;

@@ -10,7 +10,9 @@
 #include "palpate/guard/limit_cycle_detector.hpp"
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/passivity_observer.hpp"
+#include "palpate/guard/read_motion.hpp"
 #include "palpate/guard/reading_guard.hpp"
+#include "palpate/guard/stored_energy.hpp"
 #include "palpate/model/energy.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/scheme.hpp"
@@ -20,21 +22,28 @@ namespace palpate {
 /// What a sample passes before it is believed, and a force before it is sent. Made of nothing but a force
 /// limit it is the guard of a simulation, where nothing else can go wrong.
 struct Guards {
-    ForceLimit limit{};
-    SlewLimit slew{};
-    ForceRamp ramp{};
     ReadingGuard reading{};
-    EnergyTank tank{};
+    ForceLimit limit{};
     LimitCycleDetector buzz{};
-    PassivityObserver observer{};  ///< looks on
+    ForceRamp ramp{};
+    SlewLimit slew{};
+    EnergyTank tank{};
+    ReadMotion motion{};
+    PassivityObserver at_start{};  ///< looks on during the ramp
+    PassivityObserver observer{};  ///< looks on after it
 };
 
-/// The most energy that a rendering of the model can give: what the object holds between its least and its
-/// largest, and the spring of its coupling at the largest force. Infinite for a motor, a model that gains
-/// energy with every turn.
+/// Upper bound of the energy that a rendering stores within the domain of its model, at rest. Infinite for a motor, a
+/// model that gains energy with every turn.
+///
+/// The device gets the clipped force c(f). Its object stores C = int c(f) dx, with hysteresis at most r max h / 2 more
+/// (`energy_range`). The coupling stores P = K_c e^2 / 2 at a stretch of e <= F / K_c, F the largest clipped force: its
+/// force is c(f), and from K_c e_k + (B_c/T) (e_k - e_{k-1}) = c(f) with e_0 = 0 follows |e_k| <= F / K_c for every k. A
+/// compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its least can be lower by
+/// F^2 / 2 K_c. What lies outside these positions and speeds is added by `StoredEnergy` when it is visited.
 [[nodiscard]] inline double most_energy(const ForceModel& given, const Scheme& scheme, double force_limit) {
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
-    const double held = energy_range(model).span();
+    const double held = energy_range(model, force_limit).span();
     if (scheme.structure == StructureKind::Direct) {
         return held;
     }
@@ -43,23 +52,47 @@ struct Guards {
                              ? both->force().value_bounds().largest() + both->loss().value_bounds().largest()
                              : model.network()->curve().value_bounds().largest();
     const double felt = std::min(force, force_limit);
-    return held + 0.5 * felt * felt / scheme.coupling.stiffness;
+    const double stretched = 0.5 * felt * felt / scheme.coupling.stiffness;
+    return held + (scheme.compensated ? 2.0 : 1.0) * stretched;
+}
+
+/// What bounds the energy that a certified rendering of the model stores, wherever it goes.
+[[nodiscard]] inline StoredEnergySettings stored_energy(const ForceModel& model, const Scheme& scheme,
+                                                        double force_limit, double period_s) {
+    StoredEnergySettings stored;
+    stored.within = most_energy(model, scheme, force_limit);
+    const Domain& domain = model.domain();
+    if (!domain.period) {
+        stored.lower = domain.lower[0];
+        stored.upper = domain.upper[0];
+    }
+    stored.force_limit = force_limit;
+    if (scheme.structure != StructureKind::Direct) {
+        stored.stiffness = scheme.coupling.stiffness;
+    }
+    stored.mass = has_mass(scheme.structure) ? scheme.inertia.mass : 0.0;
+    stored.period_s = period_s;
+    return stored;
 }
 
 /// All guards of a live rendering.
 [[nodiscard]] inline Guards guards_of(const GuardSettings& settings, const ForceModel& model,
                                       const Scheme& scheme, double period_s) {
     const auto longest_swing = static_cast<std::uint64_t>(std::llround(0.5 / (slowest_buzz_hz * period_s)));
-    Guards guards{force_limit(settings),
-                  slew_limit(settings, period_s),
-                  force_ramp(settings, period_s),
-                  reading_guard(settings, period_s),
-                  {},
-                  {},
-                  {}};
+    Guards guards;
+    guards.reading = reading_guard(settings, period_s);
+    guards.limit = force_limit(settings);
+    guards.ramp = force_ramp(settings, period_s);
+    guards.slew = slew_limit(settings, period_s);
+    guards.motion = ReadMotion{settings.encoder_step};
     if (settings.energy_tank) {
-        guards.tank = EnergyTank{{most_energy(model, scheme, settings.force_limit), settings.device_damping,
-                                  settings.device_friction, settings.encoder_step, period_s}};
+        StoredEnergySettings stored = stored_energy(model, scheme, settings.force_limit, period_s);
+        if (!settings.certified) {
+            stored = {.within = stored.within};
+        }
+        const double share = settings.certified ? 1.0 : uncertified_credit;
+        guards.tank = EnergyTank{
+            {stored, share * settings.device_damping, share * settings.device_friction, period_s}};
     }
     if (settings.buzz_force > 0.0) {
         guards.buzz = LimitCycleDetector{{settings.buzz_force, longest_swing, settings.encoder_step}};

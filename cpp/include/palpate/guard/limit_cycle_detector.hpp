@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "palpate/status.hpp"
+
 namespace palpate {
 
 /// What counts as buzzing.
@@ -40,6 +42,11 @@ class LimitCycleDetector {
             extreme_ = position;
             least_force_ = largest_force_ = force;
         }
+    }
+
+    [[nodiscard]] Status apply(double& force) const noexcept {
+        force *= scale_;
+        return scale_ < 1.0 ? Status::Softened : Status::Ok;
     }
 
     [[nodiscard]] double scale() const noexcept { return scale_; }

@@ -10,8 +10,8 @@
 
 namespace palpate {
 
-/// The last thing between a computed force and the device: a force that is not a number becomes zero, a
-/// larger one than `largest` is clipped.
+/// The first thing after a computed force: one that is not a number becomes zero, a larger one than `largest` is
+/// clipped. The energy of an object is that of its clipped force, so everything that scales comes later.
 struct ForceLimit {
     double largest = 5.0;  ///< [N or N*m], > 0
 
@@ -46,8 +46,10 @@ struct ForceRamp {
     std::uint64_t ticks = 0;
     std::uint64_t done = 0;
 
+    [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }
+
     [[nodiscard]] Status apply(double& force) noexcept {
-        if (done >= ticks) {
+        if (is_over()) {
             return Status::Ok;
         }
         force *= static_cast<double>(done++) / static_cast<double>(ticks);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 #include "palpate/model/force_model.hpp"
@@ -14,110 +15,162 @@ namespace palpate {
 struct EnergyRange {
     double least = 0.0;    ///< over all positions, continuation included; -infinity: it is a motor [J]
     double largest = 0.0;  ///< over its domain, hysteresis included [J]
+    double missed = 0.0;   ///< upper bound of what the cells between samples can add to the span [J]
 
-    /// The most that it can give.
-    [[nodiscard]] double span() const noexcept { return largest - least; }
+    /// Upper bound of what it can give from any position in its domain.
+    [[nodiscard]] double span() const noexcept { return largest - least + missed; }
 };
 
 namespace detail {
 
-/// V where f passes from negative to positive between two positions, by bisection: V is flat there.
-[[nodiscard]] inline double energy_of_the_rest_between(const NetworkCurve& force, double below,
-                                                       double above) noexcept {
+/// Integral of f - c(f) between two positions; c limits a force to +-`limit`. `at(x)` is the curve of f. Halves the
+/// way until both ends are within the limit, or both beyond it on one side.
+template <class At>
+[[nodiscard]] double work_beyond(const At& at, double from, const Curve& at_from, double to,
+                                 const Curve& at_to, double limit, int halvings = 40) noexcept {
+    const auto side = [&](double force) noexcept { return force > limit ? 1 : force < -limit ? -1 : 0; };
+    const int first = side(at_from.value);
+    if (first == side(at_to.value) || halvings == 0) {
+        return first == 0 ? 0.0 : at_to.integral - at_from.integral - first * limit * (to - from);
+    }
+    const double middle = 0.5 * (from + to);
+    const Curve at_middle = at(middle);
+    return work_beyond(at, from, at_from, middle, at_middle, limit, halvings - 1) +
+           work_beyond(at, middle, at_middle, to, at_to, limit, halvings - 1);
+}
+
+/// Position where f passes from negative to positive between two positions, by bisection.
+template <class At>
+[[nodiscard]] double rest_between(const At& at, double below, double above) noexcept {
     constexpr int halvings = 60;
     for (int k = 0; k < halvings; ++k) {
         const double middle = 0.5 * (below + above);
-        (force.at(middle).value < 0.0 ? below : above) = middle;
+        (at(middle).value < 0.0 ? below : above) = middle;
     }
-    return std::min(force.at(below).integral, force.at(above).integral);
+    return below;
 }
 
-/// The least V on an edge line: where its force has died out if it drives the tool outward, else at the edge.
-[[nodiscard]] inline double least_energy_beyond(const EdgeLine& line, double outward) noexcept {
-    const Curve& edge = line.at_edge;
-    const bool drives_outward = -outward * edge.value > 0.0;
-    return drives_outward ? line.at(line.edge + outward * std::abs(edge.value / edge.slope)).integral
-                          : edge.integral;
+/// How far the energy of c(f) falls beyond an edge: the work of a force that drives the tool outward until it has died
+/// out along the edge line.
+[[nodiscard]] inline double fall_beyond(const EdgeLine& line, double outward, double limit) noexcept {
+    const double force = std::abs(line.at_edge.value);
+    if (!(-outward * line.at_edge.value > 0.0)) {
+        return 0.0;
+    }
+    const double within = std::min(force, limit);
+    return (force - 0.5 * within) * within / std::abs(line.at_edge.slope);
+}
+
+/// Energy of c(f) at the ends of a domain, and its range there.
+struct LimitedEnergy {
+    EnergyRange range;
+    double at_lower = 0.0;
+    double at_upper = 0.0;
+};
+
+/// The energy is that of f less the work beyond the limit. f is sampled at the borders of cells of width w; L is the
+/// largest |f'|. In a cell whose ends are both within the limit, or both beyond it on one side, f can pass the limit
+/// unseen only if one end is within L w / 2 of it; that changes the work by at most L w^2 / 4. Within a cell the energy
+/// leaves the range of its ends, and of the rest that is found, by less than that.
+template <class At>
+[[nodiscard]] LimitedEnergy limited_energy(const At& at, double lower, double upper, std::size_t cells,
+                                           double steepest, double limit) noexcept {
+    const double width = (upper - lower) / static_cast<double>(cells);
+    const double unseen = 0.25 * steepest * width * width;
+    double from = lower;
+    Curve at_from = at(lower);
+    LimitedEnergy energy{
+        {at_from.integral, at_from.integral, unseen}, at_from.integral, at_from.integral};
+    double beyond = 0.0;
+    for (std::size_t k = 1; k <= cells; ++k) {
+        const double to = lower + (upper - lower) * static_cast<double>(k) / static_cast<double>(cells);
+        const Curve at_to = at(to);
+        if (at_from.value < 0.0 && at_to.value >= 0.0) {
+            const double rest = rest_between(at, from, to);
+            const Curve at_rest = at(rest);
+            const double here = at_rest.integral - beyond - work_beyond(at, from, at_from, rest, at_rest, limit);
+            energy.range.least = std::min(energy.range.least, here);
+        }
+        const auto is_near = [&](const Curve& end) noexcept {
+            return std::abs(std::abs(end.value) - limit) <= 0.5 * steepest * width;
+        };
+        energy.range.missed += is_near(at_from) || is_near(at_to) ? unseen : 0.0;
+        beyond += work_beyond(at, from, at_from, to, at_to, limit);
+        energy.at_upper = at_to.integral - beyond;
+        energy.range.least = std::min(energy.range.least, energy.at_upper);
+        energy.range.largest = std::max(energy.range.largest, energy.at_upper);
+        from = to;
+        at_from = at_to;
+    }
+    return energy;
+}
+
+/// Cells for a curve: 16 for its finest width, 1024 at least.
+[[nodiscard]] inline std::size_t energy_cells(double travel, double finest_width) noexcept {
+    constexpr double fewest = 1024.0;
+    constexpr double most = 1e6;
+    return static_cast<std::size_t>(std::min(most, fewest + 16.0 * travel / finest_width));
 }
 
 }  // namespace detail
 
 /// The same of a force of position and velocity, at rest: by Simpson's rule, because it has no antiderivative.
-[[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force) {
-    constexpr double cells_per_width = 16.0;
-    constexpr double most_cells = 1e5;
-    constexpr int halvings = 60;
-    const auto at = [&](double x) noexcept { return force.force(x, 0.0); };
-    const auto between = [&](double from, double at_from, double to, double at_to) noexcept {
-        return (to - from) / 6.0 * (at_from + 4.0 * at(0.5 * (from + to)) + at_to);
+[[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
+    const auto at = [&](double x) noexcept {
+        return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};
     };
-    const auto cells = static_cast<int>(
-        std::min(most_cells, 64.0 + cells_per_width * force.travel() / force.finest_width()));
+    const auto work = [&](double from, double at_from, double to, double at_to) noexcept {
+        return (to - from) / 6.0 * (at_from + 4.0 * at(0.5 * (from + to)).value + at_to);
+    };
+    const std::size_t cells = detail::energy_cells(force.travel(), force.finest_width());
     double energy = 0.0;
     double from = force.lower();
-    double at_from = at(from);
+    double at_from = at(from).value;
     EnergyRange range;
-    for (int k = 1; k <= cells; ++k) {
-        const double to = force.lower() + force.travel() * k / cells;
-        const double at_to = at(to);
-        if (at_from < 0.0 && at_to >= 0.0) {  // the object rests in between
-            double below = from;
-            double above = to;
-            for (int halving = 0; halving < halvings; ++halving) {
-                const double middle = 0.5 * (below + above);
-                (at(middle) < 0.0 ? below : above) = middle;
-            }
-            range.least = std::min(range.least, energy + between(from, at_from, below, 0.0));
+    for (std::size_t k = 1; k <= cells; ++k) {
+        const double to = force.lower() + force.travel() * static_cast<double>(k) / static_cast<double>(cells);
+        const double at_to = at(to).value;
+        if (at_from < 0.0 && at_to >= 0.0) {
+            const double rest = detail::rest_between(at, from, to);
+            range.least = std::min(range.least, energy + work(from, at_from, rest, 0.0));
         }
-        energy += between(from, at_from, to, at_to);
+        energy += work(from, at_from, to, at_to);
         range.least = std::min(range.least, energy);
         range.largest = std::max(range.largest, energy);
         from = to;
         at_from = at_to;
     }
-    EdgeLine above = force.above();
-    above.at_edge.integral = energy;
-    range.least = std::min({range.least, detail::least_energy_beyond(force.below(), -1.0),
-                            detail::least_energy_beyond(above, +1.0)});
+    range.least = std::min({range.least, -detail::fall_beyond(force.below(), -1.0, force_limit),
+                            energy - detail::fall_beyond(force.above(), +1.0, force_limit)});
     return range;
 }
 
-/// The energy range of a model of one position, or of position and velocity.
-[[nodiscard]] inline EnergyRange energy_range(const ForceModel& model) {
+/// The energy range of a model of one position, or of position and velocity, whose force a device limits.
+[[nodiscard]] inline EnergyRange energy_range(
+    const ForceModel& model, double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);
     if (const VelocityNetwork* of_velocity = model.velocity()) {
-        return energy_range(*of_velocity);
+        return energy_range(*of_velocity, force_limit);
     }
-    constexpr double cells_per_width = 16.0;
-    constexpr double most_cells = 1e6;
     const HysteresisNetwork* both = model.hysteresis();
     const NetworkCurve& force = both != nullptr ? both->force() : model.network()->curve();
-    const double travel = force.upper() - force.lower();
-    const auto cells =
-        static_cast<int>(std::min(most_cells, 64.0 + cells_per_width * travel / model.finest_width()));
-    EnergyRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-    double last = force.lower();
-    for (int k = 0; k <= cells; ++k) {
-        const double x = force.lower() + travel * k / cells;
-        const Curve here = force.inside(x);
-        // Bent but not sliding, a hysteresis of play radius r holds at most h r / 2 more.
-        const double bent = both != nullptr ? 0.5 * both->play_radius() * both->loss().inside(x).value : 0.0;
-        range.least = std::min(range.least, here.integral);
-        range.largest = std::max(range.largest, here.integral + bent);
-        if (k > 0 && here.value >= 0.0 && force.inside(last).value < 0.0) {
-            range.least = std::min(range.least, detail::energy_of_the_rest_between(force, last, x));
-        }
-        last = x;
+    const std::size_t cells = detail::energy_cells(force.upper() - force.lower(), model.finest_width());
+    const detail::LimitedEnergy energy =
+        detail::limited_energy([&](double x) noexcept { return force.inside(x); }, force.lower(),
+                               force.upper(), cells, force.slope_bounds().largest(), force_limit);
+    EnergyRange range = energy.range;
+    if (both != nullptr) {
+        // S - C(x) is the work of c(g + (xi - pi) h / r) - c(g) from pi to x, and |x - pi| <= r.
+        range.largest += 0.5 * both->play_radius() * std::max(0.0, both->loss().value_bounds().upper);
     }
     if (force.periodic()) {
-        const double turn = force.inside(force.upper()).integral - force.inside(force.lower()).integral;
-        if (std::abs(turn) > 1e-9 * (range.largest - range.least)) {
+        if (std::abs(energy.at_upper - energy.at_lower) > 1e-9 * (range.largest - range.least)) {
             range.least = -std::numeric_limits<double>::infinity();
         }
         return range;
     }
-    range.least = std::min({range.least, detail::least_energy_beyond(force.below(), -1.0),
-                            detail::least_energy_beyond(force.above(), +1.0)});
+    range.least = std::min({range.least, energy.at_lower - detail::fall_beyond(force.below(), -1.0, force_limit),
+                            energy.at_upper - detail::fall_beyond(force.above(), +1.0, force_limit)});
     return range;
 }
 

@@ -31,14 +31,16 @@ namespace palpate {
 /// certified by Taylor's formula about the middle of each cell, and F is stored at their borders. Cells over the
 /// whole line prove that F rises. A step finds the cell of q among the border values, interpolates linearly and
 /// takes Newton's steps inside the cell:
-/// - The interpolation misses F by at most w^2 max|F''| / 8, and the position by w/32.
-/// - A step turns an error e into at most c e^2, c = max|F''| / (2 min F') <= 1/(8w). Errors: w/32, w/2^13,
-///   w/2^29, w/2^61. Clamping to the cell, which holds the solution, increases none.
+/// - The interpolation misses F by at most w^2 max|F''| / 8, and the position by w/32. A guess within w/32 of it,
+///   such as the tangent of the last step, is at most w/16 beside the solution.
+/// - A step turns an error e into at most c e^2, c = max|F''| / (2 min F') <= 1/(8w). Errors: w/16, w/2^11,
+///   w/2^25, w/2^53. Clamping to the cell, which holds the solution, increases none.
 /// - A correction d shows the error before it: e <= |d| + c e^2 <= |d| + e/8, so that after it at most
-///   (64/49) c d^2 is left. What leaves a residual below rounding needs no evaluation to confirm it.
+///   (64/49) c d^2 is left. A step that leaves less than `tolerance`, or a residual below rounding, needs no
+///   evaluation to confirm it.
 ///
-/// Where q stays in the cell of the last step, one evaluation more comes first, where the last tangent predicts
-/// the solution. Most steps of a slow motion end with it, because it leaves less than `tolerance`.
+/// Where the tangent stays in the cell of the last step, it is tried before the cell is looked for: one evaluation
+/// then suffices for most steps of a slow motion, and at most three more follow.
 ///
 /// A hysteresis has three sheets: F with g + h (pressing), with g - h (releasing) and with g + (y - play) h / r
 /// (sticking). Each rises and obeys (C), the last for all |y - play| <= r + w at once, so that one partition serves
@@ -47,13 +49,16 @@ namespace palpate {
 /// steps end below it but for c e^2, and two above it.
 class CertifiedSolver {
   public:
-    /// What the last step leaves to the next: its solution as a function of q, and its cell.
+    /// What the last step leaves to the next: its solution as a function of q, and how far F is smooth around it.
     struct Memory {
         double position = 0.0;    ///< the last solution
         double at_zero = 0.0;     ///< what its tangent predicts for q = 0
         double compliance = 0.0;  ///< its 1 / F'
-        std::size_t cell = none;
-        double turned = 0.0;  ///< whole turns of a knob up to that cell [m or rad]
+        double low =
+            std::numeric_limits<double>::infinity();  ///< the ends of its cell; none: nothing predicted
+        double high = -std::numeric_limits<double>::infinity();
+        double curvature = 0.0;  ///< c of its cell
+        double play = 0.0;       ///< the play that this holds for
 
         Memory() = default;
         explicit Memory(double at) noexcept : position{at} {}
@@ -74,24 +79,25 @@ class CertifiedSolver {
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
                                                             Memory& memory) const noexcept {
-        if (memory.cell != none && unique(line.slope)) {
-            const Cell cell = cell_at(memory.cell, memory.turned);
-            const double play = play_of(state);
-            if (holds(memory.cell, memory.turned, line, play)) {
-                const double y =
-                    std::clamp(memory.at_zero + line.intercept * memory.compliance, cell.low, cell.high);
-                const Trial trial = newton(environment, state, line, y, cell);
-                const double left = left_by(trial.correction, cell.curvature);
-                if (left <= tolerance_) {
-                    return found(trial, line, 1, memory);
-                }
-                const double start = 32.0 * left <= cell.high - cell.low
-                                         ? trial.position
-                                         : interpolated(memory.cell, memory.turned, line, play);
-                return descend(environment, state, line, start, 1, memory);
-            }
+        const double y = memory.at_zero + line.intercept * memory.compliance;
+        if (!(y > memory.low && y < memory.high && play_of(state) == memory.play && unique(line.slope))) {
+            return from_borders(environment, state, line, memory, y, 0);
         }
-        return from_borders(environment, state, line, memory);
+        const EnvironmentSample sample = environment.at(y, state);
+        // Newton's correction by the last compliance and two terms of its geometric series: nothing has to wait for
+        // a division. Of the correction the share missing^3 is left.
+        const double rough = (sample.force + (line.slope * y - line.intercept)) * memory.compliance;
+        const double missing = (1.0 - memory.compliance * line.slope) - memory.compliance * sample.slope;
+        const double correction = -rough - rough * (missing + missing * missing);
+        // F' changes by at most a quarter over a cell: the solution is in it if the ends are farther away than this.
+        const double reach = 3.0 * std::abs(correction);
+        const double left = 2.0 * (std::abs(rough * missing) * (missing * missing) +
+                                   memory.curvature * (correction * correction));
+        if (!(left <= tolerance_ && std::abs(missing) <= 0.25 && y - reach >= memory.low &&
+              y + reach <= memory.high)) {
+            return from_borders(environment, state, line, memory, y + correction, 1);
+        }
+        return found(sample, y + correction, 1.0 / (line.slope + sample.slope), line, 1, memory);
     }
 
     /// The search from the last position, as for a force of which nothing is certified.
@@ -106,7 +112,6 @@ class CertifiedSolver {
     }
 
   private:
-    static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
     static constexpr double infinity = std::numeric_limits<double>::infinity();
     static constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
@@ -123,6 +128,12 @@ class CertifiedSolver {
         double low;
         double high;
         double curvature;
+    };
+
+    /// Cell k, of a knob that has turned so far.
+    struct Place {
+        std::size_t cell;
+        double turned;
     };
 
     /// A stretch over which force and loss are networks; a line is one without wavelets.
@@ -168,10 +179,8 @@ class CertifiedSolver {
         }
     }
 
-    /// What a step of Newton's method leaves of the error it shows.
-    [[nodiscard]] static double left_by(double correction, double curvature) noexcept {
-        return 64.0 / 49.0 * curvature * (correction * correction);
-    }
+    /// Distance at which a position is surely on one side of a kink.
+    [[nodiscard]] double margin(double y) const noexcept { return 4.0 * epsilon * (std::abs(y) + travel_); }
 
     [[nodiscard]] static double median(double a, double b, double c) noexcept {
         return std::max(std::min(a, b), std::min(std::max(a, b), c));
@@ -200,20 +209,13 @@ class CertifiedSolver {
                 k == 0 ? 0.0 : borders_[k - 1].curvature};
     }
 
-    /// Whether the solution lies in cell k.
-    [[nodiscard]] bool holds(std::size_t k, double turned, LoadLine line, double play) const noexcept {
-        return (k == 0 || value(borders_[k - 1], turned, line.slope, play) <= line.intercept) &&
-               (k == borders_.size() || line.intercept < value(borders_[k], turned, line.slope, play));
-    }
-
     /// Newton's method from y, clamped to the cell. Evaluated some units in the last place beside the borders,
     /// because f' may jump there.
     template <class E, class State>
     [[nodiscard, gnu::always_inline]] inline Trial newton(const E& environment, const State& state,
                                                           LoadLine line, double y,
                                                           const Cell& cell) const noexcept {
-        const double margin = 4.0 * epsilon * (std::abs(y) + travel_);
-        y = std::fmax(std::fmin(y, cell.high - margin), cell.low + margin);
+        y = std::fmax(std::fmin(y, cell.high - margin(y)), cell.low + margin(y));
         const auto clamped = [&](double to) { return std::clamp(to, cell.low, cell.high); };
         const double sum = line.slope * y - line.intercept;
         if constexpr (requires { state.play; }) {
@@ -252,80 +254,90 @@ class CertifiedSolver {
         }
     }
 
-    [[nodiscard]] static Solution found(const Trial& trial, LoadLine line, int evaluations,
-                                        Memory& memory) noexcept {
-        memory.position = trial.position;
-        memory.at_zero = trial.position - line.intercept * trial.compliance;
-        memory.compliance = trial.compliance;
-        return {trial.position,
-                {line.intercept - line.slope * trial.position, trial.sample.slope, trial.sample.energy,
-                 trial.sample.extrapolated},
+    [[nodiscard]] static Solution found(const EnvironmentSample& sample, double position, double compliance,
+                                        LoadLine line, int evaluations, Memory& memory) noexcept {
+        memory.position = position;
+        memory.at_zero = position - line.intercept * compliance;
+        memory.compliance = compliance;
+        return {position,
+                {line.intercept - line.slope * position, sample.slope, sample.energy, sample.extrapolated},
                 0.0,
                 evaluations,
                 Status::Ok};
     }
 
+    /// From the border values and their interpolation, or a guess that agrees with it.
     template <Environment E>
     [[nodiscard, gnu::noinline]] Solution from_borders(const E& environment, const typename E::State& state,
-                                                       LoadLine line, Memory& memory) const noexcept {
+                                                       LoadLine line, Memory& memory, double guess,
+                                                       int evaluations) const noexcept {
+        constexpr int most = 3;
         if (!(unique(line.slope) && std::isfinite(line.intercept))) {
             return search(environment, state, line, memory);
         }
         const double play = play_of(state);
-        Memory next = memory;
-        locate(line, play, next);
-        const Solution solution =
-            descend(environment, state, line, interpolated(next.cell, next.turned, line, play), 0, next);
-        if (solution.status != Status::NonFinite) {
-            memory = next;
+        const auto [k, turned] = locate(line, play);
+        const Cell cell = cell_at(k, turned);
+        double y = interpolated(k, turned, line, play);
+        if (32.0 * std::abs(guess - y) <= cell.high - cell.low) {
+            y = guess;
         }
-        return solution;
-    }
-
-    /// Newton's method from at most w/32 beside the solution, in the cell that is remembered.
-    template <Environment E>
-    [[nodiscard, gnu::noinline]] Solution descend(const E& environment, const typename E::State& state,
-                                                  LoadLine line, double y, int evaluations,
-                                                  Memory& memory) const noexcept {
-        constexpr int most = 3;
-        const Cell cell = cell_at(memory.cell, memory.turned);
         for (int steps = 1;; ++steps) {
             const Trial trial = newton(environment, state, line, y, cell);
             if (!std::isfinite(trial.position)) {
                 return {y, trial.sample, trial.position, evaluations + steps, Status::NonFinite};
             }
-            const double left = left_by(trial.correction, cell.curvature);
+            const double left = 64.0 / 49.0 * cell.curvature * (trial.correction * trial.correction);
             y = trial.position;
             const double size =
                 std::abs(trial.sample.force) + std::abs(line.slope * y) + std::abs(line.intercept);
-            if (left * trial.steepest <= 4.0 * epsilon * size || steps == most) {
-                return found(trial, line, evaluations + steps, memory);
+            if (left <= tolerance_ || left * trial.steepest <= 4.0 * epsilon * size || steps == most) {
+                remember(cell, y, play, memory);
+                return found(trial.sample, y, trial.compliance, line, evaluations + steps, memory);
             }
         }
     }
 
+    /// How far F is smooth around y.
+    void remember(const Cell& cell, double y, double play, Memory& memory) const noexcept {
+        memory.low = cell.low + margin(y);
+        memory.high = cell.high - margin(y);
+        if (radius_ > 0.0) {
+            const double from = play - radius_;
+            const double to = play + radius_;
+            memory.low = std::fmax(memory.low, y > to     ? to + margin(y)
+                                               : y > from ? from + margin(y)
+                                                          : -infinity);
+            memory.high = std::fmin(memory.high, y < from ? from - margin(y)
+                                                 : y < to ? to - margin(y)
+                                                          : infinity);
+        }
+        memory.curvature = cell.curvature;
+        memory.play = play;
+    }
+
     /// The cell of the solution, by the values at the borders alone.
-    void locate(LoadLine line, double play, Memory& memory) const noexcept {
+    [[nodiscard]] Place locate(LoadLine line, double play) const noexcept {
         const Border& first = borders_.front();
+        double turned = 0.0;
         const auto lies_below = [&](const Border& border) {
-            return value(border, memory.turned, line.slope, play) <= line.intercept;
+            return value(border, turned, line.slope, play) <= line.intercept;
         };
-        memory.turned = 0.0;
         if (period_ > 0.0) {
             double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
                                       (line.slope * period_));
-            memory.turned = turns * period_;
+            turned = turns * period_;
             // A loss, or rounding, may be worth some turns.
             constexpr int farthest = 4;
             for (int k = 0; k < farthest && !lies_below(first); ++k) {
-                memory.turned = --turns * period_;
+                turned = --turns * period_;
             }
             for (int k = 0; k < farthest && lies_below(borders_.back()); ++k) {
-                memory.turned = ++turns * period_;
+                turned = ++turns * period_;
             }
         }
-        memory.cell = static_cast<std::size_t>(
-            std::partition_point(borders_.begin(), borders_.end(), lies_below) - borders_.begin());
+        const auto above = std::partition_point(borders_.begin(), borders_.end(), lies_below);
+        return {static_cast<std::size_t>(above - borders_.begin()), turned};
     }
 
     /// Where the chords of the sheets over cell k reach q.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -213,14 +214,26 @@ namespace detail {
     return certify_rendered(rendered_bounds(bounds, scheme), scheme, device);
 }
 
+/// Bounds of a model's force that a scheme renders on a device. The mean of a force that repeats is that of the limited
+/// force. An object with mass has the unlimited one, and the energy-consistent step need not lose what the play loses.
+[[nodiscard]] inline ForceBounds rendered_bounds(const ForceModel& model, const Scheme& scheme,
+                                                 const DeviceProfile& device) {
+    const double limit =
+        has_mass(scheme.structure) ? std::numeric_limits<double>::infinity() : device.force_limit;
+    ForceBounds bounds = rendered_bounds(force_bounds(model, scheme.play_radius, limit), scheme);
+    if (scheme.structure == StructureKind::EnergyConsistent && model.hysteresis() != nullptr) {
+        bounds.mean_force = detail::mean_push({model.hysteresis()->force(), nullptr, bounds.sliding}, limit);
+    }
+    return bounds;
+}
+
 /// What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason; a scheme
 /// or a profile that is impossible throws std::invalid_argument.
 [[nodiscard]] inline Certificate certify(const ForceModel& model, const Scheme& scheme,
                                          const DeviceProfile& device) {
     validate(device);
     validate(scheme, model);
-    Certificate certificate =
-        certify(force_bounds(model, scheme.play_radius, device.force_limit), scheme, device);
+    Certificate certificate = certify_rendered(rendered_bounds(model, scheme, device), scheme, device);
     certificate.model = fingerprint(model);
     certificate.fingerprint = fingerprint_of(certificate);
     return certificate;

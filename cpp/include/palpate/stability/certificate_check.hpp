@@ -111,8 +111,7 @@ namespace detail {
     try {
         validate(stored.device);
         validate(stored.scheme, model);
-        bounds = rendered_bounds(force_bounds(model, stored.scheme.play_radius, stored.device.force_limit),
-                                 stored.scheme);
+        bounds = rendered_bounds(model, stored.scheme, stored.device);
     } catch (const std::invalid_argument& error) {
         require(std::string("certificate is of an impossible plan: ") + error.what());
     }
