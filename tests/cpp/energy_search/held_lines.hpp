@@ -333,9 +333,13 @@ template <class Force>
         const int radius = 1 + static_cast<int>(random() % 3);
         const HysteresisPair<Pieces> pair{g, Pieces{0.0, step, h}, radius * step};
         limit_by(random, device, largest_of(g.points()) + largest_of(h));
-        need = certified_need(device, [&](const DeviceProfile& generous) {
+        const auto certified = [&](const DeviceProfile& generous) {
             return certify(bounds_of(pair), scheme, generous);
-        });
+        };
+        need = certified_need(device, certified);
+        if (need && random() % 2 == 0) {
+            need = need_at_less_friction(device, *need, certified).value_or(*need);
+        }
         scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     } else {
         limit_by(random, device, largest_of(g.points()));

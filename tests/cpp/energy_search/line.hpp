@@ -40,6 +40,28 @@ template <class Certify>
     return need;
 }
 
+/// The same with a little less friction, where `certify` then knows another line that needs more damping.
+template <class Certify>
+[[nodiscard]] std::optional<Need> need_at_less_friction(DeviceProfile device, const Need& need,
+                                                        const Certify& certify) {
+    constexpr double any_damping = 1.2345e6;
+    device.viscous_damping = any_damping;
+    device.coulomb_friction = need.friction * (1.0 - 1e-6);
+    const Certificate certificate = certify(std::as_const(device));
+    if (!certificate.certified()) {
+        return std::nullopt;
+    }
+    Need other;
+    for (const Inequality& line : certificate.inequalities) {
+        if (line.left == any_damping) {
+            other.damping = std::max(other.damping, line.right);
+        } else if (line.left == device.coulomb_friction) {
+            other.friction = std::max(other.friction, line.right);
+        }
+    }
+    return other;
+}
+
 /// A certified scene. `takes_energy` searches it on a device with the given multiples of what is needed.
 struct Trial {
     std::function<bool(double damping, double friction)> takes_energy;
