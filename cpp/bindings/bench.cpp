@@ -31,9 +31,9 @@ void bind_bench(py::module_& module) {
             [](const Bench& bench, const ForceModel& model, const std::optional<std::string>& structure,
                std::optional<bool> compensated, std::optional<double> coupling_stiffness,
                std::optional<double> coupling_damping, std::optional<double> mass,
-               std::optional<double> damping, std::optional<double> play_radius) {
+               std::optional<double> damping, std::optional<double> play_radius, std::optional<int> predict) {
                 SchemeChoices chosen{std::nullopt, compensated, coupling_stiffness, coupling_damping,
-                                     mass,         damping,     play_radius};
+                                     mass,         damping,     play_radius,        predict};
                 if (structure) {
                     chosen.structure = structure_named(*structure);
                 }
@@ -41,7 +41,7 @@ void bind_bench(py::module_& module) {
             },
             "model"_a, py::kw_only(), "structure"_a = py::none(), "compensated"_a = py::none(),
             "coupling_stiffness"_a = py::none(), "coupling_damping"_a = py::none(), "mass"_a = py::none(),
-            "damping"_a = py::none(), "play_radius"_a = py::none(),
+            "damping"_a = py::none(), "play_radius"_a = py::none(), "predict"_a = py::none(),
             "What is given, in the model's own units; what is None follows the model in this bench's scale.");
     define_by_fields(type, {"device", "hand", "length", "stiffness"});
     module.def(

@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "fields.hpp"
+#include "palpate/force_error.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/simulation.hpp"
 #include "signals.hpp"
@@ -44,9 +45,11 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
         "time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
         "velocity"_a = moved(std::move(trace.velocity)),
         "handle_start"_a = moved(std::move(trace.handle_start)),
+        "handle_middle"_a = moved(std::move(trace.handle_middle)),
         "handle_end"_a = moved(std::move(trace.handle_end)),
         "environment_position"_a = moved(std::move(trace.environment_position)),
         "force"_a = moved(std::move(trace.force)), "applied"_a = moved(std::move(trace.applied)),
+        "mean_applied"_a = moved(std::move(trace.mean_applied)),
         "evaluations"_a = moved(std::move(trace.evaluations)), "status"_a = moved(numbered(trace.status)),
         "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
@@ -149,16 +152,44 @@ void bind_rendering(py::module_& module) {
         "'newton';\n"
         "None where a structure has no load line.");
 
+    module.def("simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
+               "substeps"_a = 20, "start_position"_a = 0.0, "progress"_a = py::none(),
+               "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
+               "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
+               "Ctrl-C\n"
+               "ends it as in Python; ValueError for more than most_simulated_ticks.\n\n"
+               "Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and\n"
+               "handle_end (the true handle when sampled, and in the middle and at the end of the tick that "
+               "holds the\n"
+               "force), environment_position, force (commanded), applied (at the end of the tick), "
+               "mean_applied (over\n"
+               "the tick), evaluations, status, extrapolated.");
     module.def(
-        "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-        "substeps"_a = 20, "start_position"_a = 0.0, "progress"_a = py::none(),
-        "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
-        "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
-        "Ctrl-C\n"
-        "ends it as in Python; ValueError for more than most_simulated_ticks.\n\n"
-        "Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true\n"
-        "handle when sampled and at the end of the tick that holds the force), environment_position, force\n"
-        "(commanded), applied, evaluations, status, extrapolated.");
+        "force_error",
+        [](const ForceModel& model, double play_radius, const Array& start, const Array& middle,
+           const Array& end, const Array& applied, const Array& mean_applied, double period_s) {
+            require_vector(start, "start");
+            require_vector(middle, "middle");
+            require_vector(end, "end");
+            require_vector(applied, "applied");
+            require_vector(mean_applied, "mean_applied");
+            require_period(period_s);
+            ForceError error;
+            {
+                const py::gil_scoped_release unlocked;
+                error = force_error(model, play_radius,
+                                    {view(start), view(middle), view(end), view(applied), view(mean_applied)},
+                                    period_s);
+            }
+            return py::dict("end"_a = error.end, "instant"_a = error.instant, "mean"_a = error.mean,
+                            "band"_a = error.band, "work"_a = error.work);
+        },
+        "model"_a, "play_radius"_a, py::kw_only(), "start"_a, "middle"_a, "end"_a, "applied"_a,
+        "mean_applied"_a, "period_s"_a,
+        "RMS errors [N or N*m] of a simulated rendering against a model: at the end of the tick, at its\n"
+        "sampling instant, of its mean over the tick, and of that below 50 Hz; and the work of the error "
+        "[J].\n"
+        "Arrays (n,) from simulate; play_radius 0 is the model's own.");
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {

@@ -117,6 +117,11 @@ void add_rendering(CLI::App& app, Options& options) {
     group(app.add_option("--play-radius", scheme.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"))
         ->check(positive());
+    group(app.add_option("--predict", scheme.predict,
+                         "Samples used to predict the position half a sample ahead, direct only; 0 = none"))
+        ->check(CLI::Range(0, most_prediction_taps))
+        ->type_name("M")
+        ->default_str(std::to_string(usual.predict));
 }
 
 void add_guards(CLI::App& app, Options& options) {
@@ -254,7 +259,7 @@ bool chooses_scheme(const Options& options) {
     const SchemeChoices& scheme = options.scheme;
     // The parser writes a flag that was not given, too.
     return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
-           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius;
+           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || scheme.predict;
 }
 
 bool chooses_rendering(const Options& options) {

@@ -129,6 +129,9 @@ inline Scene random_certified_scene(Random& random, double room) {
         scheme.compensated = scheme.structure == StructureKind::Massless && model.hysteresis() == nullptr &&
                              model.slope_bounds().upper <= 0.9 * scheme.coupling.stiffness &&
                              random() % 2 == 0;
+        if (scheme.structure == StructureKind::Direct && random() % 2 == 0) {
+            scheme.predict = 1 << random() % 4;
+        }
         DeviceProfile device;
         device.period_s = uniform(random, 3e-4, 2e-3);
         device.inertia = std::exp(uniform(random, -10.0, -5.0));
@@ -168,7 +171,7 @@ ClosedLoopEnd run(const Scene& scene, H hand, std::size_t ticks, int substeps, W
 }
 
 inline std::ostream& operator<<(std::ostream& out, const Scene& scene) {
-    return out << name_of(scene.scheme.structure)
+    return out << name_of(scene.scheme.structure) << " predict " << scene.scheme.predict
                << (scene.model.hysteresis() != nullptr ? " hysteresis" : "")
                << (scene.scheme.compensated ? " compensated" : "")
                << ", K_c = " << scene.scheme.coupling.stiffness << ", B_c = " << scene.scheme.coupling.damping

@@ -4,6 +4,8 @@
 #include <complex>
 #include <limits>
 #include <string>
+#include <tuple>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -49,6 +51,105 @@ TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
         certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0931, 1)).certified());
     EXPECT_FALSE(
         certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0929, 1)).certified());
+}
+
+/// Damping over T M that direct rendering with a prediction needs, M = 62 N*m/rad.
+double predicted_share(double falling, int predict, double delay_samples = 0.0) {
+    Scheme scheme = scheme_of(StructureKind::Direct);
+    scheme.predict = predict;
+    DeviceProfile device = smooth(1.0);
+    device.delay_s = delay_samples * device.period_s;
+    return inequalities_of(slopes(-62.0 * falling, 62.0), scheme, device)[0].right / 0.062;
+}
+
+TEST(Certificate, PredictionNeedsLessDampingTheMoreSamplesItTakes) {
+    for (const auto& [predict, share, linear] :
+         {std::tuple{1, 1.00, 1.0}, {2, 0.77, 0.75}, {4, 0.66, 0.625}, {8, 0.60, 0.5625}}) {
+        EXPECT_NEAR(predicted_share(1.0, predict), share, 0.005) << predict;
+        EXPECT_GE(predicted_share(1.0, predict), linear) << "a spring needs that much";
+        EXPECT_LE(predicted_share(1.0, predict), 1.06 * linear) << predict;
+    }
+    for (const double falling : {0.0, 1.0, 3.0}) {
+        for (int predict = 1; predict <= most_prediction_taps; ++predict) {
+            EXPECT_LE(predicted_share(falling, predict), 1.0 + 1e-12) << predict << ": R(1/2), s <= 3 M";
+            EXPECT_GT(predicted_share(falling, predict), 0.5) << predict << ": more than without";
+        }
+    }
+}
+
+TEST(Certificate, PredictionOfALateForceCanNeedLessThanNone) {
+    // Q = z^-1 - z^-2 / 2: a spring needs 1.25 T K in place of 1.5 T K.
+    EXPECT_NEAR(predicted_share(0.0, 1, 1.0), 1.299, 0.001);
+    EXPECT_NEAR(predicted_share(1.0, 1, 1.0), 1.414, 0.001);
+    EXPECT_NEAR(predicted_share(0.0, 1, 2.0), 2.000, 0.001);
+    // A fraction of a sample lies between.
+    for (const int predict : {1, 4}) {
+        double before = predicted_share(0.0, predict, 1.0);
+        for (const double delay : {1.02, 1.25, 1.5, 1.75, 1.98, 2.0}) {
+            const double now = predicted_share(0.0, predict, delay);
+            EXPECT_GE(now, before * (1.0 - 1e-6)) << predict << " " << delay;
+            before = now;
+        }
+    }
+}
+
+TEST(Certificate, PredictionOfALateForceWithJitterCostsHalfOfItsSteepestSlope) {
+    Scheme scheme = scheme_of(StructureKind::Direct);
+    DeviceProfile device = smooth(10.0);
+    device.delay_s = 1.3e-3;
+    device.jitter_s = 1e-4;
+    const double held = certify(slopes(-80.0, 62.0), scheme, device).inequalities[0].right;
+    scheme.predict = 4;
+    const double predicted = certify(slopes(-80.0, 62.0), scheme, device).inequalities[0].right;
+    EXPECT_NEAR(predicted, held + 0.5 * 80.0 * device.longest_period_s(), 1e-12);
+}
+
+TEST(Certificate, PredictionRaisesTheErrorOfTheEncoder) {
+    // (m + 3) / (m + 1) half steps: 2 at m = 1, 7/5 at m = 4.
+    Scheme scheme = scheme_of(StructureKind::Direct);
+    DeviceProfile device = smooth(10.0);
+    device.encoder_step = 1e-3;
+    device.force_step = 2e-3;
+    for (const auto& [predict, gain] : {std::pair{1, 2.0}, {4, 1.4}, {16, 19.0 / 17.0}}) {
+        scheme.predict = predict;
+        device.coulomb_friction = gain * 62.0 * 0.5e-3 + 1e-3;
+        EXPECT_TRUE(certify(slopes(-15.0, 62.0), scheme, device).certified()) << predict;
+        device.coulomb_friction *= 0.999;
+        EXPECT_FALSE(certify(slopes(-15.0, 62.0), scheme, device).certified()) << predict;
+    }
+}
+
+TEST(Certificate, PredictionWithHysteresisNeedsHalfOfTheSteepestSlopeMore) {
+    ForceBounds play = slopes(-15.0, 62.0);
+    play.hysteresis = true;
+    play.loss = {0.0, 0.1};
+    play.sliding = 22.0;
+    play.loss_per_play = 40.0;
+    Scheme scheme = scheme_of(StructureKind::Direct);
+    scheme.predict = 1;
+    EXPECT_TRUE(certify(play, scheme, smooth(0.06201)).certified()) << "T (M_h + L_h) / 2";
+    EXPECT_FALSE(certify(play, scheme, smooth(0.06199)).certified());
+    scheme.predict = 16;
+    EXPECT_FALSE(certify(play, scheme, smooth(0.06199)).certified()) << "the same for every m";
+    // The play is wrong by one reading, x_hat by (m + 3) / (m + 1).
+    scheme.predict = 1;
+    DeviceProfile device = smooth(1.0);
+    device.encoder_step = 1e-3;
+    device.coulomb_friction = (2.0 * 22.0 + 3.0 * 40.0) * 0.5e-3;
+    EXPECT_TRUE(certify(play, scheme, device).certified());
+    device.coulomb_friction *= 0.999;
+    EXPECT_FALSE(certify(play, scheme, device).certified());
+}
+
+TEST(Certificate, PredictionOfAForceOfVelocityIsRefused) {
+    ForceBounds moving = slopes(0.0, 10.0);
+    moving.drag = 0.01;
+    Scheme scheme = scheme_of(StructureKind::Direct);
+    EXPECT_TRUE(certify(moving, scheme, smooth(1.0)).certified());
+    scheme.predict = 1;
+    const Certificate refused = certify(moving, scheme, smooth(1.0));
+    EXPECT_EQ(refused.verdict, Verdict::Refused);
+    EXPECT_EQ(refused.why.rfind("no bound is known", 0), 0U) << refused.why;
 }
 
 TEST(Certificate, AFallingForceNeedsDampingOnlyWithDelay) {

@@ -73,13 +73,14 @@ TEST(CertifiedScenes, NeverGiveMoreThanTheObjectHeld) {
                 << ", held " << scene.held << ", throughput " << end.energy.throughput;
         });
         ++tried[std::string(name_of(scene.scheme.structure)) +
-                (scene.model.hysteresis() != nullptr ? " hysteresis" : "") + " delay " +
+                (scene.model.hysteresis() != nullptr ? " hysteresis" : "") +
+                (scene.scheme.predict > 0 ? " predict" : "") + " delay " +
                 std::to_string(scene.device.late_samples())];
     }
     for (const auto& [what, count] : tried) {
         RecordProperty(what, count);
     }
-    EXPECT_GE(tried.size(), 15U) << "structures, kinds of model and delays that were met";
+    EXPECT_GE(tried.size(), 21U) << "structures, kinds of model and delays that were met";
 }
 
 // "No growing oscillation follows for passive hands only": what moves is never more than what was stored at first.

@@ -42,6 +42,17 @@ TEST(FailureMaps, ASpringJustPastItsBoundSwingsUpWithAHeavyHand) {
     expect_between(ratios(damping_map(3), 0, 2), 1.0, 1.02);
 }
 
+// Spring against a bound for every force with slopes from 0 to its stiffness: within 4 %.
+TEST(FailureMaps, PredictionFailsJustPastItsBoundForEveryNumberOfSamplesAndDelay) {
+    const FailureMap map = prediction_map(test::cases(5));
+    expect_between(ratios(map, 0, 2), 1.0, 1.04);
+    EXPECT_LE(ratios(map, 0, 0).lower, 1.001);
+    for (std::size_t delay = 0; delay <= 2; ++delay) {
+        EXPECT_EQ(map.lines[delay].at.front(), 1.0);
+        EXPECT_EQ(map.lines[delay].at.back(), most_prediction_taps);
+    }
+}
+
 TEST(FailureMaps, TheEncoderBoundOfAbbottAndOkamuraIsMet) {
     expect_between(ratios(encoder_map(test::cases(7)), 0, 1), 1.0, 1.01);
 }
@@ -108,6 +119,16 @@ TEST(FailureMaps, ALightHandLeavesLittleOfTheBoundUnusedAndAHandThatDampsLeavesM
         EXPECT_LE(line.measured.back(), 1.001 * line.theory.back()) << line.name;
     }
     expect_between(ratios(map, 3, 3), 2.0, 2.3);
+}
+
+// A slow swing of a heavy hand feels no lag, so what remains is far below the bound.
+TEST(FailureMaps, AHeavyHandCarriesUpTo18TimesTheStiffnessWithAPrediction) {
+    const FailureMap map = hand_map(3);
+    const FailureLine& plain = map.lines[0];
+    const FailureLine& predicted = map.lines[4];
+    EXPECT_EQ(predicted.name, "delay 0, predict 4");
+    EXPECT_GE(predicted.measured[1], 2.0 * plain.measured[1]) << "1e-3 kg*m^2";
+    EXPECT_NEAR(predicted.measured[2] / plain.measured[2], 18.3, 0.5) << "0.1 kg*m^2";
 }
 
 // spec section 7, quantised: "massless f_c >= gamma Delta/2; B_c = 0: L' Delta/2"

@@ -182,9 +182,11 @@ ForceModel velocity_model() {
 /// The real loop at 10 kHz with its real recorder behind it; `before` runs in the loop's thread before it begins,
 /// `after` in that thread when it is over.
 template <class Sin, class Before, class After>
-Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Before before, After after) {
+Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Before before, After after,
+                   int predict = 0) {
     Scheme scheme;
     scheme.structure = kind;
+    scheme.predict = predict;
     LoopSettings settings;
     settings.rate_hz = 10'000.0;
     settings.duration_s = 0.1;
@@ -242,6 +244,10 @@ TEST(RealTimePath, AllocatesLocksAndThrowsNothingInAnyStructure) {
     SKIP_UNDER_SANITIZERS();
     EXPECT_EQ(run_watched(velocity_model(), StructureKind::Direct, nothing, nothing, nothing).allocations, 0);
     for (const ForceModel& rendered : {model(), hysteresis_model()}) {
+        const Counts predicted =
+            run_watched(rendered, StructureKind::Direct, nothing, nothing, nothing, most_prediction_taps);
+        EXPECT_GT(predicted.ticks, 0U);
+        EXPECT_EQ(predicted.allocations + predicted.locks + predicted.exceptions, 0);
         for (int kind = 0; kind < 4; ++kind) {
             const Counts counts =
                 run_watched(rendered, static_cast<StructureKind>(kind), nothing, nothing, nothing);

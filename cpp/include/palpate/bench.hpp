@@ -25,6 +25,7 @@ struct SchemeChoices {
     std::optional<double> mass;
     std::optional<double> damping;
     std::optional<double> play_radius;
+    std::optional<int> predict;
 };
 
 /// A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
@@ -48,14 +49,15 @@ struct Bench {
             play_radius = std::max(4.0 * device.encoder_step, 0.01 * travel);
         }
         const Scheme standard;
-        return {chosen.structure.value_or(model.velocity() != nullptr ? StructureKind::Direct
-                                                                      : standard.structure),
+        const bool directly = model.velocity() != nullptr || chosen.predict.value_or(0) > 0;
+        return {chosen.structure.value_or(directly ? StructureKind::Direct : standard.structure),
                 {chosen.coupling_stiffness.value_or(standard.coupling.stiffness * stiffness),
                  chosen.coupling_damping.value_or(standard.coupling.damping * stiffness)},
                 {chosen.mass.value_or(standard.inertia.mass * stiffness),
                  chosen.damping.value_or(standard.inertia.damping * stiffness)},
                 chosen.compensated.value_or(standard.compensated),
-                chosen.play_radius.value_or(play_radius)};
+                chosen.play_radius.value_or(play_radius),
+                chosen.predict.value_or(standard.predict)};
     }
 
     /// The default guards in this bench's scale. A speed that the encoder hardly resolves says nothing of it.

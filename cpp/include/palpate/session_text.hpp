@@ -87,6 +87,9 @@ namespace palpate {
     if (scheme.play_radius > 0.0) {
         text += ", r = " + readable(scheme.play_radius);
     }
+    if (scheme.predict > 0) {
+        text += ", predict " + std::to_string(scheme.predict);
+    }
     return text;
 }
 

@@ -23,10 +23,12 @@ struct Trace {
     std::vector<double> position;              ///< measured by the encoder
     std::vector<double> velocity;              ///< differenced by the device
     std::vector<double> handle_start;          ///< true position when the encoder was read
+    std::vector<double> handle_middle;         ///< true position in the middle of the tick
     std::vector<double> handle_end;            ///< true position at the end of the tick that holds the force
     std::vector<double> environment_position;  ///< y
     std::vector<double> force;                 ///< commanded
-    std::vector<double> applied;               ///< what the device made of it
+    std::vector<double> applied;               ///< force of the device at the end of the tick
+    std::vector<double> mean_applied;          ///< mean force over the tick, which a fractional delay divides
     std::vector<int> evaluations;
     std::vector<Status> status;
     std::vector<std::uint8_t> extrapolated;  ///< 1 where y lay outside the model's data
@@ -66,16 +68,22 @@ template <class Each>
         Trace trace;
         for (std::size_t k = 0; k < ticks; ++k) {
             each(k);
-            const double start = device.handle_position();
+            const Motion start = device.handle();
+            const double before = device.applied_force();
             const Tick tick = controller.tick();
+            const Motion end = device.handle();
+            const double late = profile.delay_fraction();
             trace.time.push_back(static_cast<double>(k) * profile.period_s);
             trace.position.push_back(tick.reading.position);
             trace.velocity.push_back(tick.reading.velocity);
-            trace.handle_start.push_back(start);
-            trace.handle_end.push_back(device.handle_position());
+            trace.handle_start.push_back(start.position);
+            trace.handle_middle.push_back(0.5 * (start.position + end.position) +
+                                          0.125 * profile.period_s * (start.velocity - end.velocity));
+            trace.handle_end.push_back(end.position);
             trace.environment_position.push_back(tick.rendered.environment_position);
             trace.force.push_back(tick.command.force);
             trace.applied.push_back(device.applied_force());
+            trace.mean_applied.push_back(late * before + (1.0 - late) * device.applied_force());
             trace.evaluations.push_back(tick.rendered.evaluations);
             trace.status.push_back(tick.status);
             trace.extrapolated.push_back(static_cast<std::uint8_t>(tick.rendered.extrapolated));

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
-from .._core import Scheme, structure_names
+from .._core import Scheme, most_prediction_taps, structure_names
 from .output import talk
 
 if TYPE_CHECKING:
@@ -63,6 +63,13 @@ def scheme_options(command: F) -> F:
                 type=float,
                 show_default="the model's, or 1 % of its travel",
                 help="r of a model with hysteresis, in its position unit.",
+            ),
+            click.option(
+                "--predict",
+                type=click.IntRange(0, most_prediction_taps),
+                metavar="M",
+                show_default=f"{_DEFAULT.predict}",
+                help="Samples used to predict the position half a sample ahead, direct only; 0 = none.",
             ),
         )
     ):

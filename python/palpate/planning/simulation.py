@@ -20,8 +20,11 @@ from ..verdict import Finding, Verdict, no, usable
 from .plan import Plan
 
 START = "handle_start"
+MIDDLE = "handle_middle"
 END = "handle_end"
-"""Stems of the columns with the true handle position when the encoder was read, and when the force ended."""
+"""Stems of the columns with the true handle position at the start, in the middle and at the end of a tick."""
+MEAN_APPLIED = "mean_applied"
+"""Stem of the column with the mean force over a tick, which a fractional delay divides."""
 
 _GRID = 1001
 """Positions at which the force range is looked for."""
@@ -64,8 +67,8 @@ def simulate(
     Recording
         Position as the encoder reads it and force as the device applies it, with time, so that what was
         rendered can be identified and verified like anything else. Further columns: the handle's true
-        position at the start and the end of each tick, the environment's position, the commanded force, the
-        number of evaluations, the status as a word, and whether the model was extrapolated (1) or not (0).
+        position at the start, in the middle and at the end of each tick, the environment's position, the
+        commanded force, the mean force over the tick, the number of evaluations, the status as a word, and whether the model was extrapolated (1) or not (0).
 
     Raises
     ------
@@ -103,9 +106,11 @@ def simulate(
         recording,
         columns={
             f"{START}{position}": trace["handle_start"],
+            f"{MIDDLE}{position}": trace["handle_middle"],
             f"{END}{position}": trace["handle_end"],
             f"environment_position{position}": trace["environment_position"],
             f"commanded{force}": trace["force"],
+            f"{MEAN_APPLIED}{force}": trace["mean_applied"],
             "evaluations": trace["evaluations"].astype(np.float64),
             "extrapolated": np.asarray(trace["extrapolated"], dtype=np.float64),
             "status": np.array([_NAMES[value] for value in trace["status"]], dtype=object),
@@ -115,16 +120,26 @@ def simulate(
 
 @dataclass(frozen=True)
 class ForceError:
-    """RMS of rendered minus identified force at the handle, over all ticks [N*m or N]."""
+    """Rendered minus identified force at the handle's true position, RMS over all ticks [N*m or N]."""
 
     end: float
-    """at the end of the tick that holds the force: what is felt, the hold included"""
+    """At the end of the tick that holds the force. A force that is ahead of the motion is rewarded"""
     instant: float
-    """at its sampling instant: what the structure and the encoder cost"""
+    """At the sampling instant: the part of structure and encoder"""
+    mean: float
+    """Of the mean over each tick"""
+    band: float
+    """Of that mean below 50 Hz: the part that a hand can follow"""
+    work: float
+    """Work of the error on the handle's motion, over the whole time [J]; below 0 the rendering gives energy"""
 
 
 def force_error(plan: Plan, rendered: Recording) -> ForceError:
-    """How far a simulated rendering is from the identified model, felt at the handle's true position.
+    """Errors of a simulated rendering against the identified model, at the handle's true position.
+
+    With F the force of the device, x the true motion and T the period, the error of the mean over tick k is
+    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is its sequence after
+    a low-pass filter without phase.
 
     Parameters
     ----------
@@ -134,13 +149,20 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
         From :func:`simulate`.
     """
     suffix = _suffix(plan.model.units["position"])
-    start, end = rendered.columns[f"{START}{suffix}"], rendered.columns[f"{END}{suffix}"]
     period = rendered.sample_period
     if period is None:
         raise InputError("a rendering of one tick has no force error; simulate a longer time")
-    at_end = force_at(plan, np.concatenate([start[:1], end]), period)[1:]
-    at_start = force_at(plan, start, period)
-    return ForceError(end=_rms(rendered.force - at_end), instant=_rms(rendered.force - at_start))
+    errors = _core.force_error(
+        plan.model,
+        plan.scheme.play_radius,
+        start=rendered.columns[f"{START}{suffix}"],
+        middle=rendered.columns[f"{MIDDLE}{suffix}"],
+        end=rendered.columns[f"{END}{suffix}"],
+        applied=rendered.force,
+        mean_applied=rendered.columns[f"{MEAN_APPLIED}{_suffix(plan.model.units['force'])}"],
+        period_s=period,
+    )
+    return ForceError(**errors)
 
 
 def force_range(plan: Plan) -> float:
@@ -235,6 +257,8 @@ def describe(scheme: Scheme) -> str:
     words = [scheme.structure]
     if scheme.compensated:
         words.append("compensated")
+    if scheme.predict:
+        words.append(f"predict {scheme.predict}")
     if scheme.structure in ("implicit", "explicit"):
         words += [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"]
     return ", ".join(words)
@@ -243,6 +267,3 @@ def describe(scheme: Scheme) -> str:
 def _suffix(unit: str) -> str:
     return f"_{COLUMN_SUFFIX[unit]}" if unit else ""
 
-
-def _rms(values: Float1D) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

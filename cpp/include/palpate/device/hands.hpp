@@ -55,22 +55,24 @@ struct GreedyHand {
 
 /// A hand so firm that it alone says how the handle moves: from sample to sample of a sinusoid,
 ///
-///     x_k = x_0 + reach (1 - cos(pi k / ticks)) / 2.
+///     x_k = x_0 + reach (1 - cos(pi k turns / ticks)) / 2.
 ///
-/// With 1 tick from turn to turn it moves at the Nyquist frequency, with many it is slow.
+/// With 1 tick from turn to turn it moves at the Nyquist frequency, with many it is slow. Several turns in these
+/// ticks are a frequency between the ones of whole ticks.
 struct PacingHand {
     double reach = 0.0;      ///< from turn to turn [m or rad]
-    int ticks = 1;           ///< from turn to turn, at least 1
+    int ticks = 1;           ///< of `turns` turns, at least 1
     double firmness = 1e6;   ///< far above every damping of device and object [N*s/m or N*m*s/rad]
     double period_s = 1e-3;  ///< of the tick [s]
     int rests = 1;           ///< ticks before the first way, while the object is put under the handle
+    int turns = 1;           ///< from 1 to ticks
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         const double tick = std::round(time / period_s) - rests;
         if (tick < 0.0) {
             return {0.0, firmness, 0.0, 0.0, 0.0};
         }
-        const double angle = std::numbers::pi / ticks;
+        const double angle = std::numbers::pi * turns / ticks;
         const double way = std::cos(angle * tick) - std::cos(angle * (tick + 1.0));
         return {0.0, firmness, 0.0, firmness * 0.5 * reach * way / period_s, 0.0};
     }

@@ -10,6 +10,7 @@
 #include "palpate/failure/guard_map.hpp"
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/failure/period_map.hpp"
+#include "palpate/failure/prediction_map.hpp"
 #include "palpate/failure/solver_maps.hpp"
 #include "palpate/failure/unused_maps.hpp"
 
@@ -21,8 +22,9 @@ struct NamedFailureMap {
 };
 
 /// Every map that can be measured.
-inline constexpr std::array<NamedFailureMap, 12> failure_maps{{{"explicit", explicit_map},
+inline constexpr std::array<NamedFailureMap, 13> failure_maps{{{"explicit", explicit_map},
                                                                {"damping", damping_map},
+                                                               {"prediction", prediction_map},
                                                                {"period", period_map},
                                                                {"encoder", encoder_map},
                                                                {"play", play_map},

@@ -9,6 +9,7 @@
 #include "palpate/failure/failure_map.hpp"
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/failure/objects.hpp"
+#include "palpate/failure/prediction_map.hpp"
 #include "palpate/failure/trials.hpp"
 #include "palpate/readable.hpp"
 #include "palpate/rendering/direct.hpp"
@@ -21,19 +22,22 @@ namespace palpate {
 /// over the mass of a hand that holds the handle and does nothing else.
 [[nodiscard]] inline FailureMap hand_map(int points) {
     FailureMap map{"hand", "mass of the hand [kg*m^2]", "stiffness K [N*m/rad]", {}};
-    map.searched = 10.0;
-    const auto add = [&](const std::string& name, int delay, double damping) {
+    map.searched = 40.0;
+    const auto add = [&](const std::string& name, int delay, double damping, int predict = 0) {
         DeviceProfile device = smooth_knob();
         device.delay_s = delay * device.period_s;
-        const double bound = direct_limit(device);
+        const double bound = predict > 0 ? predicted_limit(device, predict) : direct_limit(device);
         map.lines.push_back(failure_line(
             name, logarithmic(1e-5, 1e-1, points), [&](double /*mass*/) { return bound; },
             [&](double mass, double stiffness) {
                 constexpr double radians = 1000.0;  // of the swing that are watched
                 const double slowness = std::sqrt((mass + device.inertia) / stiffness);
                 const auto ticks = static_cast<std::size_t>(radians * slowness / device.period_s);
-                return oscillates_with(Direct{LinearObject{stiffness}}, device, {0.0, damping, mass, 0.0},
-                                       stiffness, ticks);
+                const PassiveHand hand{0.0, damping, mass, 0.0};
+                return predict > 0
+                           ? oscillates_with(PredictedDirect{LinearObject{stiffness}, predict}, device, hand,
+                                             stiffness, ticks)
+                           : oscillates_with(Direct{LinearObject{stiffness}}, device, hand, stiffness, ticks);
             },
             map.searched));
     };
@@ -41,6 +45,7 @@ namespace palpate {
         add("delay " + std::to_string(delay), delay, 0.0);
     }
     add("delay 0, damping hand", 0, smooth_knob().viscous_damping);
+    add("delay 0, predict 4", 0, 0.0, 4);
     return map;
 }
 

@@ -24,6 +24,7 @@
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/rendering/predicted.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 #include "palpate/solver/resolvent.hpp"
@@ -66,9 +67,6 @@ struct Scheme {
     int predict = 0;           ///< m: samples used to predict the position half a sample ahead; 0 = none
 };
 
-/// Largest number of samples that a prediction uses.
-inline constexpr int most_prediction_taps = 16;
-
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
@@ -94,6 +92,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     detail::require(scheme.predict == 0 || scheme.structure == StructureKind::Direct,
                     "predict is " + std::to_string(scheme.predict) + ", must be 0 for the structure " +
                         std::string(name_of(scheme.structure)));
+    detail::require(
+        scheme.predict == 0 || model.velocity() == nullptr,
+        "predict is " + std::to_string(scheme.predict) + ", must be 0 for a force of position and velocity");
     require(not_negative(scheme.play_radius), "play_radius", scheme.play_radius, ">= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
                     "play_radius is 0, but the model leaves it to the rendering: must be > 0");
@@ -154,7 +155,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
         using E = decltype(environment);
         switch (scheme.structure) {
             case StructureKind::Direct:
-                return visit(Direct{std::move(environment)});
+                return scheme.predict > 0 ? visit(PredictedDirect{std::move(environment), scheme.predict})
+                                          : visit(Direct{std::move(environment)});
             case StructureKind::Massless: {
                 const double p = Massless<E>::load_line_slope(scheme.coupling, period_s);
                 if (std::isfinite(force_limit)) {

@@ -115,9 +115,16 @@ namespace detail {
 [[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
                                                              const DeviceProfile& device) {
     if (scheme.structure == StructureKind::Direct) {
-        return bounds.hysteresis   ? hysteresis_inequalities(bounds, device)
-               : bounds.drag > 0.0 ? velocity_inequalities(bounds, device)
-                                   : direct_inequalities(bounds, device);
+        if (bounds.drag > 0.0) {
+            std::vector<Inequality> lines = velocity_inequalities(bounds, device);
+            if (scheme.predict > 0) {
+                lines.push_back({"velocity-prediction", "prediction of a force of velocity", "B_v = 0", 0.0,
+                                 bounds.drag, Basis::None, "docs/certificate.md"});
+            }
+            return lines;
+        }
+        return bounds.hysteresis ? hysteresis_inequalities(bounds, device, scheme.predict)
+                                 : direct_inequalities(bounds, device, scheme.predict);
     }
     std::vector<Inequality> lines = detail::inequalities_behind_a_coupling(bounds, scheme, device);
     if (bounds.drag > 0.0) {

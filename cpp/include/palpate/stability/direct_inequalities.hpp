@@ -8,6 +8,7 @@
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/held_force.hpp"
 #include "palpate/stability/inequality.hpp"
+#include "palpate/stability/predicted_force.hpp"
 
 namespace palpate {
 
@@ -39,11 +40,32 @@ namespace detail {
             late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
 }
 
+/// Damping that covers hold and delay of a force at a predicted position.
+[[nodiscard]] inline Inequality prediction_inequality(const DeviceProfile& device, double need,
+                                                      const std::string& formula) {
+    return {"damping-hold",
+            "viscous damping against hold, delay and prediction",
+            formula,
+            device.viscous_damping,
+            device.longest_period_s() * need,
+            Basis::Proved,
+            "docs/certificate.md"};
+}
+
 }  // namespace detail
 
-/// A static force held for a sample, any motion within it: M and s_ bound the slopes of f, B is `device_need`.
+/// A static force held for a sample, any motion within it: M and s_ bound the slopes of f, B is `device_need`, with
+/// a prediction from m samples `predicted_need`.
 [[nodiscard]] inline std::vector<Inequality> direct_inequalities(const ForceBounds& bounds,
-                                                                 const DeviceProfile& device) {
+                                                                 const DeviceProfile& device,
+                                                                 int predict = 0) {
+    if (predict > 0) {
+        return {detail::prediction_inequality(
+                    device, predicted_need(device, predict, {bounds.rising(), bounds.falling()}),
+                    device.late_samples() > 0 ? "b >= T B(M, s_, m, t_d)" : "b >= T B(M, s_, m)"),
+                detail::friction_inequality(device, predicted_encoder_gain(predict) * bounds.steepest,
+                                            bounds.mean_force, "(m + 3) / (m + 1) L Delta / 2")};
+    }
     return {detail::hold_inequality(device, {bounds.rising(), bounds.falling()}, 0.0,
                                     device.late_samples() > 0 ? "b >= T B(M, s_, t_d)" : "b >= T M / 2"),
             detail::friction_inequality(device, bounds.steepest, bounds.mean_force, "L Delta / 2")};
@@ -51,13 +73,24 @@ namespace detail {
 
 /// A force with hysteresis, f = g + s h with a play of radius r, rendered directly: while it sticks h / r adds to
 /// its slope. The encoder is wrong in x and in the play. Without delay the play of the reading counts as exact, for
-/// a little more slope.
+/// a little more slope. With a prediction the play follows the measured position.
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
-                                                                     const DeviceProfile& device) {
+                                                                     const DeviceProfile& device,
+                                                                     int predict = 0) {
     const Inequality loss{
         "loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
         Basis::Proved,      "docs/certificate.md"};
     const bool late = device.late_samples() > 0;
+    if (predict > 0) {
+        const double gain = predicted_encoder_gain(predict);
+        return {loss,
+                detail::prediction_inequality(
+                    device, predicted_path_need(device, {bounds.rising(), bounds.falling()}),
+                    late ? "b >= T (B(M_h, s_h, t_d) + L_h / 2)" : "b >= T (M_h + L_h) / 2"),
+                detail::friction_inequality(
+                    device, gain * bounds.sliding + (gain + 1.0) * bounds.loss_per_play, bounds.mean_force,
+                    "(q max(|g'| + |h'|) + (q + 1) max h / r) Delta / 2")};
+    }
     const auto hold = [&](double more, const std::string& added) {
         return detail::hold_inequality(device, {bounds.rising() + more, bounds.falling() + more}, 0.0,
                                        late ? "b >= T B(M_h, s_h, t_d)" : "b >= T (M_h" + added + ") / 2");

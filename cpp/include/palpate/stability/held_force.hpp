@@ -177,7 +177,7 @@ template <class Function>
 template <class Gain = FilterGain, class Cost>
 [[nodiscard]] double least_cost(std::span<const double> taps, SlopeRange slopes, Cost cost) {
     constexpr double weight = 1e-8;
-    const Gain rough{taps, Maximum::Likely, 64};
+    const Gain rough{taps, Maximum::Likely, 16};
     const double slope = slopes.rising + slopes.falling;
     const double highest = 8.0 * slope / rough.size();
     const auto least_over_gamma = [&](double l) {

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "palpate/simulation.hpp"
+
+namespace palpate {
+
+/// Error of a rendered force against a force law f along the true motion x(t) of the handle, over all ticks. The
+/// force F that the device holds is compared with f at different times of the tick [t_k, t_k + T]:
+///
+///     end       F(t_k + T) - f(x(t_k + T)),                        RMS
+///     instant   F(t_k + T) - f(x(t_k)),                            RMS
+///     mean      e_k = (1/T) integral of F(t) - f(x(t)) dt,         RMS
+///     band      e_k filtered with zero phase to below 50 Hz,       RMS
+///     work      integral of (F - f) dx over all ticks; below 0 the rendering gives energy
+///
+/// The error at the end rewards a force that is ahead of the motion. The mean does not: it is what a hand feels that
+/// is slow against the sample rate.
+struct ForceError {
+    double end = 0.0;      ///< [N or N*m]
+    double instant = 0.0;  ///< [N or N*m]
+    double mean = 0.0;     ///< [N or N*m]
+    double band = 0.0;     ///< [N or N*m]
+    double work = 0.0;     ///< [J]
+};
+
+/// Largest frequency of the band-limited force error [Hz].
+inline constexpr double force_error_band_hz = 50.0;
+
+/// A signal without what lies above a frequency, phase kept: convolved with sin(2 pi f t) / (pi t) under a Hann
+/// window of +-4 / f. The signal is mirrored at its ends. At f the amplitude is halved.
+[[nodiscard]] inline std::vector<double> below_frequency(std::span<const double> signal, double period_s,
+                                                         double frequency_hz) {
+    const double cycles = frequency_hz * period_s;
+    if (cycles >= 0.5 || signal.empty()) {
+        return {signal.begin(), signal.end()};
+    }
+    const auto half = static_cast<std::ptrdiff_t>(std::ceil(4.0 / cycles));
+    std::vector<double> kernel;
+    double sum = 0.0;
+    for (std::ptrdiff_t k = -half; k <= half; ++k) {
+        const double angle = 2.0 * std::numbers::pi * cycles * static_cast<double>(k);
+        const double sinc = k == 0 ? 1.0 : std::sin(angle) / angle;
+        const double share = static_cast<double>(k) / static_cast<double>(half + 1);
+        kernel.push_back(sinc * (0.5 + 0.5 * std::cos(std::numbers::pi * share)));
+        sum += kernel.back();
+    }
+    const auto size = static_cast<std::ptrdiff_t>(signal.size());
+    std::vector<double> filtered;
+    filtered.reserve(signal.size());
+    for (std::ptrdiff_t n = 0; n < size; ++n) {
+        double value = 0.0;
+        for (std::ptrdiff_t k = -half; k <= half; ++k) {
+            std::ptrdiff_t at = n + k;
+            while (at < 0 || at >= size) {
+                at = at < 0 ? -1 - at : 2 * size - 1 - at;
+            }
+            value += kernel[static_cast<std::size_t>(k + half)] * signal[static_cast<std::size_t>(at)];
+        }
+        filtered.push_back(value / sum);
+    }
+    return filtered;
+}
+
+/// The handle's true motion and the force on it, a value for each tick: spans of a `Trace`, or of columns that were
+/// made of one.
+struct HeldForces {
+    std::span<const double> start;         ///< handle at the start of the tick
+    std::span<const double> middle;        ///< in its middle
+    std::span<const double> end;           ///< at its end
+    std::span<const double> applied;       ///< force at the end of the tick
+    std::span<const double> mean_applied;  ///< mean force over the tick
+};
+
+[[nodiscard]] inline HeldForces held_forces(const Trace& trace) noexcept {
+    return {trace.handle_start, trace.handle_middle, trace.handle_end, trace.applied, trace.mean_applied};
+}
+
+/// The errors of forces against `law(motion, step_s)`: the force law along a motion with this time from each position
+/// to the next. Within a tick f is taken at four evenly spaced times, on the parabola through start, middle and end.
+template <class Law>
+[[nodiscard]] ForceError force_error(const HeldForces& held, double period_s, Law&& law) {
+    const std::size_t ticks = held.start.size();
+    for (const std::span<const double> column : {held.middle, held.end, held.applied, held.mean_applied}) {
+        if (column.size() != ticks) {
+            throw std::invalid_argument("force_error needs as many values of each column as of start, " +
+                                        std::to_string(ticks) + ", not " + std::to_string(column.size()));
+        }
+    }
+    if (ticks == 0) {
+        return {};
+    }
+    constexpr std::size_t parts = 4;
+    std::vector<double> motion;  // the middles of the parts
+    std::vector<double> moved;   // in each part
+    std::vector<double> ends{held.start[0]};
+    for (std::size_t k = 0; k < ticks; ++k) {
+        const double slope = held.end[k] - held.start[k];
+        const double bend = 2.0 * (held.start[k] + held.end[k] - 2.0 * held.middle[k]);
+        const auto at = [&](double u) { return held.start[k] + u * (slope - bend * (1.0 - u)); };
+        for (std::size_t j = 0; j < parts; ++j) {
+            const double u = static_cast<double>(j) / parts;
+            motion.push_back(at(u + 0.5 / parts));
+            moved.push_back(at(u + 1.0 / parts) - at(u));
+        }
+        ends.push_back(held.end[k]);
+    }
+    const std::vector<double> within = law(motion, period_s / parts);
+    const std::vector<double> at_ends = law(ends, period_s);
+    const std::vector<double> at_starts =
+        law(std::vector<double>(held.start.begin(), held.start.end()), period_s);
+    ForceError error;
+    std::vector<double> means;
+    means.reserve(ticks);
+    for (std::size_t k = 0; k < ticks; ++k) {
+        error.end += std::pow(held.applied[k] - at_ends[k + 1], 2);
+        error.instant += std::pow(held.applied[k] - at_starts[k], 2);
+        double mean = 0.0;
+        for (std::size_t j = 0; j < parts; ++j) {
+            const double difference = held.mean_applied[k] - within[parts * k + j];
+            mean += difference / parts;
+            error.work += difference * moved[parts * k + j];
+        }
+        means.push_back(mean);
+        error.mean += mean * mean;
+    }
+    for (const double value : below_frequency(means, period_s, force_error_band_hz)) {
+        error.band += value * value;
+    }
+    for (double* sum : {&error.end, &error.instant, &error.mean, &error.band}) {
+        *sum = std::sqrt(*sum / static_cast<double>(ticks));
+    }
+    return error;
+}
+
+/// The errors of a trace against a model rendered exactly, its play of `play_radius` included.
+[[nodiscard]] inline ForceError force_error(const ForceModel& model, double play_radius,
+                                            const HeldForces& held, double period_s) {
+    Scheme exact;
+    exact.structure = StructureKind::Direct;
+    exact.play_radius = play_radius;
+    return force_error(held, period_s, [&](std::span<const double> motion, double step_s) {
+        std::vector<double> force;
+        force.reserve(motion.size());
+        for (const Rendered& rendered : motion_driven(model, exact, motion, step_s)) {
+            force.push_back(rendered.force);
+        }
+        return force;
+    });
+}
+
+}  // namespace palpate
