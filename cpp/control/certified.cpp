@@ -21,8 +21,11 @@ constexpr double rounding = 1e-6;  ///< what a profile written by hand may be of
 }  // namespace
 
 void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
-    guards.slew_s = 0.0;
     guards.certified = true;
+    guards.slew_s = 0.0;
+    guards.force_limit = certificate.device.force_limit;
+    guards.device_damping = certificate.device.viscous_damping;
+    guards.device_friction = certificate.device.coulomb_friction;
     loop.tolerated = 0;
     loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
     loop.longest_period_s = certificate.longest_period_s;
@@ -53,7 +56,8 @@ std::string not_certified(const ModelFile& file, const Options& options, const D
                readable(device.force_limit) + " N*m";
     }
     if (chooses_rendering(options)) {
-        return "is certified as it was planned: leave out --structure and its numbers, --slew-s, "
+        return "is certified as it was planned: leave out --structure and its numbers, --force-limit, "
+               "--slew-s, "
                "--tolerated-samples";
     }
     return "";

@@ -14,8 +14,9 @@ namespace palpate::control {
 /// Below this share of its rate the certificate of a run no longer holds: it is for the period asked for.
 inline constexpr double certified_rate_share = 0.99;
 
-/// What a certified run keeps to: no slew limit and no tick without a force, which are not covered by the proofs,
-/// and no time between two ticks that is longer than they hold for.
+/// Sets what a certified run keeps to: no slew limit and no tick without a force, because the proofs do not cover them;
+/// the certified force limit; no longer time between two ticks than certified. The energy tank counts on the certified
+/// damping and friction.
 void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop);
 
 /// Why a model may not move a device, whose own word is `device`: empty where its certificate is for this device, at

@@ -263,7 +263,7 @@ bool chooses_scheme(const Options& options) {
 }
 
 bool chooses_rendering(const Options& options) {
-    return chooses_scheme(options) || options.slew_s || options.tolerated;
+    return chooses_scheme(options) || options.force_limit || options.slew_s || options.tolerated;
 }
 
 }  // namespace palpate::control

@@ -112,30 +112,31 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
     const RecordingFile& file = outlets.file;
     const std::string ending = ending_text(loop, settings.loop);
     if (as_json) {
-        nlohmann::json summary{{"verdict", verdict_text(findings)},
-                               {"ended", ending},
-                               {"status", text(loop.status).word},
-                               {"ticks", loop.timing.ticks()},
-                               {"rate_hz", loop.timing.rate_hz()},
-                               {"wanted_rate_hz", settings.loop.rate_hz},
-                               {"period", microseconds(loop.timing.period)},
-                               {"lateness", microseconds(loop.timing.lateness)},
-                               {"missed_deadlines", loop.timing.missed},
-                               {"longest_gap_us", 1e-3 * static_cast<double>(loop.timing.period.largest())},
-                               {"ticks_by_status", statuses(loop)},
-                               {"lost_samples", loop.lost_samples},
-                               {"repeated_samples", loop.repeated_samples},
-                               {"record", record.empty() ? nlohmann::json() : nlohmann::json(record)},
-                               {"recorded", file.written()},
-                               {"lost_records", report.lost_records + file.refused()},
-                               {"telemetry_sent", outlets.telemetry.sent()},
-                               {"telemetry_dropped", outlets.telemetry.dropped()},
-                               {"energy", {{"given_in_ramp_J", loop.given_in_ramp},
-                                           {"given_J", loop.given},
-                                           {"most_stored_J", std::isfinite(loop.most_stored)
-                                                                 ? nlohmann::json(loop.most_stored)
-                                                                 : nlohmann::json()}}},
-                               {"without", report.refused}};
+        nlohmann::json summary{
+            {"verdict", verdict_text(findings)},
+            {"ended", ending},
+            {"status", text(loop.status).word},
+            {"ticks", loop.timing.ticks()},
+            {"rate_hz", loop.timing.rate_hz()},
+            {"wanted_rate_hz", settings.loop.rate_hz},
+            {"period", microseconds(loop.timing.period)},
+            {"lateness", microseconds(loop.timing.lateness)},
+            {"missed_deadlines", loop.timing.missed},
+            {"longest_gap_us", 1e-3 * static_cast<double>(loop.timing.period.largest())},
+            {"ticks_by_status", statuses(loop)},
+            {"lost_samples", loop.lost_samples},
+            {"repeated_samples", loop.repeated_samples},
+            {"record", record.empty() ? nlohmann::json() : nlohmann::json(record)},
+            {"recorded", file.written()},
+            {"lost_records", report.lost_records + file.refused()},
+            {"telemetry_sent", outlets.telemetry.sent()},
+            {"telemetry_dropped", outlets.telemetry.dropped()},
+            {"energy",
+             {{"given_in_ramp_J", loop.given_in_ramp},
+              {"given_J", loop.given},
+              {"most_stored_J",
+               std::isfinite(loop.most_stored) ? nlohmann::json(loop.most_stored) : nlohmann::json()}}},
+            {"without", report.refused}};
         if (!device.json.is_null()) {
             summary.update(device.json);
         }

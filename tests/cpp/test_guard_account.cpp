@@ -43,13 +43,18 @@ class GuidedHandle {
         const double force = pending_[ticks_ % pending_.size()];
         const double way = to_ - at_;
         motor_ += force * way;
-        loss_ += std::abs(way) * (device_.viscous_damping * std::abs(way) / device_.period_s +
-                                  device_.coulomb_friction);
+        loss_ += std::abs(way) *
+                 (device_.viscous_damping * std::abs(way) / device_.period_s + device_.coulomb_friction);
         least_ = std::min(least_, energy());
         at_ = to_;
         ++ticks_;
-        return {encoded(at_), 0.0, force, std::numeric_limits<double>::quiet_NaN(),
-                static_cast<double>(ticks_) * device_.period_s, ticks_, Status::Ok};
+        return {encoded(at_),
+                0.0,
+                force,
+                std::numeric_limits<double>::quiet_NaN(),
+                static_cast<double>(ticks_) * device_.period_s,
+                ticks_,
+                Status::Ok};
     }
 
     /// What the hand put in so far, and the least of it [J]
@@ -92,7 +97,7 @@ DeviceProfile bench_knob() {
 /// The knob of the README, as `palpate demo` and `palpate identify` make it.
 ForceModel readme_knob() {
     NetworkParameters network;
-    network.alpha = {14.065144146110542, 4.162057332442819,  5.888611543700749, 36.06654311080214,
+    network.alpha = {14.065144146110542, 4.162057332442819, 5.888611543700749, 36.06654311080214,
                      6.664738379356768,  41.52923490349144, 56.94283014365128};
     network.beta = {0.5078861161881123,   0.6697168372310223, 0.2474086359804909, 0.3957300688865673,
                     0.028856055274948916, 0.3459005107773592, 0.3611594362786021};
@@ -242,21 +247,20 @@ TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
         Motions motion{random, scene};
         GuidedHandle handle{scene.device, scene.start};
         const Guards guards = certified_guards(scene.model, scene.scheme, scene.device);
-        with_structure(
-            scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit,
-            [&](auto structure) {
-                Controller controller{handle, std::move(structure), guards};
-                ASSERT_EQ(controller.start(), Status::Ok);
-                std::size_t drained = 0;
-                for (int tick = 0; tick < 3000; ++tick) {
-                    handle.go_to(tick < 5 ? scene.start : motion.next(random, tick));
-                    drained += controller.tick().status == Status::Drained ? 1 : 0;
-                }
-                const EnergyTank& tank = controller.guards().tank;
-                EXPECT_EQ(drained, 0U) << "scene " << k << ": " << scene << "; given " << tank.most_given()
-                                       << " of " << tank.stored().most();
-                most = std::max(most, tank.most_given() / tank.stored().most());
-            });
+        with_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit,
+                       [&](auto structure) {
+                           Controller controller{handle, std::move(structure), guards};
+                           ASSERT_EQ(controller.start(), Status::Ok);
+                           std::size_t drained = 0;
+                           for (int tick = 0; tick < 3000; ++tick) {
+                               handle.go_to(tick < 5 ? scene.start : motion.next(random, tick));
+                               drained += controller.tick().status == Status::Drained ? 1 : 0;
+                           }
+                           const EnergyTank& tank = controller.guards().tank;
+                           EXPECT_EQ(drained, 0U) << "scene " << k << ": " << scene << "; given "
+                                                  << tank.most_given() << " of " << tank.stored().most();
+                           most = std::max(most, tank.most_given() / tank.stored().most());
+                       });
     }
     EXPECT_GT(most, 0.3);  // the bound of what is stored is not far from what is given
 }
@@ -266,9 +270,8 @@ TEST(GuardedAccount, RubbingASpringAtItsBoundNeedsFullCredit) {
     DeviceProfile device;
     device.encoder_step = 0.0;
     const double stiffness = (2.0 - 1e-8) * device.viscous_damping / device.period_s;
-    const ForceModel spring{
-        NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0},
-        {{-0.04}, {0.04}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+    const ForceModel spring{NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0},
+                            {{-0.04}, {0.04}, Continuation::Linear, Continuation::Linear, std::nullopt}};
     ASSERT_TRUE(certify(spring, direct(), device).certified());
     const auto drained = [&](double share) {
         GuidedHandle handle{device, 0.0};
@@ -457,9 +460,10 @@ TEST(MostEnergy, IsABoundOfTheEnergyOfTheClippedForce) {
         const double span = stored_span(model, limit);
         const double most = most_energy(model, direct(), limit);
         EXPECT_GE(most, span * (1.0 - 1e-5)) << "model " << k << ", limit " << limit;
-        const double bend = model.hysteresis() == nullptr ? 0.0
-                                                          : 0.5 * model.hysteresis()->play_radius() *
-                                                                model.hysteresis()->loss().value_bounds().upper;
+        const double bend =
+            model.hysteresis() == nullptr
+                ? 0.0
+                : 0.5 * model.hysteresis()->play_radius() * model.hysteresis()->loss().value_bounds().upper;
         if (energy_range(model, limit).least > -1e300 && model.domain().below == Continuation::Linear) {
             worst = std::max(worst, (most - bend) / std::max(span, 1e-3));
         }

@@ -102,6 +102,16 @@ def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
     assert "# certified: yes" in record.read_text(encoding="utf-8")
 
 
+def test_a_certified_run_has_the_certified_force_limit_and_no_slew_limit(tmp_path: Path) -> None:
+    record = tmp_path / "felt.csv"
+    words = ["--wait-ms", 500, "--duration-s", 0.1, "--record", record]
+    control(*words, device=LOCK_STEP, model=planned(tmp_path, force_limit=3.0))
+    assert "# guards: force limit 3, no slew limit, ramp 0.2 s" in record.read_text(encoding="utf-8")
+    refused = control("--force-limit", 2, device=LOCK_STEP, model=planned(tmp_path))
+    assert refused.returncode == 2
+    assert "leave out --structure and its numbers, --force-limit" in refused.stderr
+
+
 @pytest.mark.parametrize(
     ("device", "reason"),
     [

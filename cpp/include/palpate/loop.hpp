@@ -84,10 +84,11 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double given_in_ramp = 0.0;  ///< most energy that the motor had given, net, during the ramp at the start [J]
-    double given = 0.0;          ///< the same since its end [J]
-    double most_stored = 0.0;    ///< upper bound of the energy that the rendering stored above its least [J]
-    std::uint64_t buzzes = 0;   ///< each made the object softer
+    double given_in_ramp =
+        0.0;             ///< most energy that the motor had given, net, during the ramp at the start [J]
+    double given = 0.0;  ///< the same since its end [J]
+    double most_stored = 0.0;  ///< upper bound of the energy that the rendering stored above its least [J]
+    std::uint64_t buzzes = 0;  ///< each made the object softer
 };
 
 [[nodiscard]] inline TickRecord record_of(const Tick& tick, const Wake& wake, Nanoseconds first) noexcept {

@@ -63,14 +63,14 @@ namespace palpate {
            " Hz for half a second";
 }
 
-/// What energy a rendering gave, net, in one line; the ramp at the start can give what the object holds once, so it is
-/// told by itself.
+/// Returns the most energy that a rendering had given, net, in one line. The ramp at the start can give what the object
+/// holds once, so its energy is stated separately.
 [[nodiscard]] inline std::string energy_text(const LoopReport& report) {
     const std::string stored = std::isfinite(report.most_stored)
                                    ? "the object held at most " + readable(report.most_stored) + " J"
                                    : "no bound is known of what the object held";
-    return "gave at most " + readable(report.given_in_ramp) + " J during the ramp and " +
-           readable(report.given) + " J after it; " + stored;
+    return "given " + readable(report.given_in_ramp) + " J during the ramp, " + readable(report.given) +
+           " J after it; " + stored;
 }
 
 /// "massless, compensated, K_c = 100, B_c = 0.02"
@@ -108,13 +108,15 @@ namespace palpate {
                                               const GuardSettings& guards, double rate_hz) {
     Metadata metadata{{"created_by", created_by}};
     metadata.insert(metadata.end(), device.begin(), device.end());
-    metadata.insert(
-        metadata.end(),
-        {{"model", model},
-         {"structure", describe(scheme)},
-         {"guards", "force limit " + readable(guards.force_limit) + ", slew from nothing to the limit in " +
-                        readable(guards.slew_s) + " s, ramp " + readable(guards.ramp_s) + " s"},
-         {"rate_hz", readable(rate_hz)}});
+    metadata.insert(metadata.end(),
+                    {{"model", model},
+                     {"structure", describe(scheme)},
+                     {"guards", "force limit " + readable(guards.force_limit) +
+                                    (guards.slew_s > 0.0 ? ", slew from nothing to the limit in " +
+                                                               readable(guards.slew_s) + " s"
+                                                         : ", no slew limit") +
+                                    ", ramp " + readable(guards.ramp_s) + " s"},
+                     {"rate_hz", readable(rate_hz)}});
     return metadata;
 }
 

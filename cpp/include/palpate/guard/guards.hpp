@@ -91,8 +91,8 @@ struct Guards {
             stored = {.within = stored.within};
         }
         const double share = settings.certified ? 1.0 : uncertified_credit;
-        guards.tank = EnergyTank{
-            {stored, share * settings.device_damping, share * settings.device_friction, period_s}};
+        guards.tank =
+            EnergyTank{{stored, share * settings.device_damping, share * settings.device_friction, period_s}};
     }
     if (settings.buzz_force > 0.0) {
         guards.buzz = LimitCycleDetector{{settings.buzz_force, longest_swing, settings.encoder_step}};

@@ -13,9 +13,9 @@ struct StoredEnergySettings {
     double within = std::numeric_limits<double>::infinity();
     double lower = -std::numeric_limits<double>::infinity();  ///< of the domain [m or rad]
     double upper = std::numeric_limits<double>::infinity();   ///< of the domain [m or rad]
-    double force_limit = 0.0;  ///< F_max [N or N*m]
-    double stiffness = 0.0;    ///< K_c; 0: no coupling [N/m or N*m/rad]
-    double mass = 0.0;         ///< m of the object [kg or kg*m^2]
+    double force_limit = 0.0;                                 ///< F_max [N or N*m]
+    double stiffness = 0.0;                                   ///< K_c; 0: no coupling [N/m or N*m/rad]
+    double mass = 0.0;                                        ///< m of the object [kg or kg*m^2]
     double period_s = 1e-3;
 };
 

@@ -79,8 +79,7 @@ template <class At>
     const double unseen = 0.25 * steepest * width * width;
     double from = lower;
     Curve at_from = at(lower);
-    LimitedEnergy energy{
-        {at_from.integral, at_from.integral, unseen}, at_from.integral, at_from.integral};
+    LimitedEnergy energy{{at_from.integral, at_from.integral, unseen}, at_from.integral, at_from.integral};
     double beyond = 0.0;
     for (std::size_t k = 1; k <= cells; ++k) {
         const double to = lower + (upper - lower) * static_cast<double>(k) / static_cast<double>(cells);
@@ -88,7 +87,8 @@ template <class At>
         if (at_from.value < 0.0 && at_to.value >= 0.0) {
             const double rest = rest_between(at, from, to);
             const Curve at_rest = at(rest);
-            const double here = at_rest.integral - beyond - work_beyond(at, from, at_from, rest, at_rest, limit);
+            const double here =
+                at_rest.integral - beyond - work_beyond(at, from, at_from, rest, at_rest, limit);
             energy.range.least = std::min(energy.range.least, here);
         }
         const auto is_near = [&](const Curve& end) noexcept {
@@ -128,7 +128,8 @@ template <class At>
     double at_from = at(from).value;
     EnergyRange range;
     for (std::size_t k = 1; k <= cells; ++k) {
-        const double to = force.lower() + force.travel() * static_cast<double>(k) / static_cast<double>(cells);
+        const double to =
+            force.lower() + force.travel() * static_cast<double>(k) / static_cast<double>(cells);
         const double at_to = at(to).value;
         if (at_from < 0.0 && at_to >= 0.0) {
             const double rest = detail::rest_between(at, from, to);
@@ -146,8 +147,8 @@ template <class At>
 }
 
 /// The energy range of a model of one position, or of position and velocity, whose force a device limits.
-[[nodiscard]] inline EnergyRange energy_range(
-    const ForceModel& model, double force_limit = std::numeric_limits<double>::infinity()) {
+[[nodiscard]] inline EnergyRange energy_range(const ForceModel& model,
+                                              double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);
     if (const VelocityNetwork* of_velocity = model.velocity()) {
         return energy_range(*of_velocity, force_limit);
@@ -169,8 +170,9 @@ template <class At>
         }
         return range;
     }
-    range.least = std::min({range.least, energy.at_lower - detail::fall_beyond(force.below(), -1.0, force_limit),
-                            energy.at_upper - detail::fall_beyond(force.above(), +1.0, force_limit)});
+    range.least =
+        std::min({range.least, energy.at_lower - detail::fall_beyond(force.below(), -1.0, force_limit),
+                  energy.at_upper - detail::fall_beyond(force.above(), +1.0, force_limit)});
     return range;
 }
 
