@@ -80,6 +80,23 @@ TEST(DirectLines, RenderableSlopesAreCertifiedAndNotLessThanWithEqualSides) {
     }
 }
 
+TEST(DirectLines, TheLongestPeriodOfALateForceIsTheLastThatIsCertified) {
+    for (const double delay : {0.0, 0.25, 1.0, 2.0}) {
+        for (const double falling : {0.0, 5.0, 25.0}) {
+            DeviceProfile profile = device(delay);
+            ForceBounds bounds;
+            bounds.slope = {-falling, 8.0};
+            bounds.steepest = bounds.sliding = bounds.slope.largest();
+            const Certificate certificate = certify(bounds, direct_scheme(), profile);
+            ASSERT_TRUE(certificate.certified());
+            profile.jitter_s = 0.9999 * certificate.longest_period_s - profile.period_s;
+            EXPECT_TRUE(certify(bounds, direct_scheme(), profile).certified()) << delay << " " << falling;
+            profile.jitter_s = 1.0001 * certificate.longest_period_s - profile.period_s;
+            EXPECT_FALSE(certify(bounds, direct_scheme(), profile).certified()) << delay << " " << falling;
+        }
+    }
+}
+
 TEST(DirectLines, AForceThatFallsGetsTheRoomThatItsRiseLeaves) {
     const DeviceProfile late = device(1.0);
     const Interval rises = renderable_slopes(late, 0.0, {100.0, 1.0});

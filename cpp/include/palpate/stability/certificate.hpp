@@ -136,25 +136,47 @@ namespace detail {
 
 namespace detail {
 
-/// The longest period for which every line holds, all else equal; at most 100 times the longest one asked for.
-[[nodiscard]] inline double longest_period(const ForceBounds& bounds, const Scheme& scheme,
-                                           const DeviceProfile& device) {
-    const auto holds = [&](double factor) {
+/// The longest period for which every line holds, all else equal; at most 100 times the longest one asked for. Most
+/// right sides grow with it in proportion, so that guess is tried before a bisection.
+[[nodiscard]] inline double longest_period(const std::vector<Inequality>& lines, const ForceBounds& bounds,
+                                           const Scheme& scheme, const DeviceProfile& device) {
+    constexpr double most = 100.0;
+    const double T = device.longest_period_s();
+    const auto lines_at = [&](double factor) {
         DeviceProfile later = device;
-        later.jitter_s = factor * device.longest_period_s() - device.period_s;
-        const std::vector<Inequality> lines = inequalities_of(bounds, scheme, later);
-        return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+        later.jitter_s = factor * T - device.period_s;
+        return inequalities_of(bounds, scheme, later);
     };
-    double low = 1.0;
-    double high = 100.0;
-    if (holds(high)) {
-        return high * device.longest_period_s();
+    const auto holds = [&](double factor) {
+        const std::vector<Inequality> later = lines_at(factor);
+        return std::all_of(later.begin(), later.end(), [](const Inequality& line) { return line.holds(); });
+    };
+    double guess = most;
+    const std::vector<Inequality> doubled = lines_at(2.0);
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+        const double growth = doubled[k].right - lines[k].right;
+        if (growth > 0.0) {
+            guess = std::min(guess, 1.0 + lines[k].margin() / growth);
+        }
     }
-    for (int k = 0; k < 50; ++k) {
+    double low = 1.0;
+    double high = most;
+    if (const double below = guess * (1.0 - 1e-12); below > 1.0 && holds(below)) {
+        if (guess == most || !holds(guess * (1.0 + 1e-9))) {
+            return below * T;
+        }
+        low = below;
+    } else {
+        high = guess;
+    }
+    if (low > 1.0 && holds(high)) {
+        return high * T;
+    }
+    for (int k = 0; k < 40; ++k) {
         const double middle = 0.5 * (low + high);
         (holds(middle) ? low : high) = middle;
     }
-    return low * device.longest_period_s();
+    return low * T;
 }
 
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
@@ -207,7 +229,7 @@ namespace detail {
     if (all([](const Inequality& line) { return line.holds(); })) {
         const bool proved = all([](const Inequality& line) { return line.rests_on != Basis::Linear; });
         certificate.verdict = proved ? Verdict::Certified : Verdict::StableLocally;
-        certificate.longest_period_s = detail::longest_period(certificate.bounds, scheme, device);
+        certificate.longest_period_s = detail::longest_period(lines, certificate.bounds, scheme, device);
     }
     certificate.why = detail::reason(lines, certificate.verdict);
     certificate.inequalities = std::move(lines);
