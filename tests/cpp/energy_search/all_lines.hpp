@@ -20,18 +20,23 @@ namespace palpate::energy_search {
     for (const double n : {0.0, 1.0, 2.0, 0.25, 0.5, 1.3}) {
         const bool whole = n == std::floor(n);
         const auto damping = [&](const char* name, bool tight, auto draw) {
-            lines.push_back({name, n, Part::Damping, tight, [draw, n](test::Random& random) { return draw(random, n); }});
+            lines.push_back(
+                {name, n, Part::Damping, tight, [draw, n](test::Random& random) { return draw(random, n); }});
         };
         const auto friction = [&](const char* name, bool tight, auto draw) {
-            lines.push_back({name, n, Part::Friction, tight, [draw, n](test::Random& random) { return draw(random, n); }});
+            lines.push_back({name, n, Part::Friction, tight,
+                             [draw, n](test::Random& random) { return draw(random, n); }});
         };
         using R = test::Random;
         const auto behind = [](StructureKind kind, Regime regime) {
-            return [kind, regime](R& random, double delay) { return draw_coupled(random, kind, delay, regime); };
+            return
+                [kind, regime](R& random, double delay) { return draw_coupled(random, kind, delay, regime); };
         };
         damping("direct", n < 1.1, draw_direct);
         damping("hysteresis", n == 0.0, draw_hysteresis);
         damping("velocity", false, draw_velocity);
+        damping("prediction", n == 0.0,
+                [](R& random, double delay) { return draw_prediction(random, delay, false); });
         damping("wheel", false, [](R& random, double delay) { return draw_wheel(random, delay, false); });
         damping("wheel of wavelets", false,
                 [](R& random, double delay) { return draw_network_wheel(random, delay, false); });
@@ -43,18 +48,24 @@ namespace palpate::energy_search {
         damping("energy-consistent", false, behind(StructureKind::EnergyConsistent, Regime::Usual));
         damping("massless, firm object", n == 0.0, behind(StructureKind::Massless, Regime::Firm));
         damping("implicit, firm object", n == 0.0, behind(StructureKind::Implicit, Regime::Firm));
-        damping("energy-consistent, firm object", n == 0.0, behind(StructureKind::EnergyConsistent, Regime::Firm));
+        damping("energy-consistent, firm object", n == 0.0,
+                behind(StructureKind::EnergyConsistent, Regime::Firm));
         damping("implicit, limited", false, behind(StructureKind::Implicit, Regime::Limited));
-        damping("energy-consistent, limited", false, behind(StructureKind::EnergyConsistent, Regime::Limited));
+        damping("energy-consistent, limited", false,
+                behind(StructureKind::EnergyConsistent, Regime::Limited));
         if (!whole) {
             continue;
         }
-        friction("wheel, mean", false, [](R& random, double delay) { return draw_wheel(random, delay, true); });
+        friction("wheel, mean", false,
+                 [](R& random, double delay) { return draw_wheel(random, delay, true); });
         friction("wheel of wavelets, mean", false,
                  [](R& random, double delay) { return draw_network_wheel(random, delay, true); });
-        friction("encoder", false, [](R& random, double delay) { return draw_encoder(random, delay, false); });
+        friction("encoder", false,
+                 [](R& random, double delay) { return draw_encoder(random, delay, false); });
         friction("encoder, hysteresis", false,
                  [](R& random, double delay) { return draw_encoder(random, delay, true); });
+        friction("encoder, prediction", false,
+                 [](R& random, double delay) { return draw_prediction(random, delay, true); });
         friction("force step", false, draw_force_step);
     }
     return lines;

@@ -83,9 +83,8 @@ enum class Regime { Usual, Firm, Limited };
     scheme.coupling.damping =
         random() % 2 == 0 ? 0.0
                           : scheme.coupling.stiffness * period * std::exp(test::uniform(random, -3.0, 1.0));
-    scheme.inertia.mass =
-        scheme.coupling.stiffness * period * period *
-        std::exp(firm                        ? test::uniform(random, 9.0, 14.0)
+    scheme.inertia.mass = scheme.coupling.stiffness * period * period *
+                          std::exp(firm                        ? test::uniform(random, 9.0, 14.0)
                                    : regime == Regime::Limited ? test::uniform(random, 3.0, 8.0)
                                                                : test::uniform(random, -3.0, 7.0));
     scheme.inertia.damping =

@@ -45,6 +45,14 @@ template <class MeanOf>
     return shifted(0.5 * (low + high));
 }
 
+/// Nodes of a turn: many for slow turning, few for jumps.
+[[nodiscard]] inline int wheel_nodes(double delay, bool slowly) {
+    constexpr int slow[] = {3000, 1200, 600};
+    constexpr int fast[] = {48, 24, 12};
+    const int samples = std::min(samples_of(delay), 2);
+    return slowly ? slow[samples] : fast[samples];
+}
+
 /// A wheel of straight pieces. Slow turning in many short moves tries the mean force, jumps try the damping.
 [[nodiscard]] inline std::optional<Trial> draw_wheel(test::Random& random, double delay, bool slowly) {
     const int cells = 8 + static_cast<int>(random() % 9);
@@ -80,7 +88,7 @@ template <class MeanOf>
         return std::nullopt;
     }
     HeldScene scene;
-    const int nodes = slowly ? 3000 : samples_of(delay) == 0 ? 48 : samples_of(delay) == 1 ? 24 : 12;
+    const int nodes = wheel_nodes(delay, slowly);
     scene.read = even_grid(0.0, turn / nodes, nodes, slowly ? 1 : nodes, true);
     scene.table = table_of(Direct{PieceObject{wheel}}, scene.read, 0, sent_on(device));
     scene.held =
@@ -89,7 +97,8 @@ template <class MeanOf>
 }
 
 /// A wheel of a few wavelets, as the core certifies it.
-[[nodiscard]] inline std::optional<Trial> draw_network_wheel(test::Random& random, double delay, bool slowly) {
+[[nodiscard]] inline std::optional<Trial> draw_network_wheel(test::Random& random, double delay,
+                                                             bool slowly) {
     const NetworkParameters network = small_network(random);
     Domain domain = test::unit_domain();
     domain.period = 1.0;
@@ -106,7 +115,7 @@ template <class MeanOf>
     }
     const double mean = mean_over(1.0, [&](double x) { return clipped(curve.at(x).value, device); });
     HeldScene scene;
-    const int nodes = slowly ? 3000 : samples_of(delay) == 0 ? 48 : samples_of(delay) == 1 ? 24 : 12;
+    const int nodes = wheel_nodes(delay, slowly);
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, slowly ? 1 : nodes, true);
     scene.table = with_structure(
         model, scheme, device.period_s, device.force_limit,
@@ -130,7 +139,7 @@ template <class MeanOf>
 /// A force that is made softer at any time, more than once, and never harder again. On a wheel or on pieces.
 [[nodiscard]] inline std::optional<Trial> draw_softening(test::Random& random, double delay) {
     const bool wheel = random() % 2 == 0;
-    const int nodes = wheel ? 1500 : 40;
+    const int nodes = wheel ? wheel_nodes(delay, true) / 2 : 40;
     const int cells = wheel ? 8 + static_cast<int>(random() % 9) : nodes - 1;
     const double step = wheel ? 1.0 / cells : 1.0 / nodes;
     DeviceProfile device = random_device(random, delay);
@@ -161,7 +170,11 @@ template <class MeanOf>
     };
     auto shared = std::make_shared<Softening>();
     HeldScene& scene = shared->scene;
-    scene.read = even_grid(0.0, wheel ? 1.0 / nodes : step, nodes, wheel ? 1 : samples_of(delay) == 0 ? nodes : 3, wheel);
+    scene.read = even_grid(0.0, wheel ? 1.0 / nodes : step, nodes,
+                           wheel                    ? 1
+                           : samples_of(delay) == 0 ? nodes
+                                                    : 3,
+                           wheel);
     scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
     scene.need = {need->damping / device.longest_period_s(), need->friction, device.whole_delay_samples(),
                   device.delay_fraction()};

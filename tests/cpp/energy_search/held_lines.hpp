@@ -15,6 +15,7 @@
 #include "held_scenes.hpp"
 #include "line.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate.hpp"
 
@@ -27,7 +28,9 @@ struct Fineness {
 };
 
 /// Number of remembered positions for a delay in samples.
-[[nodiscard]] inline int samples_of(double delay) { return static_cast<int>(std::ceil(delay)); }
+[[nodiscard]] inline int samples_of(double delay) {
+    return static_cast<int>(std::ceil(delay));
+}
 
 [[nodiscard]] inline Fineness random_fineness(test::Random& random, int memory) {
     if (random() % 2 == 0) {
@@ -129,7 +132,8 @@ template <class Force>
 }
 
 /// A network of position by any structure whose force depends on the present position alone.
-[[nodiscard]] inline std::optional<Trial> draw_static_network(test::Random& random, double delay, bool coupled) {
+[[nodiscard]] inline std::optional<Trial> draw_static_network(test::Random& random, double delay,
+                                                              bool coupled) {
     const Fineness fine = random_fineness(random, samples_of(delay));
     const ForceModel model{small_network(random), test::unit_domain()};
     const NetworkCurve& curve = model.network()->curve();
@@ -185,10 +189,10 @@ template <class Force>
     const bool far = random() % 2 == 0;
     const int nodes = far ? (samples_of(delay) == 0   ? 60
                              : samples_of(delay) == 1 ? 40
-                                          : 24)
+                                                      : 24)
                           : (samples_of(delay) == 0   ? 20
                              : samples_of(delay) == 1 ? 14
-                                          : 8);
+                                                      : 8);
     const int reach = far ? (samples_of(delay) == 2 ? 2 : 3) : nodes - 1;
     const int radius = 1 + static_cast<int>(random() % 4);
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
@@ -307,12 +311,12 @@ template <class Force>
 
 /// An encoder with steps: the handle is anywhere within the count that is read.
 [[nodiscard]] inline std::optional<Trial> draw_encoder(test::Random& random, double delay, bool hysteresis) {
-    const int counts = hysteresis   ? (samples_of(delay) == 0   ? 14
-                                       : samples_of(delay) == 1 ? 8
-                                                    : 4)
+    const int counts = hysteresis               ? (samples_of(delay) == 0   ? 14
+                                                   : samples_of(delay) == 1 ? 8
+                                                                            : 4)
                        : samples_of(delay) == 0 ? 24
                        : samples_of(delay) == 1 ? 12
-                                    : 6;
+                                                : 6;
     const int within = samples_of(delay) == 0 ? 2 : 1;
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
     DeviceProfile device = random_device(random, delay);
@@ -321,6 +325,7 @@ template <class Force>
     scene.read = encoder_grid(0.0, step, counts, within);
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
+    double at_start = 0.0;
     const Pieces g{0.0, step, random_forces(random, counts, step, random_slopes(random))};
     std::optional<Need> need;
     if (hysteresis) {
@@ -340,6 +345,8 @@ template <class Force>
         if (need && random() % 2 == 0) {
             need = need_at_less_friction(device, *need, certified).value_or(*need);
         }
+        // The read play rests at the count, the handle up to half a count away.
+        at_start = bounds_of(pair).loss_per_play * step * step / 8.0;
         scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     } else {
         limit_by(random, device, largest_of(g.points()));
@@ -351,6 +358,9 @@ template <class Force>
         return std::nullopt;
     }
     scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(g.at(x).value, device); });
+    for (double& energy : scene.held) {
+        energy += at_start;
+    }
     return trial_of(std::move(scene), *need, device);
 }
 
@@ -376,6 +386,45 @@ template <class Force>
     HeldScene scene;
     scene.read = even_grid(0.0, step, fine.nodes, fine.reach);
     scene.table = table_of(Direct{PieceObject{pieces}}, scene.read, 0, sent_on(device));
+    scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
+    return trial_of(std::move(scene), *need, device);
+}
+
+/// A force at a position that is predicted from 1 to 3 samples; with an encoder, from 1 or 2.
+[[nodiscard]] inline std::optional<Trial> draw_prediction(test::Random& random, double delay, bool encoder) {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    scheme.predict = 1 + static_cast<int>(random() % (encoder ? 2 : delay > 0.0 ? 2 : 3));
+    const int window = samples_of(delay) + scheme.predict;
+    const double step = std::exp(test::uniform(random, -6.0, -2.0));
+    DeviceProfile device = random_device(random, delay);
+    HeldScene scene;
+    int points = 0;
+    if (encoder) {
+        points = window == 1 ? 12 : window == 2 ? 6 : 4;
+        device.encoder_step = step;
+        scene.read = encoder_grid(0.0, step, points, window == 1 ? 1 : 0);
+    } else {
+        const bool far = random() % 2 == 0;
+        points = far ? (window == 1   ? 100
+                        : window == 2 ? 60
+                        : window == 3 ? 40
+                                      : 24)
+                     : (window == 1   ? 20
+                        : window == 2 ? 12
+                        : window == 3 ? 8
+                                      : 5);
+        scene.read = even_grid(0.0, step, points, !far ? points : window < 3 ? 3 : 2);
+    }
+    const Pieces pieces{0.0, step, random_forces(random, points, step, random_slopes(random))};
+    limit_by(random, device, largest_of(pieces.points()));
+    const auto need = certified_need(
+        device, [&](const DeviceProfile& generous) { return certify(bounds_of(pieces), scheme, generous); });
+    if (!need || need->damping <= 0.0 || (encoder && need->friction <= 0.0)) {
+        return std::nullopt;
+    }
+    scene.table = table_of(PredictedDirect{PieceObject{pieces}, scheme.predict}, scene.read, scheme.predict,
+                           sent_on(device));
     scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
     return trial_of(std::move(scene), *need, device);
 }
