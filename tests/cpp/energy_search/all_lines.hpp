@@ -32,10 +32,12 @@ namespace palpate::energy_search {
             return
                 [kind, regime](R& random, double delay) { return draw_coupled(random, kind, delay, regime); };
         };
-        damping("direct", n < 1.1, draw_direct);
+        damping("direct", n == 0.0, draw_direct);
+        damping("direct, steep shapes", n < 1.1, draw_direct_steep);
         damping("hysteresis", n == 0.0, draw_hysteresis);
         damping("velocity", false, draw_velocity);
-        damping("prediction", n == 0.0,
+        damping("prediction, steep shapes", n == 0.0, [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
+        damping("prediction", false,
                 [](R& random, double delay) { return draw_prediction(random, delay, false); });
         damping("wheel", false, [](R& random, double delay) { return draw_wheel(random, delay, false); });
         damping("wheel of wavelets", false,

@@ -126,10 +126,14 @@ struct Slopes {
     double s = 0.0;
 };
 
+/// Any force, or one of the shapes for which the bounds are closest: long runs of the extreme slopes, falling no more
+/// steeply than rising, or not rising at all.
+enum class Shapes { Any, Steep };
+
 /// Rising only, falling only, or both.
-[[nodiscard]] inline Slopes random_slopes(test::Random& random) {
+[[nodiscard]] inline Slopes random_slopes(test::Random& random, Shapes shapes = Shapes::Any) {
     const double M = std::exp(test::uniform(random, 0.0, 4.0));
-    switch (random() % 4) {
+    switch (random() % (shapes == Shapes::Any ? 4 : 3)) {
         case 0:
             return {M, 0.0};
         case 1:
@@ -143,10 +147,11 @@ struct Slopes {
 
 /// Forces at `count` points: runs of the extreme slopes, mixed slopes, a wall, or a spring.
 [[nodiscard]] inline std::vector<double> random_forces(test::Random& random, int count, double step,
-                                                       Slopes slopes) {
+                                                       Slopes slopes, Shapes shapes = Shapes::Any) {
     std::vector<double> force{0.0};
-    const auto kind = random() % 4;
-    const int run = 1 + static_cast<int>(random() % 5);
+    const bool steep = shapes == Shapes::Steep;
+    const auto kind = steep ? 3 * (random() % 2) : random() % 4;
+    const int run = steep ? std::max(2, count / 4) : 1 + static_cast<int>(random() % 5);
     const int wall = static_cast<int>(random() % static_cast<std::uint64_t>(count));
     const double rising = test::uniform(random, 0.2, 0.8);
     bool up = random() % 2 == 0;

@@ -32,8 +32,8 @@ struct Fineness {
     return static_cast<int>(std::ceil(delay));
 }
 
-[[nodiscard]] inline Fineness random_fineness(test::Random& random, int memory) {
-    if (random() % 2 == 0) {
+[[nodiscard]] inline Fineness random_fineness(test::Random& random, int memory, Shapes shapes = Shapes::Any) {
+    if (shapes == Shapes::Steep || random() % 2 == 0) {
         constexpr int fine[] = {400, 200, 100, 40};
         return {fine[std::min(memory, 3)], memory > 2 ? 2 : 3};
     }
@@ -92,10 +92,10 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
 
 /// A static force of straight pieces, rendered directly or through a coupling without damper.
 [[nodiscard]] inline std::optional<Trial> draw_static_pieces(test::Random& random, const Scheme& scheme,
-                                                             double delay) {
-    const Fineness fine = random_fineness(random, samples_of(delay));
+                                                             double delay, Shapes shapes) {
+    const Fineness fine = random_fineness(random, samples_of(delay), shapes);
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
-    const Pieces pieces{0.0, step, random_forces(random, fine.nodes, step, random_slopes(random))};
+    const Pieces pieces{0.0, step, random_forces(random, fine.nodes, step, random_slopes(random, shapes), shapes)};
     DeviceProfile device = random_device(random, delay);
     limit_by(random, device, largest_of(pieces.points()));
     const auto need = certified_need(
@@ -176,8 +176,14 @@ template <class Force>
 [[nodiscard]] inline std::optional<Trial> draw_direct(test::Random& random, double delay) {
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
-    return random() % 2 == 0 ? draw_static_pieces(random, scheme, delay)
+    return random() % 2 == 0 ? draw_static_pieces(random, scheme, delay, Shapes::Any)
                              : draw_static_network(random, delay, false);
+}
+
+[[nodiscard]] inline std::optional<Trial> draw_direct_steep(test::Random& random, double delay) {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    return draw_static_pieces(random, scheme, delay, Shapes::Steep);
 }
 
 [[nodiscard]] inline std::optional<Trial> draw_spring_behind_coupling(test::Random& random, double delay) {
@@ -391,7 +397,8 @@ template <class Force>
 }
 
 /// A force at a position that is predicted from 1 to 3 samples; with an encoder, from 1 or 2.
-[[nodiscard]] inline std::optional<Trial> draw_prediction(test::Random& random, double delay, bool encoder) {
+[[nodiscard]] inline std::optional<Trial> draw_prediction(test::Random& random, double delay, bool encoder,
+                                                          Shapes shapes = Shapes::Any) {
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
     scheme.predict = 1 + static_cast<int>(random() % (encoder ? 2 : delay > 0.0 ? 2 : 3));
@@ -405,7 +412,7 @@ template <class Force>
         device.encoder_step = step;
         scene.read = encoder_grid(0.0, step, points, window == 1 ? 1 : 0);
     } else {
-        const bool far = random() % 2 == 0;
+        const bool far = shapes == Shapes::Steep || random() % 2 == 0;
         points = far ? (window == 1   ? 100
                         : window == 2 ? 60
                         : window == 3 ? 40
@@ -416,7 +423,7 @@ template <class Force>
                                       : 5);
         scene.read = even_grid(0.0, step, points, !far ? points : window < 3 ? 3 : 2);
     }
-    const Pieces pieces{0.0, step, random_forces(random, points, step, random_slopes(random))};
+    const Pieces pieces{0.0, step, random_forces(random, points, step, random_slopes(random, shapes), shapes)};
     limit_by(random, device, largest_of(pieces.points()));
     const auto need = certified_need(
         device, [&](const DeviceProfile& generous) { return certify(bounds_of(pieces), scheme, generous); });
