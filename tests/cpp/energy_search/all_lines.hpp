@@ -36,6 +36,11 @@ namespace palpate::energy_search {
         damping("direct, steep shapes", n < 1.1, draw_direct_steep);
         damping("hysteresis", n == 0.0, draw_hysteresis);
         damping("velocity", false, draw_velocity);
+        if (n > 0.0) {
+            damping("jitter", false, [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Any); });
+            damping("jitter, steep shapes", false,
+                    [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Steep); });
+        }
         damping("prediction, steep shapes", n == 0.0, [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
         damping("prediction", false,
                 [](R& random, double delay) { return draw_prediction(random, delay, false); });
@@ -66,6 +71,10 @@ namespace palpate::energy_search {
                  [](R& random, double delay) { return draw_encoder(random, delay, false); });
         friction("encoder, hysteresis", false,
                  [](R& random, double delay) { return draw_encoder(random, delay, true); });
+        friction("encoder, massless", false,
+                 [](R& random, double delay) { return draw_coupled_encoder(random, delay, false); });
+        friction("encoder, mass and spring", false,
+                 [](R& random, double delay) { return draw_coupled_encoder(random, delay, true); });
         friction("encoder, prediction", false,
                  [](R& random, double delay) { return draw_prediction(random, delay, true); });
         friction("force step", false, draw_force_step);

@@ -127,6 +127,33 @@ template <class Structure>
             need, text_of(scene)};
 }
 
+/// The same for the friction below which energy is taken out.
+template <class Structure>
+[[nodiscard]] Trial friction_trial(test::Random& random, Structure structure, const CoupledScene& scene,
+                                   const Need& need, int starts, int steps) {
+    const double period = scene.device.longest_period_s();
+    auto shared = std::make_shared<Structure>(std::move(structure));
+    struct Known {
+        double damping = -1.0;
+        double friction = 0.0;
+    };
+    auto known = std::make_shared<Known>();
+    return {[=, seed = random()](double damping_factor, double friction_factor) {
+                const double damping = damping_factor * need.damping / period;
+                if (known->damping != damping) {
+                    test::Random own{seed};
+                    MotionSearch<Structure> search{*shared, scene.places, scene.device.force_limit};
+                    const auto rate = [&](const Account& account) {
+                        return account.gain(damping, scene.places.held, 0.0);
+                    };
+                    known->damping = damping;
+                    known->friction = search.most(own, starts, steps, rate, rate);
+                }
+                return known->friction > friction_factor * need.friction;
+            },
+            need, text_of(scene)};
+}
+
 /// An object of straight pieces that holds finite energy.
 [[nodiscard]] inline Pieces closed_pieces(test::Random& random, int count, double step, Slopes slopes) {
     std::vector<double> forces = random_forces(random, count, step, slopes);
@@ -233,6 +260,56 @@ template <class Structure>
         return build(pair, bounds_of(pair));
     }
     return build(PieceObject{g}, bounds_of(g));
+}
+
+/// An encoder with steps in front of a coupling: objects without mass, and springs with mass.
+[[nodiscard]] inline std::optional<Trial> draw_coupled_encoder(test::Random& random, double delay, bool mass) {
+    CoupledScene scene;
+    const StructureKind kind = mass ? StructureKind::Implicit : StructureKind::Massless;
+    scene.device = random_device(random, delay);
+    scene.device.force_limit = std::numeric_limits<double>::infinity();
+    scene.places.delay = scene.device.whole_delay_samples();
+    scene.places.late = scene.device.delay_fraction();
+    const double period = scene.device.period_s;
+    const int count = 12;
+    const double step = std::exp(test::uniform(random, -6.0, -2.0));
+    const Slopes slopes = random_slopes(random);
+    const double slope = std::max(slopes.M, slopes.s);
+    const Pieces g = closed_pieces(random, count, step, slopes);
+    scene.scheme = random_coupling(random, kind, slope, period, Regime::Usual);
+    scene.device.encoder_step = scene.places.encoder_step = step * std::exp(test::uniform(random, -2.0, 1.0));
+    const auto force = [&](double x) { return mass ? slope * x : g.at(x).value; };
+    const Least least = least_energy(-5.0 * step * count, 6.0 * step * count, force);
+    const double start = scene.places.encoder_step * std::round(least.place / scene.places.encoder_step);
+    constexpr int parts = 1000;
+    for (int k = 0; k < parts; ++k) {
+        scene.places.held += force(least.place + (start - least.place) * (k + 0.5) / parts) * (start - least.place) / parts;
+    }
+    scene.places.held += 1e-6 * std::abs(scene.places.held);
+    scene.places.start = start;
+    scene.places.high = step * count;
+    scene.places.finest = 0.3 * scene.places.encoder_step;
+    scene.places.widest = 10.0 * scene.places.encoder_step;
+    ForceBounds bounds = bounds_of(g);
+    if (mass) {
+        bounds = {};
+        bounds.slope = {slope, slope};
+        bounds.steepest = bounds.sliding = slope;
+    }
+    scene.slopes = bounds.slope;
+    const auto need = certified_need(
+        scene.device, [&](const DeviceProfile& generous) { return certify(bounds, scene.scheme, generous); });
+    if (!need || need->damping <= 0.0 || need->friction <= 0.0) {
+        return std::nullopt;
+    }
+    constexpr int starts = 6;
+    constexpr int steps = 60;
+    if (mass) {
+        return friction_trial(random,
+                              Implicit{test::Spring{slope}, scene.scheme.inertia, scene.scheme.coupling, period}, scene,
+                              *need, starts, steps);
+    }
+    return friction_trial(random, Massless{PieceObject{g}, scene.scheme.coupling, period}, scene, *need, starts, steps);
 }
 
 }  // namespace palpate::energy_search

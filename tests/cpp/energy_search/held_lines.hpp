@@ -396,6 +396,42 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
+/// A static force on a device with jitter and a delay in seconds.
+[[nodiscard]] inline std::optional<Trial> draw_jitter(test::Random& random, double delay, Shapes shapes) {
+    DeviceProfile device = random_device(random, delay);
+    device.jitter_s = device.period_s * test::uniform(random, 0.02, 0.6);
+    const Clock clock{device.period_s, device.jitter_s, device.delay_s, 0.0};
+    const bool far = shapes == Shapes::Steep || random() % 2 == 0;
+    const int older = clock.older();
+    const int points = far ? (older == 1 ? 150 : older == 2 ? 60 : 30) : (older == 1 ? 20 : older == 2 ? 8 : 4);
+    const double step = std::exp(test::uniform(random, -6.0, -2.0));
+    const Pieces pieces{0.0, step, random_forces(random, points, step, random_slopes(random, shapes), shapes)};
+    limit_by(random, device, largest_of(pieces.points()));
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    const auto need = certified_need(
+        device, [&](const DeviceProfile& generous) { return certify(bounds_of(pieces), scheme, generous); });
+    if (!need || need->damping <= 0.0) {
+        return std::nullopt;
+    }
+    auto shared = std::make_shared<HeldScene>();
+    ReadGrid& read = shared->read;
+    for (int i = 0; i < 2 * points; ++i) {
+        read.grid.position.push_back(step * (i / 2));
+        read.count.push_back(i / 2);
+    }
+    read.reading = read.of_count = read.grid.position;
+    read.grid.reach = !far ? 2 * points - 1 : older > 2 ? 3 : 5;
+    shared->table = table_of(Direct{PieceObject{pieces}}, read, 0, sent_on(device));
+    shared->held = held_energy(read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
+    return Trial{[shared, clock, b = need->damping](double damping, double /*friction*/) {
+                     Clock here = clock;
+                     here.damping = b * damping;
+                     return ValueIteration{shared->read.grid, shared->table, here}.run(shared->held).violated();
+                 },
+                 *need};
+}
+
 /// A force at a position that is predicted from 1 to 3 samples; with an encoder, from 1 or 2.
 [[nodiscard]] inline std::optional<Trial> draw_prediction(test::Random& random, double delay, bool encoder,
                                                           Shapes shapes = Shapes::Any) {

@@ -151,6 +151,20 @@ struct Cost {
     }
 };
 
+/// A device whose samples are taken at k period + u_k, u_k either 0 or jitter, and whose commands act `delay` after
+/// their own samples. Each position of its grid has two nodes in a row, one for each u.
+struct Clock {
+    double period = 1.0;  ///< [s]
+    double jitter = 0.0;  ///< below the period [s]
+    double delay = 0.0;   ///< [s]
+    double damping = 0.0; ///< b [N*s/m or N*m*s/rad]
+
+    /// Number of samples before the present one whose commands can still act.
+    [[nodiscard]] int older() const noexcept {
+        return std::max(1, static_cast<int>(std::ceil((delay + jitter) / period)));
+    }
+};
+
 /// The most energy that a motion takes out, found by value iteration.
 struct Finding {
     double taken = 0.0;      ///< largest of -E - (S_0 - S_min) over the starts at rest [J]
@@ -176,6 +190,19 @@ class ValueIteration {
           value_(windows_.count() * plays_, 0.0),
           policy_(value_.size(), none) {
         fill();
+    }
+
+    /// The same with a clock: the table is that of a static force.
+    ValueIteration(const Grid& grid, const ForceTable& table, const Clock& clock)
+        : grid_{grid},
+          table_{&table},
+          cost_{},
+          windows_{grid, clock.older()},
+          nodes_{grid.nodes()},
+          plays_{1},
+          value_(windows_.count(), 0.0),
+          policy_(value_.size(), none) {
+        fill(clock);
     }
 
     /// `held[i]` is S_0 - S_min at node i, at rest. Stops at the first motion that takes energy out.
@@ -262,11 +289,58 @@ class ValueIteration {
                 largest_force_ = std::max(largest_force_, std::abs(now_[state]));
             }
         }
+        measure_moves();
+    }
+
+    void measure_moves() noexcept {
         for (int i = 0; i < nodes_; ++i) {
             for (int jump = -grid_.reach; jump <= grid_.reach; ++jump) {
                 longest_move_ = std::max(longest_move_, can_move(i, jump) ? std::abs(move(i, jump)) : 0.0);
             }
         }
+    }
+
+    /// What a sample from each state to each of both u costs.
+    struct Sample {
+        double force = 0.0;    ///< mean over the sample
+        double damping = 0.0;  ///< b over its length
+        double uneven = 0.0;   ///< gained by an uneven path while the force changes [J]
+    };
+
+    void fill(const Clock& clock) {
+        now_.assign(value_.size(), 0.0);
+        exists_.assign(value_.size(), 0);
+        next_play_.assign(value_.size(), 0);
+        samples_.resize(2 * value_.size());
+        const int older = windows_.older();
+        for (std::size_t window = 0; window < windows_.count(); ++window) {
+            const Windows::Nodes w = windows_.nodes_of(window);
+            if (!windows_.exists(w)) {
+                continue;
+            }
+            exists_[window] = 1;
+            const auto taken = [&](int k) { return -k * clock.period + (w.node[k] % 2) * clock.jitter; };
+            const auto force = [&](int k) { return table_->of[static_cast<std::size_t>(w.node[k])]; };
+            largest_force_ = std::max(largest_force_, std::abs(force(0)));
+            for (std::size_t u = 0; u < 2; ++u) {
+                const double end = clock.period + static_cast<double>(u) * clock.jitter;
+                const double length = end - taken(0);
+                double work = 0.0;
+                double square = 0.0;
+                for (int k = older; k >= 0; --k) {  // the command of sample k acts until that of the next one does
+                    const double from = k == older ? taken(0) : std::max(taken(0), taken(k) + clock.delay);
+                    const double to = k == 0 ? end : std::min(end, taken(k - 1) + clock.delay);
+                    if (to > from) {
+                        work += force(k) * (to - from);
+                        square += force(k) * force(k) * (to - from);
+                    }
+                }
+                const double mean = work / length;
+                samples_[2 * window + u] = {mean, clock.damping / length,
+                                            std::max(0.0, square - mean * work) / (4.0 * clock.damping)};
+            }
+        }
+        measure_moves();
     }
 
     [[nodiscard]] bool can_move(int from, int jump) const noexcept {
@@ -303,7 +377,12 @@ class ValueIteration {
     }
 
     [[nodiscard]] double paid(std::size_t state, int jump) const noexcept {
-        return cost_.of_move(move(place(state), jump), old_.empty() ? 0.0 : old_[state], now_[state]);
+        const double d = move(place(state), jump);
+        if (!samples_.empty()) {
+            const Sample& sample = samples_[2 * state + static_cast<std::size_t>(target(place(state), jump) % 2)];
+            return (sample.force + sample.damping * d) * d - sample.uneven;
+        }
+        return cost_.of_move(d, old_.empty() ? 0.0 : old_[state], now_[state]);
     }
 
     /// Improves every state once; the largest improvement.
@@ -326,7 +405,7 @@ class ValueIteration {
                 const std::size_t next = play_is_new_ ? after(state, jump)
                                                       : base + static_cast<std::size_t>(target(from, jump)) *
                                                                    windows_.stride() * plays_;
-                const double total = cost_.of_move(move(from, jump), old, now) + value_[next];
+                const double total = (samples_.empty() ? cost_.of_move(move(from, jump), old, now) : paid(state, jump)) + value_[next];
                 if (total < best) {
                     best = total;
                     chosen = jump;
@@ -391,6 +470,7 @@ class ValueIteration {
     std::vector<std::int16_t> policy_;
     std::vector<double> now_;
     std::vector<double> old_;
+    std::vector<Sample> samples_;
     std::vector<std::uint8_t> exists_;
     std::vector<std::size_t> next_play_;
 };
