@@ -68,14 +68,16 @@ void tick(benchmark::State& state, const palpate::ForceModel& model, palpate::St
     scheme.structure = kind;
     scheme.compensated = compensated;
     scheme.play_radius = model.hysteresis() != nullptr ? 0.005 : 0.0;
-    palpate::with_structure(model, scheme, 1e-3, 5.0, [&](auto structure) {
+    palpate::with_structure(model, scheme, 1e-3, 50.0, [&](auto structure) {
         Playback device{palpate::bench::hand_motion(4000)};
         palpate::GuardSettings settings;
         settings.force_limit = 50.0;
         palpate::Controller controller{
             device, std::move(structure),
-            palpate::Guards{palpate::force_limit(settings), palpate::slew_limit(settings, 1e-3),
-                            palpate::force_ramp(settings, 1e-3), palpate::reading_guard(settings, 1e-3)}};
+            palpate::Guards{.reading = palpate::reading_guard(settings, 1e-3),
+                            .limit = palpate::force_limit(settings),
+                            .ramp = palpate::force_ramp(settings, 1e-3),
+                            .slew = palpate::slew_limit(settings, 1e-3)}};
         (void)controller.start();
         for (auto _ : state) {
             benchmark::DoNotOptimize(controller.tick());

@@ -827,10 +827,10 @@ def steepest_stick(device: DeviceProfile) -> float:
     """
     Slope h / r that leaves half of what the device holds to sliding.
     """
-def stiffest_coupling(*, mass: bool, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+def stiffest_coupling(*, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
     """
     Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
-    `damping` is B_c; `falling` the steepest fall of the object's force. With mass the force limit counts.
+    `damping` is B_c; `falling` the steepest fall of the object's force.
     """
 def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """

@@ -93,15 +93,27 @@ TEST(Certificate, PredictionOfALateForceCanNeedLessThanNone) {
     }
 }
 
-TEST(Certificate, PredictionOfALateForceWithJitterCostsHalfOfItsSteepestSlope) {
-    Scheme scheme = scheme_of(StructureKind::Direct);
-    DeviceProfile device = smooth(10.0);
-    device.delay_s = 1.3e-3;
-    device.jitter_s = 1e-4;
-    const double held = certify(slopes(-80.0, 62.0), scheme, device).inequalities[0].right;
-    scheme.predict = 4;
-    const double predicted = certify(slopes(-80.0, 62.0), scheme, device).inequalities[0].right;
-    EXPECT_NEAR(predicted, held + 0.5 * 80.0 * device.longest_period_s(), 1e-12);
+TEST(Certificate, JitterOfALateDeviceRaisesTheNeedOfAPredictionLittleByLittle) {
+    const SlopeRange slope{62.0, 80.0};
+    for (const double delay : {0.3e-3, 1.0e-3, 1.3e-3, 2.0e-3}) {
+        for (const int predict : {1, 4}) {
+            DeviceProfile device = smooth(10.0);
+            device.delay_s = delay;
+            const double steady = device.period_s * predicted_need(device, predict, slope);
+            double before = steady;
+            for (const double jitter : {1e-12, 1e-6, 1e-5, 1e-4, 3e-4}) {
+                device.jitter_s = jitter;
+                const double now = device.longest_period_s() * predicted_need(device, predict, slope);
+                const double most = device.longest_period_s() * (device_need(device, slope) + 0.5 * 80.0);
+                EXPECT_LE(now, most) << delay << " " << predict << " " << jitter;
+                EXPECT_GE(now, before * (1.0 - 2e-4)) << delay << " " << predict << " " << jitter;
+                before = now;
+            }
+            device.jitter_s = 1e-12;
+            EXPECT_NEAR(device.longest_period_s() * predicted_need(device, predict, slope), steady,
+                        1e-3 * steady);
+        }
+    }
 }
 
 TEST(Certificate, PredictionRaisesTheErrorOfTheEncoder) {

@@ -73,6 +73,16 @@ TEST(FailureMaps, NothingFailsBeforeItsBoundWhereTheForceFalls) {
     EXPECT_GE(ratios(falling_map(test::cases(3)), 0, 1, 10.0).lower, 1.0);
 }
 
+// spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+TEST(FailureMaps, AForceLimitOutsideTheStepMakesAMotorOfAMassAndInsideItDoesNot) {
+    const FailureMap map = limit_map(6);
+    EXPECT_LT(map.lines[0].measured.back(), -1.9);
+    for (std::size_t k = 0; k < map.lines[0].at.size(); ++k) {
+        EXPECT_GT(map.lines[1].measured[k], 0.0);
+        EXPECT_GT(map.lines[2].measured[k], 0.0);
+    }
+}
+
 // spec section 5: "uniqueness: p + min f' > 0; fixed-point iteration converges if L < p"
 TEST(FailureMaps, SolversFailWhereTheoryPutsIt) {
     expect_between(ratios(solver_map(3), 0, 2), 0.999, 1.001);

@@ -33,8 +33,10 @@ template <Device D, Structure S, class Watch>
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
     Controller controller{device, std::move(moves),
-                          Guards{force_limit(guards), slew_limit(guards, period_s),
-                                 force_ramp(guards, period_s), reading_guard(guards, period_s)}};
+                          Guards{.reading = reading_guard(guards, period_s),
+                                 .limit = force_limit(guards),
+                                 .ramp = force_ramp(guards, period_s),
+                                 .slew = slew_limit(guards, period_s)}};
     return run_session(controller, settings, outlets, asked, watch);
 }
 

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/failure/failure_map.hpp"
@@ -86,8 +88,8 @@ inline constexpr double coupling_time = 0.2e-3;
 }
 
 /// How steeply an object may fall behind a coupling, over the coupling's stiffness, on a device that the
-/// coupling just suits. The bounds are sufficient: K_c + B_c/T without mass, K_c + (B_c + 2 B_o)/T with mass and
-/// backward Euler.
+/// coupling just suits and whose force limit is never reached. The bounds are sufficient: K_c + B_c/T without mass,
+/// K_c + (B_c + 2 B_o)/T with mass and backward Euler.
 [[nodiscard]] inline FailureMap falling_map(int points) {
     constexpr double width = 0.1;  // of the snap [rad]
     const double period = smooth_knob().period_s;
@@ -128,6 +130,73 @@ inline constexpr double coupling_time = 0.2e-3;
     });
     add("implicit, B_o = 0.02", 0.02, [&](const auto& object, VirtualCoupling coupling) {
         return Implicit{object, Inertia{0.001, 0.02}, coupling, period, solver};
+    });
+    return map;
+}
+
+namespace detail {
+
+/// Work of a hand that throws a free mass [J]: it winds up the coupling, lets the mass fly, then slows it down with a
+/// spring just below the device's force limit. The device clips the structure's force.
+template <Structure S>
+[[nodiscard]] double work_of_a_throw(S structure, VirtualCoupling coupling, const DeviceProfile& device,
+                                     double wound_up) {
+    constexpr int winding = 60;  // samples
+    constexpr int most_slowing = 4000;
+    const double limit = device.force_limit;
+    double work = 0.0;
+    double x = 0.0;
+    structure.reset(x);
+    Rendered now = structure.step(x);
+    const auto move = [&](double to) {
+        const double d = to - x;
+        work += std::clamp(now.force, -limit, limit) * d + device.viscous_damping / device.period_s * d * d;
+        x = to;
+        now = structure.step(x);
+    };
+    for (int k = 0; k < winding; ++k) {
+        move(x + wound_up / winding);
+    }
+    double before = now.environment_position - 1.0;
+    while (now.environment_position < x + limit / coupling.stiffness && now.environment_position > before) {
+        before = now.environment_position;
+        move(x);
+    }
+    for (int k = 0; k < most_slowing && now.environment_position >= before; ++k) {
+        before = now.environment_position;
+        move(std::max(x, before - 0.99 * limit / coupling.stiffness));
+    }
+    return work;
+}
+
+}  // namespace detail
+
+/// Work of a hand that throws a mass behind a coupling, over how far it winds the coupling up: with the force limit
+/// inside the step, for device and object, and outside of it, for the device only. Below 0 the hand gets energy.
+[[nodiscard]] inline FailureMap limit_map(int points) {
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    const Inertia mass{0.05, 0.0};
+    const VirtualCoupling coupling{90.0, 0.0};
+    DeviceProfile device = smooth_knob();
+    device.viscous_damping = device.period_s * coupling_need(coupling, device.period_s, 0);
+    FailureMap map{"limit", "wind-up of the coupling [rad]", "work of the hand [N*m*rad]", {}};
+    map.linear = true;
+    const auto add = [&](const char* name, auto build) {
+        FailureLine line{name, logarithmic(0.05, 0.6, points), {}, {}};
+        for (const double wound_up : line.at) {
+            line.measured.push_back(detail::work_of_a_throw(build(), coupling, device, wound_up));
+            line.theory.push_back(std::numeric_limits<double>::quiet_NaN());
+        }
+        map.lines.push_back(std::move(line));
+    };
+    const auto implicit = [&](double limit) {
+        return Implicit<LinearObject>{LinearObject{}, mass, coupling, device.period_s, {}, limit};
+    };
+    add("limit outside the step", [&] { return implicit(infinite); });
+    add("limit inside, implicit", [&] { return implicit(device.force_limit); });
+    add("limit inside, energy-consistent", [&] {
+        return EnergyConsistent{LinearObject{}, mass, coupling,          device.period_s,
+                                1e-4,           true, device.force_limit};
     });
     return map;
 }

@@ -22,7 +22,7 @@ struct NamedFailureMap {
 };
 
 /// Every map that can be measured.
-inline constexpr std::array<NamedFailureMap, 13> failure_maps{{{"explicit", explicit_map},
+inline constexpr std::array<NamedFailureMap, 14> failure_maps{{{"explicit", explicit_map},
                                                                {"damping", damping_map},
                                                                {"prediction", prediction_map},
                                                                {"period", period_map},
@@ -30,6 +30,7 @@ inline constexpr std::array<NamedFailureMap, 13> failure_maps{{{"explicit", expl
                                                                {"play", play_map},
                                                                {"coupling", coupling_map},
                                                                {"falling", falling_map},
+                                                               {"limit", limit_map},
                                                                {"coupled-encoder", coupled_encoder_map},
                                                                {"hand", hand_map},
                                                                {"solver", solver_map},

@@ -147,7 +147,7 @@ struct Least {
 };
 template <class Function>
 [[nodiscard]] Least least_between(double low, double high, Function function) {
-    constexpr int steps = 56;  // to 2e-12 of the interval
+    constexpr int steps = 40;  // to 4e-9 of the interval
     constexpr double golden = 0.6180339887498949;
     double left = high - golden * (high - low);
     double right = low + golden * (high - low);
@@ -177,7 +177,7 @@ template <class Function>
 template <class Gain = FilterGain, class Cost>
 [[nodiscard]] double least_cost(std::span<const double> taps, SlopeRange slopes, Cost cost) {
     constexpr double weight = 1e-8;
-    const Gain rough{taps, Maximum::Likely, 16};
+    const Gain rough{taps, Maximum::Likely, 8};
     const double slope = slopes.rising + slopes.falling;
     const double highest = 8.0 * slope / rough.size();
     const auto least_over_gamma = [&](double l) {
@@ -265,9 +265,8 @@ class SplitGain {
     [[nodiscard]] double size() const noexcept { return size_; }
 
     /// Largest eigenvalue over all frequencies of the form of both parts, with a gamma for each.
-    [[nodiscard]] double most(double fraction, SlopeRange slopes, double l, double gamma_first,
+    [[nodiscard]] double most(double fraction, double rest, SlopeRange slopes, double l, double gamma_first,
                               double gamma_second) const noexcept {
-        const double rest = 1.0 - fraction;
         const double first = step_energy(slopes, l, gamma_first);
         const double second = step_energy(slopes, l, gamma_second);
         const auto eigenvalue = [&](std::size_t k) {
@@ -298,20 +297,45 @@ class SplitGain {
 /// The same for a static force whose command, computed at x_k - q_k, acts a further fraction tau of a sample late:
 /// during the first part of a sample, in which the handle moves by alpha, the command before. Each part is a step of
 /// its own, alpha^2 h(q' / alpha) and beta^2 h((q + alpha) / beta), against B (alpha^2 / tau + beta^2 / (1 - tau)).
-[[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes) {
+/// `rest`: 1 - tau; where the instant between both parts varies, tau and `rest` are the longest of each.
+[[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes,
+                                          double rest) {
     if (!(fraction > 0.0) || !(slopes.steepest() > 0.0) || !std::isfinite(slopes.rising + slopes.falling)) {
         return filtered_need(taps, slopes);
     }
     const auto least = [&](double gamma_first, double gamma_second) {
         return detail::least_cost<detail::SplitGain>(
             taps, slopes, [&](const detail::SplitGain& gain, double l, double gamma) {
-                return gain.most(fraction, slopes, l, gamma_first * gamma, gamma_second * gamma);
+                return gain.most(fraction, rest, slopes, l, gamma_first * gamma, gamma_second * gamma);
             });
     };
-    return std::min(least(fraction, 1.0 - fraction), least(std::sqrt(fraction), std::sqrt(1.0 - fraction)));
+    return std::min(least(fraction, rest), least(std::sqrt(fraction), std::sqrt(rest)));
+}
+[[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes) {
+    return filtered_need(taps, fraction, slopes, 1.0 - fraction);
 }
 
 namespace detail {
+
+/// The need of a filter that leaves out the motion during a time of at most nu T around each sample, which enters q
+/// up to `gain` times.
+[[nodiscard]] inline double roughly_filtered_need(std::span<const double> taps, double gain, double nu,
+                                                  SlopeRange slopes) {
+    const double off = gain * std::sqrt(nu);
+    const double eta = off / size_of(taps);
+    return least_cost(taps, slopes, [&](const FilterGain& filter, double l, double gamma) {
+        return step_energy(slopes, l, gamma) + filter.most(l, gamma * (1.0 + eta)) +
+               gamma * (1.0 + 1.0 / eta) * off * off + std::abs(l) * off;
+    });
+}
+
+/// nu of `roughly_filtered_need`: the time between a sample and the instant `delay` after the one `whole` before it,
+/// times the number of such times that can overlap, over T.
+[[nodiscard]] inline double uncertain_time(double delay, double period, double jitter, int whole) noexcept {
+    const double off = std::abs(delay - whole * period);
+    const double span = off + jitter + std::max(0.0, jitter - off);
+    return (off + jitter) * std::ceil(span / (period - jitter)) / (period + jitter);
+}
 
 /// The need with samples at k period + u_k, 0 <= u_k <= jitter, and each command acting `delay` after its sample:
 /// the smaller of R(Lambda) and the line for n samples of delay with what the rest of the delay, at most a time
@@ -332,16 +356,9 @@ namespace detail {
     if (jitter >= period || whole == 0 || !(slopes.steepest() > 0.0) || !std::isfinite(simple)) {
         return simple;
     }
-    const double off = std::abs(delay - whole * period);
-    const double span = off + jitter + std::max(0.0, jitter - off);
-    const double nu = (off + jitter) * std::ceil(span / (period - jitter)) / T;
     const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
-    const double eta = std::sqrt(nu) / whole;
-    const double sharp = least_cost(taps, slopes, [&](const FilterGain& gain, double l, double gamma) {
-        return step_energy(slopes, l, gamma) + gain.most(l, gamma * (1.0 + eta)) +
-               gamma * (1.0 + 1.0 / eta) * nu + std::abs(l) * std::sqrt(nu);
-    });
-    return std::min(simple, sharp);
+    const double nu = uncertain_time(delay, period, jitter, whole);
+    return std::min(simple, roughly_filtered_need(taps, 1.0, nu, slopes));
 }
 
 }  // namespace detail

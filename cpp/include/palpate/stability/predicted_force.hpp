@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -28,25 +29,44 @@ namespace palpate {
     return device_need(device, slopes) + 0.5 * slopes.steepest();
 }
 
-/// b / T that a static force held at a predicted position needs: R(1/2) or less without delay; with delay often less
-/// than without prediction. The larger of whole and fractional delay, because a delay may be shorter than stated.
-[[nodiscard]] inline double predicted_need(const DeviceProfile& device, int predict, SlopeRange slopes) {
-    const double simple = predicted_path_need(device, slopes);
-    if (device.jitter_s > 0.0 && device.late_samples() > 0) {
-        return simple;
-    }
-    const std::vector<double> taps = prediction_taps(device.whole_delay_samples(), predict);
-    double sharp = filtered_need(taps, slopes);
-    if (device.delay_fraction() > 0.0) {
-        sharp = std::max(sharp, filtered_need(taps, device.delay_fraction(), slopes));
-    }
-    return std::min(simple, sharp);
-}
-
 /// Largest error of a predicted position over that of the encoder, (m + 3) / (m + 1): the last sample counts
 /// (m + 2) / (m + 1) times, the m before it 1 / (m + 1) together.
 [[nodiscard]] constexpr double predicted_encoder_gain(int predict) noexcept {
     return predict > 0 ? (predict + 3.0) / (predict + 1.0) : 1.0;
+}
+
+/// b / T that a static force held at a predicted position needs: R(1/2) or less without delay; with delay often less
+/// than without prediction.
+///
+/// With jitter the instant at which a command begins to act moves by up to the jitter within its sample. Where it can
+/// leave the sample, the delay counts as the nearest whole samples and the rest as unknown motion.
+[[nodiscard]] inline double predicted_need(const DeviceProfile& device, int predict, SlopeRange slopes) {
+    const double simple = predicted_path_need(device, slopes);
+    if (!(slopes.steepest() > 0.0) || !std::isfinite(simple)) {
+        return simple;
+    }
+    const double P = device.period_s;
+    const double T = device.longest_period_s();
+    const double fraction = device.delay_fraction();
+    const double moves = device.late_samples() > 0 ? device.jitter_s : 0.0;
+    const int whole = device.whole_delay_samples();
+    if (fraction == 0.0 && moves == 0.0) {
+        return std::min(simple, filtered_need(prediction_taps(whole, predict), slopes));
+    }
+    if (whole == 0 ? device.delay_s <= P - moves : moves <= std::min(fraction, 1.0 - fraction) * P) {
+        const double uncertain = whole == 0 ? 0.0 : moves;
+        const std::vector<double> taps = prediction_taps(whole, predict);
+        const double split =
+            filtered_need(taps, (fraction * P + uncertain) / T, slopes, ((1.0 - fraction) * P + moves) / T);
+        return std::min(simple, std::max(filtered_need(taps, slopes), split));  // a delay may be shorter
+    }
+    if (moves >= P) {
+        return simple;
+    }
+    const int nearest = static_cast<int>(std::lround(device.delay_s / P));
+    const double nu = detail::uncertain_time(device.delay_s, P, moves, nearest);
+    return std::min(simple, detail::roughly_filtered_need(prediction_taps(nearest, predict),
+                                                          predicted_encoder_gain(predict), nu, slopes));
 }
 
 }  // namespace palpate
