@@ -37,11 +37,13 @@ namespace palpate::energy_search {
         damping("hysteresis", n == 0.0, draw_hysteresis);
         damping("velocity", false, draw_velocity);
         if (n > 0.0) {
-            damping("jitter", false, [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Any); });
+            damping("jitter", false,
+                    [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Any); });
             damping("jitter, steep shapes", false,
                     [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Steep); });
         }
-        damping("prediction, steep shapes", n == 0.0, [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
+        damping("prediction, steep shapes", n == 0.0,
+                [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
         damping("prediction", false,
                 [](R& random, double delay) { return draw_prediction(random, delay, false); });
         damping("wheel", false, [](R& random, double delay) { return draw_wheel(random, delay, false); });

@@ -263,7 +263,8 @@ template <class Structure>
 }
 
 /// An encoder with steps in front of a coupling: objects without mass, and springs with mass.
-[[nodiscard]] inline std::optional<Trial> draw_coupled_encoder(test::Random& random, double delay, bool mass) {
+[[nodiscard]] inline std::optional<Trial> draw_coupled_encoder(test::Random& random, double delay,
+                                                               bool mass) {
     CoupledScene scene;
     const StructureKind kind = mass ? StructureKind::Implicit : StructureKind::Massless;
     scene.device = random_device(random, delay);
@@ -283,7 +284,8 @@ template <class Structure>
     const double start = scene.places.encoder_step * std::round(least.place / scene.places.encoder_step);
     constexpr int parts = 1000;
     for (int k = 0; k < parts; ++k) {
-        scene.places.held += force(least.place + (start - least.place) * (k + 0.5) / parts) * (start - least.place) / parts;
+        scene.places.held +=
+            force(least.place + (start - least.place) * (k + 0.5) / parts) * (start - least.place) / parts;
     }
     scene.places.held += 1e-6 * std::abs(scene.places.held);
     scene.places.start = start;
@@ -305,11 +307,12 @@ template <class Structure>
     constexpr int starts = 6;
     constexpr int steps = 60;
     if (mass) {
-        return friction_trial(random,
-                              Implicit{test::Spring{slope}, scene.scheme.inertia, scene.scheme.coupling, period}, scene,
-                              *need, starts, steps);
+        return friction_trial(
+            random, Implicit{test::Spring{slope}, scene.scheme.inertia, scene.scheme.coupling, period}, scene,
+            *need, starts, steps);
     }
-    return friction_trial(random, Massless{PieceObject{g}, scene.scheme.coupling, period}, scene, *need, starts, steps);
+    return friction_trial(random, Massless{PieceObject{g}, scene.scheme.coupling, period}, scene, *need,
+                          starts, steps);
 }
 
 }  // namespace palpate::energy_search

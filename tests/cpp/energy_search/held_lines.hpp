@@ -95,7 +95,8 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
                                                              double delay, Shapes shapes) {
     const Fineness fine = random_fineness(random, samples_of(delay), shapes);
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
-    const Pieces pieces{0.0, step, random_forces(random, fine.nodes, step, random_slopes(random, shapes), shapes)};
+    const Pieces pieces{0.0, step,
+                        random_forces(random, fine.nodes, step, random_slopes(random, shapes), shapes)};
     DeviceProfile device = random_device(random, delay);
     limit_by(random, device, largest_of(pieces.points()));
     const auto need = certified_need(
@@ -403,9 +404,15 @@ template <class Force>
     const Clock clock{device.period_s, device.jitter_s, device.delay_s, 0.0};
     const bool far = shapes == Shapes::Steep || random() % 2 == 0;
     const int older = clock.older();
-    const int points = far ? (older == 1 ? 150 : older == 2 ? 60 : 30) : (older == 1 ? 20 : older == 2 ? 8 : 4);
+    const int points = far ? (older == 1   ? 150
+                              : older == 2 ? 60
+                                           : 30)
+                           : (older == 1   ? 20
+                              : older == 2 ? 8
+                                           : 4);
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
-    const Pieces pieces{0.0, step, random_forces(random, points, step, random_slopes(random, shapes), shapes)};
+    const Pieces pieces{0.0, step,
+                        random_forces(random, points, step, random_slopes(random, shapes), shapes)};
     limit_by(random, device, largest_of(pieces.points()));
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
@@ -424,12 +431,13 @@ template <class Force>
     read.grid.reach = !far ? 2 * points - 1 : older > 2 ? 3 : 5;
     shared->table = table_of(Direct{PieceObject{pieces}}, read, 0, sent_on(device));
     shared->held = held_energy(read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
-    return Trial{[shared, clock, b = need->damping](double damping, double /*friction*/) {
-                     Clock here = clock;
-                     here.damping = b * damping;
-                     return ValueIteration{shared->read.grid, shared->table, here}.run(shared->held).violated();
-                 },
-                 *need};
+    return Trial{
+        [shared, clock, b = need->damping](double damping, double /*friction*/) {
+            Clock here = clock;
+            here.damping = b * damping;
+            return ValueIteration{shared->read.grid, shared->table, here}.run(shared->held).violated();
+        },
+        *need};
 }
 
 /// A force at a position that is predicted from 1 to 3 samples; with an encoder, from 1 or 2.
@@ -459,7 +467,8 @@ template <class Force>
                                       : 5);
         scene.read = even_grid(0.0, step, points, !far ? points : window < 3 ? 3 : 2);
     }
-    const Pieces pieces{0.0, step, random_forces(random, points, step, random_slopes(random, shapes), shapes)};
+    const Pieces pieces{0.0, step,
+                        random_forces(random, points, step, random_slopes(random, shapes), shapes)};
     limit_by(random, device, largest_of(pieces.points()));
     const auto need = certified_need(
         device, [&](const DeviceProfile& generous) { return certify(bounds_of(pieces), scheme, generous); });

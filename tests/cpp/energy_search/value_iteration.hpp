@@ -154,10 +154,10 @@ struct Cost {
 /// A device whose samples are taken at k period + u_k, u_k either 0 or jitter, and whose commands act `delay` after
 /// their own samples. Each position of its grid has two nodes in a row, one for each u.
 struct Clock {
-    double period = 1.0;  ///< [s]
-    double jitter = 0.0;  ///< below the period [s]
-    double delay = 0.0;   ///< [s]
-    double damping = 0.0; ///< b [N*s/m or N*m*s/rad]
+    double period = 1.0;   ///< [s]
+    double jitter = 0.0;   ///< below the period [s]
+    double delay = 0.0;    ///< [s]
+    double damping = 0.0;  ///< b [N*s/m or N*m*s/rad]
 
     /// Number of samples before the present one whose commands can still act.
     [[nodiscard]] int older() const noexcept {
@@ -327,7 +327,8 @@ class ValueIteration {
                 const double length = end - taken(0);
                 double work = 0.0;
                 double square = 0.0;
-                for (int k = older; k >= 0; --k) {  // the command of sample k acts until that of the next one does
+                for (int k = older; k >= 0;
+                     --k) {  // the command of sample k acts until that of the next one does
                     const double from = k == older ? taken(0) : std::max(taken(0), taken(k) + clock.delay);
                     const double to = k == 0 ? end : std::min(end, taken(k - 1) + clock.delay);
                     if (to > from) {
@@ -379,7 +380,8 @@ class ValueIteration {
     [[nodiscard]] double paid(std::size_t state, int jump) const noexcept {
         const double d = move(place(state), jump);
         if (!samples_.empty()) {
-            const Sample& sample = samples_[2 * state + static_cast<std::size_t>(target(place(state), jump) % 2)];
+            const Sample& sample =
+                samples_[2 * state + static_cast<std::size_t>(target(place(state), jump) % 2)];
             return (sample.force + sample.damping * d) * d - sample.uneven;
         }
         return cost_.of_move(d, old_.empty() ? 0.0 : old_[state], now_[state]);
@@ -405,7 +407,9 @@ class ValueIteration {
                 const std::size_t next = play_is_new_ ? after(state, jump)
                                                       : base + static_cast<std::size_t>(target(from, jump)) *
                                                                    windows_.stride() * plays_;
-                const double total = (samples_.empty() ? cost_.of_move(move(from, jump), old, now) : paid(state, jump)) + value_[next];
+                const double total =
+                    (samples_.empty() ? cost_.of_move(move(from, jump), old, now) : paid(state, jump)) +
+                    value_[next];
                 if (total < best) {
                     best = total;
                     chosen = jump;
