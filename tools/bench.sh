@@ -18,7 +18,7 @@ processor=$(awk -F': ' '/^model name/ { print $2; exit }' /proc/cpuinfo 2>/dev/n
 compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' build/release/CMakeCache.txt)
 flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCache.txt)
 
-for source in bench/*.cpp; do
+for source in bench/bench_*.cpp; do
     name=$(basename "$source" .cpp)
     "build/release/bench/$name" \
         --benchmark_min_time="$seconds" --benchmark_repetitions="$repetitions" \
@@ -32,6 +32,8 @@ for source in bench/*.cpp; do
         exit 1
     fi
 done
+"build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 100 * scale) }')" |
+    tee build/bench/certificate_search.txt
 .venv/bin/python bench/python_calls.py build/bench/bench_python_calls.json
 .venv/bin/python bench/model_error.py build/bench/bench_model_error.json
 .venv/bin/python bench/ratios.py build/bench

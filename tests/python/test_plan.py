@@ -246,6 +246,26 @@ def test_an_object_with_mass_is_implicit_where_the_encoder_has_no_steps_and_else
     assert "no bound is known" in reasons["implicit"]
 
 
+def test_a_falling_object_with_mass_is_stepped_energy_consistently_because_of_the_force_limit() -> None:
+    falling = model_by_hand(weight=[0.3])
+    chosen = plan(falling, SMOOTH, mass=1e-3)
+    assert chosen.structure == "energy-consistent"
+    reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
+    assert "use the energy-consistent structure" in reasons["implicit"]
+    damped = plan(falling, SMOOTH, mass=1e-3, damping=0.01)
+    assert damped.structure == "implicit", "2 B_o / T = 20 is above its steepest fall"
+
+
+def test_the_coupling_is_softer_on_a_late_device_and_still_certified() -> None:
+    stiffness = []
+    for delay_s in (0.0, 0.5e-3, 1e-3, 2e-3):
+        chosen = plan(model_by_hand(), DeviceProfile(id="late", encoder_step=0.0, delay_s=delay_s), mass=1e-3)
+        assert chosen.structure == "implicit"
+        stiffness.append(chosen.scheme.coupling_stiffness)
+    assert stiffness == sorted(stiffness, reverse=True)
+    assert stiffness[3] < 0.3 * stiffness[0]
+
+
 def test_a_plan_is_stored_and_holds_for_its_device_alone(tmp_path: Path) -> None:
     path = plan(model_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
     again = Plan.of(load_model(path))

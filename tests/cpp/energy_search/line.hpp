@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "../support.hpp"
+#include "palpate/stability/certificate.hpp"
+
+namespace palpate::energy_search {
+
+/// What a certificate asks of the device.
+struct Need {
+    double damping = 0.0;   ///< b [N*s/m or N*m*s/rad]
+    double friction = 0.0;  ///< f_c [N or N*m]
+};
+
+/// The least damping and friction that `certify` accepts. Nothing where it refuses whatever the device has.
+template <class Certify>
+[[nodiscard]] std::optional<Need> certified_need(DeviceProfile device, const Certify& certify) {
+    constexpr double any_damping = 1.2345e6;
+    constexpr double any_friction = 5.4321e6;
+    device.viscous_damping = any_damping;
+    device.coulomb_friction = any_friction;
+    const Certificate generous = certify(std::as_const(device));
+    if (!generous.certified()) {
+        return std::nullopt;
+    }
+    Need need;
+    for (const Inequality& line : generous.inequalities) {
+        if (line.left == any_damping) {
+            need.damping = std::max(need.damping, line.right);
+        } else if (line.left == any_friction) {
+            need.friction = std::max(need.friction, line.right);
+        }
+    }
+    return need;
+}
+
+/// The same with a little less friction, where `certify` then knows another line that needs more damping.
+template <class Certify>
+[[nodiscard]] std::optional<Need> need_at_less_friction(DeviceProfile device, const Need& need,
+                                                        const Certify& certify) {
+    constexpr double any_damping = 1.2345e6;
+    device.viscous_damping = any_damping;
+    device.coulomb_friction = need.friction * (1.0 - 1e-6);
+    const Certificate certificate = certify(std::as_const(device));
+    if (!certificate.certified()) {
+        return std::nullopt;
+    }
+    Need other;
+    for (const Inequality& line : certificate.inequalities) {
+        if (line.left == any_damping) {
+            other.damping = std::max(other.damping, line.right);
+        } else if (line.left == device.coulomb_friction) {
+            other.friction = std::max(other.friction, line.right);
+        }
+    }
+    return other;
+}
+
+/// A certified scene. `takes_energy` searches it on a device with the given multiples of what is needed.
+struct Trial {
+    std::function<bool(double damping, double friction)> takes_energy;
+    Need need;
+    std::string text{};  ///< the scene in words
+};
+
+enum class Part { Damping, Friction };
+
+/// A line of the certificate and the scenes that try it.
+struct Line {
+    std::string name;
+    double delay = 0.0;  ///< [samples]
+    Part part = Part::Damping;
+    bool tight = false;  ///< some motion comes close to the bound in at least half of the scenes
+    std::function<std::optional<Trial>(test::Random&)> draw;
+
+    /// True if energy is taken out with `factor` of what the line asks for and all of what the others ask for.
+    [[nodiscard]] bool fails(const Trial& trial, double factor) const {
+        constexpr double rounding = 1.0 + 1e-9;
+        return part == Part::Damping ? trial.takes_energy(factor, rounding)
+                                     : trial.takes_energy(rounding, factor);
+    }
+};
+
+}  // namespace palpate::energy_search

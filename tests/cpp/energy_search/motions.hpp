@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "../support.hpp"
+
+namespace palpate::energy_search {
+
+/// A motion of the handle: from rest at `start` to `centre`, then a wave that repeats, either sample by sample or
+/// as a sum of sines.
+struct Motion {
+    double centre = 0.0;
+    double size = 1.0;
+    double period = 2.0;  ///< [samples]; used by the sines
+    bool sines = false;
+    std::vector<double> shape;   ///< samples of one period, or cosine and sine of each harmonic
+    std::vector<double> within;  ///< where within the encoder's count the handle is, from -1/2 to 1/2
+
+    [[nodiscard]] double wave(std::size_t k) const noexcept {
+        if (!sines) {
+            return centre + size * shape[k % shape.size()];
+        }
+        double sum = centre;
+        for (std::size_t h = 0; 2 * h < shape.size(); ++h) {
+            const double angle = 2.0 * std::numbers::pi * static_cast<double>((h + 1) * k) / period;
+            sum += size * (shape[2 * h] * std::cos(angle) + shape[2 * h + 1] * std::sin(angle));
+        }
+        return sum;
+    }
+};
+
+/// What a motion costs the hand besides the device's damping and friction.
+struct Account {
+    double work = 0.0;    ///< sum of the mean force of a sample times d [J]
+    double square = 0.0;  ///< sum d^2
+    double length = 0.0;  ///< sum |d|
+    /// Sum tau (1 - tau) (change of the force within a sample)^2: an uneven path within the samples gains this over
+    /// 4 b / T.
+    double spread = 0.0;
+
+    /// b / T below which the motion takes energy out of an object that held `held`.
+    [[nodiscard]] double damping(double held, double friction) const noexcept {
+        if (!(square > 0.0)) {
+            return 0.0;
+        }
+        const double paid = work + held + friction * length;
+        return 0.5 * (-paid + std::sqrt(paid * paid + square * spread)) / square;
+    }
+
+    /// Energy taken out at a damping, over the length of the way.
+    [[nodiscard]] double gain(double damping, double held, double friction) const noexcept {
+        const double uneven = damping > 0.0 ? 0.25 * spread / damping : 0.0;
+        return length > 0.0 ? (uneven - work - held - damping * square) / length - friction : 0.0;
+    }
+};
+
+/// Where and how widely motions are tried.
+struct Places {
+    double start = 0.0;  ///< at rest, where the object holds least
+    double held = 0.0;   ///< S_0 - S_min there [J]
+    double low = 0.0;    ///< of the centres
+    double high = 0.0;
+    double finest = 0.0;  ///< of the sizes
+    double widest = 0.0;
+    double encoder_step = 0.0;
+    int delay = 0;      ///< whole samples
+    double late = 0.0;  ///< rest of the delay [samples]
+};
+
+/// Optimises motions of a structure. `Structure` must have `reset` and `step`; `limit` clips what is sent.
+template <class Structure>
+class MotionSearch {
+  public:
+    MotionSearch(Structure& structure, const Places& places, double limit)
+        : structure_{structure}, places_{places}, limit_{limit} {}
+
+    /// Largest over motions and their lengths of `rate(account)`, e.g. the damping below which energy is taken out.
+    /// Half of the motions are optimised for that, which favours fast ones. The others are optimised for `gain`.
+    template <class Rate, class Gain>
+    [[nodiscard]] double most(test::Random& random, int starts, int steps, const Rate& rate,
+                              const Gain& gain) {
+        double best = 0.0;
+        for (int k = 0; k < starts; ++k) {
+            const bool slow = k % 2 == 1;
+            const auto tried = [&](const Motion& motion) {
+                const Found found = evaluate(motion, rate, gain);
+                best = std::max(best, found.rate);
+                return slow ? found.gain : found.rate;
+            };
+            Motion motion = random_motion(random, slow);
+            double found = tried(motion);
+            double stride = 0.5;
+            for (int step = 0; step < steps; ++step) {
+                const Motion trial = changed(random, motion, stride);
+                const double here = tried(trial);
+                const bool better = here > found;
+                stride = std::clamp(stride * (better ? 1.6 : 0.93), 1e-3, 2.0);
+                if (better) {
+                    motion = trial;
+                    found = here;
+                }
+            }
+        }
+        return best;
+    }
+
+    /// The largest over all lengths of one motion.
+    struct Found {
+        double rate = 0.0;
+        double gain = -std::numeric_limits<double>::infinity();
+    };
+
+    template <class Rate, class Gain>
+    [[nodiscard]] Found evaluate(const Motion& motion, const Rate& rate, const Gain& gain) {
+        double at = places_.start;
+        if (places_.encoder_step > 0.0) {
+            at = places_.encoder_step * std::round(at / places_.encoder_step);
+        }
+        structure_.reset(at);
+        const auto late = static_cast<std::size_t>(places_.delay + (places_.late > 0.0 ? 1 : 0));
+        sent_.clear();
+        Account account;
+        Found most;
+        double read = at;
+        for (std::size_t k = 0; k < ticks + late; ++k) {
+            sent_.push_back(std::clamp(structure_.step(read).force, -limit_, limit_));
+            if (k < late) {
+                continue;  // at rest until the first force acts
+            }
+            const std::size_t now = k - late;
+            read = now < approach ? places_.start + (motion.wave(0) - places_.start) *
+                                                        static_cast<double>(now + 1) / approach
+                                  : motion.wave(now - approach);
+            double next = read;
+            if (places_.encoder_step > 0.0) {
+                read = places_.encoder_step * std::round(read / places_.encoder_step);
+                next = read + places_.encoder_step * motion.within[now % motion.within.size()];
+            }
+            const double d = next - at;
+            const double old = sent_[now];
+            const double fresh = sent_[places_.late > 0.0 ? now + 1 : now];
+            account.work += (places_.late * old + (1.0 - places_.late) * fresh) * d;
+            account.spread += places_.late * (1.0 - places_.late) * (fresh - old) * (fresh - old);
+            account.square += d * d;
+            account.length += std::abs(d);
+            at = next;
+            if (now > approach) {
+                most.rate = std::max(most.rate, rate(account));
+                most.gain = std::max(most.gain, gain(account));
+            }
+        }
+        return most;
+    }
+
+    static constexpr std::size_t approach = 16;
+    static constexpr std::size_t ticks = 500;
+
+  private:
+    [[nodiscard]] Motion random_motion(test::Random& random, bool slow) const {
+        Motion motion;
+        motion.centre = random() % 3 == 0 ? places_.start : test::uniform(random, places_.low, places_.high);
+        motion.size =
+            places_.finest * std::exp(test::uniform(random, 0.0, std::log(places_.widest / places_.finest)));
+        motion.sines = slow || random() % 3 == 0;
+        if (motion.sines) {
+            motion.period = std::exp(test::uniform(random, std::log(slow ? 10.0 : 2.0), std::log(100.0)));
+            motion.shape.resize(2 * (1 + random() % 3));
+        } else {
+            constexpr int longest = 10;
+            motion.shape.resize(2 + random() % (random() % 2 == 0
+                                                    ? 2 * static_cast<std::size_t>(places_.delay) + 3
+                                                    : longest));
+        }
+        const bool alternates = !motion.sines && random() % 2 == 0;
+        for (std::size_t i = 0; i < motion.shape.size(); ++i) {
+            motion.shape[i] =
+                alternates ? (2 * i < motion.shape.size() ? 1.0 : -1.0) : test::uniform(random, -1.0, 1.0);
+        }
+        motion.within.resize(motion.sines ? 1 : motion.shape.size());
+        for (double& part : motion.within) {
+            part = random() % 2 == 0 ? 0.5 : -0.5;
+        }
+        return motion;
+    }
+
+    [[nodiscard]] Motion changed(test::Random& random, Motion motion, double stride) const {
+        std::normal_distribution<double> normal;
+        const std::size_t one = random() % (motion.shape.size() + 3);
+        const bool all = random() % 2 == 0;
+        for (std::size_t i = 0; i < motion.shape.size(); ++i) {
+            if (all || one == i) {
+                motion.shape[i] += stride * normal(random);
+            }
+        }
+        if (all || one == motion.shape.size()) {
+            motion.centre += motion.size * stride * normal(random);
+        }
+        if (all || one == motion.shape.size() + 1) {
+            motion.size = std::max(places_.finest, motion.size * std::exp(stride * normal(random)));
+        }
+        if (all || one == motion.shape.size() + 2) {
+            motion.period = std::max(2.0, motion.period * std::exp(0.3 * stride * normal(random)));
+        }
+        for (double& part : motion.within) {
+            if (random() % 4 == 0) {
+                part = std::clamp(part + stride * normal(random), -0.5, 0.5);
+            }
+        }
+        return motion;
+    }
+
+    Structure& structure_;
+    Places places_;
+    double limit_;
+    std::vector<double> sent_;
+};
+
+}  // namespace palpate::energy_search

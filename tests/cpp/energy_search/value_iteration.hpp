@@ -1,0 +1,482 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace palpate::energy_search {
+
+/// The positions between which the handle moves. From node i it can reach the nodes i - reach to i + reach.
+struct Grid {
+    std::vector<double> position;  ///< not falling [m or rad]
+    int reach = 0;                 ///< longest move [nodes]
+    double turn = 0.0;             ///< length of one turn; 0 = the positions do not repeat [m or rad]
+
+    [[nodiscard]] int nodes() const noexcept { return static_cast<int>(position.size()); }
+    [[nodiscard]] bool repeats() const noexcept { return turn > 0.0; }
+    /// Number of values of one remembered position: its index, or its index modulo 2 reach + 1.
+    [[nodiscard]] int residues() const noexcept { return std::min(nodes(), 2 * reach + 1); }
+};
+
+/// Windows of `older` + 1 positions, newest first, numbered 0, 1, ... The newest is stored as its node, each older one
+/// as its residue, which the position after it makes unique.
+class Windows {
+  public:
+    struct Nodes {
+        int node[8];
+    };
+
+    Windows(const Grid& grid, int older)
+        : nodes_{grid.nodes()},
+          residues_{grid.residues()},
+          reach_{grid.reach},
+          older_{older},
+          repeats_{grid.repeats()} {
+        for (int k = 0; k < older; ++k) {
+            stride_ *= static_cast<std::size_t>(residues_);
+        }
+    }
+
+    [[nodiscard]] int older() const noexcept { return older_; }
+    [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
+    [[nodiscard]] std::size_t count() const noexcept { return stride_ * static_cast<std::size_t>(nodes_); }
+    [[nodiscard]] int newest(std::size_t window) const noexcept { return static_cast<int>(window / stride_); }
+
+    [[nodiscard]] Nodes nodes_of(std::size_t window) const noexcept {
+        Nodes result{};
+        std::size_t below = stride_;
+        std::size_t rest = window % stride_;
+        result.node[0] = newest(window);
+        for (int k = 1; k <= older_; ++k) {
+            below /= static_cast<std::size_t>(residues_);
+            const int residue = static_cast<int>(rest / below);
+            rest %= below;
+            result.node[k] = residues_ == nodes_ ? residue : resolved(residue, result.node[k - 1]);
+        }
+        return result;
+    }
+
+    /// False for a window that leaves the grid.
+    [[nodiscard]] bool exists(const Nodes& w) const noexcept {
+        return std::all_of(w.node, w.node + older_ + 1, [&](int node) { return node >= 0 && node < nodes_; });
+    }
+
+    /// The number of the window that starts at place `first` of another one.
+    [[nodiscard]] std::size_t number(const Nodes& w, int first) const noexcept {
+        auto window = static_cast<std::size_t>(w.node[first]);
+        for (int k = 1; k <= older_; ++k) {
+            window = window * static_cast<std::size_t>(residues_) +
+                     static_cast<std::size_t>(w.node[first + k] % residues_);
+        }
+        return window;
+    }
+
+    [[nodiscard]] std::size_t at_rest(int node) const noexcept {
+        Nodes w{};
+        std::fill(w.node, w.node + older_ + 1, node);
+        return number(w, 0);
+    }
+
+    [[nodiscard]] std::size_t moved(std::size_t window, int to) const noexcept {
+        if (older_ == 0) {
+            return static_cast<std::size_t>(to);
+        }
+        const auto residues = static_cast<std::size_t>(residues_);
+        const auto from = static_cast<std::size_t>(newest(window) % residues_);
+        return static_cast<std::size_t>(to) * stride_ + from * (stride_ / residues) +
+               window % stride_ / residues;
+    }
+
+  private:
+    /// The node within reach of `near` that has this residue.
+    [[nodiscard]] int resolved(int residue, int near) const noexcept {
+        int offset = (residue - near) % residues_;
+        offset = offset < 0 ? offset + residues_ : offset;
+        offset = offset > reach_ ? offset - residues_ : offset;
+        const int node = near + offset;
+        return repeats_ ? (node + nodes_) % nodes_ : node;
+    }
+
+    int nodes_;
+    int residues_;
+    int reach_;
+    int older_;
+    bool repeats_;
+    std::size_t stride_ = 1;
+};
+
+/// The force that a structure computes from the last positions it read, as a table over the nodes. `of` has one
+/// value for each play state and each window (i_0, r_1, ..., r_memory), with i_0 the newest.
+struct ForceTable {
+    int memory = 0;              ///< positions before the newest that the force depends on
+    int plays = 1;               ///< number of play states
+    std::vector<double> of;      ///< [N or N*m]
+    std::vector<int> next_play;  ///< play state after node i was read: [play * nodes + i]
+    std::vector<int> rest_play;  ///< play state of a start at rest at node i
+
+    [[nodiscard]] int play_after(int play, int node, int nodes) const noexcept {
+        return plays == 1 ? 0 : next_play[static_cast<std::size_t>(play * nodes + node)];
+    }
+};
+
+/// What the hand pays for besides the force.
+struct Cost {
+    double damping = 0.0;   ///< b / T [N/m or N*m/rad]
+    double friction = 0.0;  ///< f_c [N or N*m]
+    int delay = 0;          ///< n, whole samples
+    double late = 0.0;      ///< tau, the further part of a sample during which the last command still acts
+
+    /// Least energy that the hand pays for a move d while the force changes from `old` to `now` after tau T.
+    /// Within each part the path is straight: an uneven one costs more.
+    [[nodiscard]] double of_move(double d, double old, double now) const noexcept {
+        if (late == 0.0) {
+            return now * d + damping * d * d + friction * std::abs(d);
+        }
+        const double shift = late * (1.0 - late) / (2.0 * damping);
+        const double low = std::min(0.0, d);
+        const double high = std::max(0.0, d);
+        double part = late * d - (old - now) * shift;
+        if (part > high) {
+            part = std::max(high, late * d - (old - now + 2.0 * friction) * shift);
+        } else if (part < low) {
+            part = std::min(low, late * d - (old - now - 2.0 * friction) * shift);
+        }
+        const double rest = d - part;
+        return old * part + now * rest + damping * (part * part / late + rest * rest / (1.0 - late)) +
+               friction * (std::abs(part) + std::abs(rest));
+    }
+};
+
+/// A device whose samples are taken at k period + u_k, u_k either 0 or jitter, and whose commands act `delay` after
+/// their own samples. Each position of its grid has two nodes in a row, one for each u.
+struct Clock {
+    double period = 1.0;   ///< [s]
+    double jitter = 0.0;   ///< below the period [s]
+    double delay = 0.0;    ///< [s]
+    double damping = 0.0;  ///< b [N*s/m or N*m*s/rad]
+
+    /// Number of samples before the present one whose commands can still act.
+    [[nodiscard]] int older() const noexcept {
+        return std::max(1, static_cast<int>(std::ceil((delay + jitter) / period)));
+    }
+};
+
+/// The most energy that a motion takes out, found by value iteration.
+struct Finding {
+    double taken = 0.0;      ///< largest of -E - (S_0 - S_min) over the starts at rest [J]
+    bool cycle = false;      ///< some motion takes energy out again and again
+    bool converged = false;  ///< no motion on the grid takes more
+    double scale = 0.0;      ///< largest force times longest move [J]
+
+    [[nodiscard]] bool violated() const noexcept { return cycle || taken > 1e-6 * scale; }
+};
+
+/// Shortest paths over all motions between the nodes. The state is the window of positions that the force still
+/// depends on; J(state) is the least energy that the hand pays from there on, for any number of samples. It falls
+/// without end where a motion can be repeated and takes energy out each time.
+class ValueIteration {
+  public:
+    ValueIteration(const Grid& grid, const ForceTable& table, const Cost& cost)
+        : grid_{grid},
+          table_{&table},
+          cost_{cost},
+          windows_{grid, cost.delay + table.memory + (cost.late > 0.0 ? 1 : 0)},
+          nodes_{grid.nodes()},
+          plays_{static_cast<std::size_t>(table.plays)},
+          value_(windows_.count() * plays_, 0.0),
+          policy_(value_.size(), none) {
+        fill();
+    }
+
+    /// The same with a clock: the table is that of a static force.
+    ValueIteration(const Grid& grid, const ForceTable& table, const Clock& clock)
+        : grid_{grid},
+          table_{&table},
+          cost_{},
+          windows_{grid, clock.older()},
+          nodes_{grid.nodes()},
+          plays_{1},
+          value_(windows_.count(), 0.0),
+          policy_(value_.size(), none) {
+        fill(clock);
+    }
+
+    /// `held[i]` is S_0 - S_min at node i, at rest. Stops at the first motion that takes energy out.
+    [[nodiscard]] Finding run(const std::vector<double>& held, int sweeps = 2000) {
+        Finding finding;
+        finding.scale = largest_force_ * longest_move_ + 1e-300;
+        const double least_gain = 1e-11 * finding.scale;
+        for (int sweep = 0; sweep < sweeps && !finding.violated(); ++sweep) {
+            const double gain = sweep_once(sweep % 2 == 0, least_gain);
+            finding.converged = gain <= least_gain;
+            if (sweep % 8 == 7 || finding.converged) {
+                finding.cycle = a_cycle_pays(1e-10 * finding.scale);
+                finding.taken = taken_at_rest(held);
+            }
+            if (finding.converged) {
+                break;
+            }
+        }
+        return finding;
+    }
+
+    /// Goes on with another force, kept from the first sample until the motion goes over to what was searched before.
+    void precede(const ForceTable& table) {
+        table_ = &table;
+        std::fill(policy_.begin(), policy_.end(), none);
+        fill();
+    }
+
+    /// One sample of another force before everything that was searched before.
+    void precede_once(const ForceTable& table) {
+        precede(table);
+        const std::vector<double> later = value_;
+        for (std::size_t state = 0; state < value_.size(); ++state) {
+            value_[state] = 0.0;
+            for (int jump = lowest(state); exists_[state] != 0 && jump <= highest(state); ++jump) {
+                value_[state] = std::min(value_[state], paid(state, jump) + later[after(state, jump)]);
+            }
+        }
+    }
+
+    /// The most that is taken out by motions that start at rest.
+    [[nodiscard]] Finding found(const std::vector<double>& held) const {
+        Finding finding;
+        finding.scale = largest_force_ * longest_move_ + 1e-300;
+        finding.taken = taken_at_rest(held);
+        finding.converged = true;
+        return finding;
+    }
+
+  private:
+    static constexpr std::int16_t none = INT16_MIN;
+
+    void fill() {
+        const bool late = cost_.late > 0.0;
+        const int newest =
+            cost_.delay + (late ? 1 : 0);  // place of the position that the play state belongs to
+        const Windows read{grid_, table_->memory};
+        now_.assign(value_.size(), 0.0);
+        old_.assign(late ? value_.size() : 0, 0.0);
+        exists_.assign(value_.size(), 0);
+        next_play_.assign(value_.size(), 0);
+        play_is_new_ = plays_ > 1 && newest == 0;
+        for (std::size_t window = 0; window < windows_.count(); ++window) {
+            const Windows::Nodes w = windows_.nodes_of(window);
+            if (!windows_.exists(w)) {
+                continue;
+            }
+            for (std::size_t play = 0; play < plays_; ++play) {
+                const std::size_t state = window * plays_ + play;
+                const double force = table_->of[play * read.count() + read.number(w, newest)];
+                if (!std::isfinite(force)) {
+                    continue;  // a play state that the position cannot have
+                }
+                const int before = static_cast<int>(play);
+                const int later =
+                    newest > 0 ? table_->play_after(before, w.node[newest - 1], nodes_) : before;
+                next_play_[state] = static_cast<std::size_t>(later);
+                now_[state] = force;
+                if (late) {
+                    old_[state] = force;
+                    now_[state] = table_->of[next_play_[state] * read.count() + read.number(w, newest - 1)];
+                }
+                exists_[state] = 1;
+                largest_force_ = std::max(largest_force_, std::abs(now_[state]));
+            }
+        }
+        measure_moves();
+    }
+
+    void measure_moves() noexcept {
+        for (int i = 0; i < nodes_; ++i) {
+            for (int jump = -grid_.reach; jump <= grid_.reach; ++jump) {
+                longest_move_ = std::max(longest_move_, can_move(i, jump) ? std::abs(move(i, jump)) : 0.0);
+            }
+        }
+    }
+
+    /// What a sample from each state to each of both u costs.
+    struct Sample {
+        double force = 0.0;    ///< mean over the sample
+        double damping = 0.0;  ///< b over its length
+        double uneven = 0.0;   ///< gained by an uneven path while the force changes [J]
+    };
+
+    void fill(const Clock& clock) {
+        now_.assign(value_.size(), 0.0);
+        exists_.assign(value_.size(), 0);
+        next_play_.assign(value_.size(), 0);
+        samples_.resize(2 * value_.size());
+        const int older = windows_.older();
+        for (std::size_t window = 0; window < windows_.count(); ++window) {
+            const Windows::Nodes w = windows_.nodes_of(window);
+            if (!windows_.exists(w)) {
+                continue;
+            }
+            exists_[window] = 1;
+            const auto taken = [&](int k) { return -k * clock.period + (w.node[k] % 2) * clock.jitter; };
+            const auto force = [&](int k) { return table_->of[static_cast<std::size_t>(w.node[k])]; };
+            largest_force_ = std::max(largest_force_, std::abs(force(0)));
+            for (std::size_t u = 0; u < 2; ++u) {
+                const double end = clock.period + static_cast<double>(u) * clock.jitter;
+                const double length = end - taken(0);
+                double work = 0.0;
+                double square = 0.0;
+                for (int k = older; k >= 0;
+                     --k) {  // the command of sample k acts until that of the next one does
+                    const double from = k == older ? taken(0) : std::max(taken(0), taken(k) + clock.delay);
+                    const double to = k == 0 ? end : std::min(end, taken(k - 1) + clock.delay);
+                    if (to > from) {
+                        work += force(k) * (to - from);
+                        square += force(k) * force(k) * (to - from);
+                    }
+                }
+                const double mean = work / length;
+                samples_[2 * window + u] = {mean, clock.damping / length,
+                                            std::max(0.0, square - mean * work) / (4.0 * clock.damping)};
+            }
+        }
+        measure_moves();
+    }
+
+    [[nodiscard]] bool can_move(int from, int jump) const noexcept {
+        return grid_.repeats() || (from + jump >= 0 && from + jump < nodes_);
+    }
+    [[nodiscard]] int target(int from, int jump) const noexcept {
+        const int node = from + jump;
+        return node < 0 ? node + nodes_ : node >= nodes_ ? node - nodes_ : node;
+    }
+    [[nodiscard]] double move(int from, int jump) const noexcept {
+        const int node = from + jump;
+        const double turned = node < 0 ? -grid_.turn : node >= nodes_ ? grid_.turn : 0.0;
+        return grid_.position[static_cast<std::size_t>(target(from, jump))] + turned -
+               grid_.position[static_cast<std::size_t>(from)];
+    }
+
+    [[nodiscard]] int lowest(std::size_t state) const noexcept {
+        return grid_.repeats() ? -grid_.reach : std::max(-grid_.reach, -place(state));
+    }
+    [[nodiscard]] int highest(std::size_t state) const noexcept {
+        return grid_.repeats() ? grid_.reach : std::min(grid_.reach, nodes_ - 1 - place(state));
+    }
+
+    [[nodiscard]] int place(std::size_t state) const noexcept { return windows_.newest(state / plays_); }
+
+    [[nodiscard]] std::size_t after(std::size_t state, int jump) const noexcept {
+        const std::size_t window = state / plays_;
+        const int to = target(windows_.newest(window), jump);
+        const std::size_t play =
+            play_is_new_
+                ? static_cast<std::size_t>(table_->play_after(static_cast<int>(state % plays_), to, nodes_))
+                : next_play_[state];
+        return windows_.moved(window, to) * plays_ + play;
+    }
+
+    [[nodiscard]] double paid(std::size_t state, int jump) const noexcept {
+        const double d = move(place(state), jump);
+        if (!samples_.empty()) {
+            const Sample& sample =
+                samples_[2 * state + static_cast<std::size_t>(target(place(state), jump) % 2)];
+            return (sample.force + sample.damping * d) * d - sample.uneven;
+        }
+        return cost_.of_move(d, old_.empty() ? 0.0 : old_[state], now_[state]);
+    }
+
+    /// Improves every state once; the largest improvement.
+    [[nodiscard]] double sweep_once(bool upward, double least_gain) {
+        double most = 0.0;
+        const std::size_t states = value_.size();
+        for (std::size_t k = 0; k < states; ++k) {
+            const std::size_t state = upward ? k : states - 1 - k;
+            if (exists_[state] == 0) {
+                continue;
+            }
+            const int from = place(state);
+            double best = value_[state] - least_gain;
+            int chosen = none;
+            const int last = highest(state);
+            const double now = now_[state];
+            const double old = old_.empty() ? 0.0 : old_[state];
+            const std::size_t base = windows_.moved(state / plays_, 0) * plays_ + next_play_[state];
+            for (int jump = lowest(state); jump <= last; ++jump) {
+                const std::size_t next = play_is_new_ ? after(state, jump)
+                                                      : base + static_cast<std::size_t>(target(from, jump)) *
+                                                                   windows_.stride() * plays_;
+                const double total =
+                    (samples_.empty() ? cost_.of_move(move(from, jump), old, now) : paid(state, jump)) +
+                    value_[next];
+                if (total < best) {
+                    best = total;
+                    chosen = jump;
+                }
+            }
+            if (chosen != none) {
+                most = std::max(most, value_[state] - best);
+                value_[state] = best;
+                policy_[state] = static_cast<std::int16_t>(chosen);
+            }
+        }
+        return most;
+    }
+
+    /// True if following the best moves from some state leads round a cycle that takes energy out.
+    [[nodiscard]] bool a_cycle_pays(double least) const {
+        std::vector<std::uint32_t> seen(value_.size(), 0);
+        std::uint32_t walk = 0;
+        for (std::size_t first = 0; first < value_.size(); ++first) {
+            std::size_t state = first;
+            ++walk;
+            while (seen[state] == 0 && policy_[state] != none) {
+                seen[state] = walk;
+                state = after(state, policy_[state]);
+            }
+            if (seen[state] != walk) {
+                continue;
+            }
+            double sum = 0.0;
+            std::size_t along = state;
+            do {
+                sum += paid(along, policy_[along]);
+                along = after(along, policy_[along]);
+            } while (along != state);
+            if (sum < -least) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    [[nodiscard]] double taken_at_rest(const std::vector<double>& held) const {
+        double most = 0.0;
+        for (int i = 0; i < nodes_; ++i) {
+            const auto node = static_cast<std::size_t>(i);
+            const std::size_t play = plays_ == 1 ? 0 : static_cast<std::size_t>(table_->rest_play[node]);
+            most = std::max(most, -value_[windows_.at_rest(i) * plays_ + play] - held[node]);
+        }
+        return most;
+    }
+
+    const Grid& grid_;
+    const ForceTable* table_;
+    Cost cost_;
+    Windows windows_;
+    int nodes_;
+    std::size_t plays_;
+    bool play_is_new_ = false;
+    double largest_force_ = 0.0;
+    double longest_move_ = 0.0;
+    std::vector<double> value_;
+    std::vector<std::int16_t> policy_;
+    std::vector<double> now_;
+    std::vector<double> old_;
+    std::vector<Sample> samples_;
+    std::vector<std::uint8_t> exists_;
+    std::vector<std::size_t> next_play_;
+};
+
+}  // namespace palpate::energy_search
