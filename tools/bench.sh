@@ -38,6 +38,7 @@ done
 .venv/bin/python bench/model_error.py build/bench/bench_model_error.json
 .venv/bin/python bench/ratios.py build/bench
 .venv/bin/palpate chart speed build/bench --to build/bench/figures
+.venv/bin/palpate chart prediction --to build/bench
 for name in identification filters parsimony real_data dynamic; do
     echo && .venv/bin/python "bench/$name.py" --json "build/bench/$name.json"
 done
