@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rendered force against time, for every structure and solver: a click and a wall on a simulated knob, a hand
-// that presses through both. Beside the time of a step along that motion stands the RMS of F_k - f(handle), at
-// the end of the tick that holds F_k and at its sampling instant.
+// that presses through both. Beside the time of a step along that motion stand the RMS force errors of
+// palpate/force_error.hpp: at the end of a tick, at its sampling instant, of its mean, and of that below 50 Hz.
 
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 
 #include "palpate/controller.hpp"
 #include "palpate/device/simulated.hpp"
+#include "palpate/force_error.hpp"
 #include "palpate/io/model_file.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/rendering/compensated.hpp"
@@ -21,6 +23,7 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/substepped.hpp"
 #include "palpate/rendering/trapezoidal.hpp"
 #include "palpate/solver/one_newton_step.hpp"
@@ -63,8 +66,7 @@ double implicit_slope(palpate::Inertia inertia) {
 
 /// A structure in the closed loop: what the hand felt, and the motion that came of it.
 struct Felt {
-    double error_end = 0.0;
-    double error_instant = 0.0;
+    palpate::ForceError error;
     double force = 0.0;  ///< RMS of f along the motion
     double evaluations = 0.0;
     std::vector<double> motion;
@@ -78,21 +80,34 @@ Felt closed_loop(S structure) {
     palpate::Controller controller{device, std::move(structure), palpate::ForceLimit{}};
     (void)controller.start();
     Felt felt;
+    std::vector<double> start;
+    std::vector<double> middle;
+    std::vector<double> end;
+    std::vector<double> applied;
     for (std::size_t k = 0; k < ticks; ++k) {
-        const double sampled = device.handle_position();
+        const palpate::Motion before = device.handle();
         const palpate::Tick tick = controller.tick();
         felt.status = tick.status == palpate::Status::Ok ? felt.status : tick.status;
-        const double force = sum().at(device.handle_position(), {}).force;
-        felt.force += force * force;
-        felt.error_end += std::pow(tick.command.force - force, 2);
-        felt.error_instant += std::pow(tick.command.force - sum().at(sampled, {}).force, 2);
+        const palpate::Motion after = device.handle();
+        start.push_back(before.position);
+        middle.push_back(0.5 * (before.position + after.position) +
+                         0.125 * period * (before.velocity - after.velocity));
+        end.push_back(after.position);
+        applied.push_back(tick.command.force);
+        felt.force += std::pow(sum().at(after.position, {}).force, 2);
         felt.evaluations += tick.rendered.evaluations;
         felt.motion.push_back(tick.reading.position);
     }
     constexpr auto count = static_cast<double>(ticks);
     felt.force = std::sqrt(felt.force / count);
-    felt.error_end = std::sqrt(felt.error_end / count);
-    felt.error_instant = std::sqrt(felt.error_instant / count);
+    felt.error = palpate::force_error({start, middle, end, applied, applied}, period,
+                                      [](std::span<const double> motion, double /*step_s*/) {
+                                          std::vector<double> force;
+                                          for (const double x : motion) {
+                                              force.push_back(sum().at(x, {}).force);
+                                          }
+                                          return force;
+                                      });
     felt.evaluations /= count;
     return felt;
 }
@@ -101,9 +116,9 @@ Felt closed_loop(S structure) {
 template <class S>
 void tick(benchmark::State& state, const S& initial, double expected) {
     const Felt felt = closed_loop(initial);
-    if (felt.status != palpate::Status::Ok || !(std::abs(felt.error_end - expected) <= 0.05 * expected)) {
+    if (felt.status != palpate::Status::Ok || !(std::abs(felt.error.end - expected) <= 0.05 * expected)) {
         state.SkipWithError(
-            ("force error " + std::to_string(felt.error_end) + " N*m, " + palpate::text(felt.status).word)
+            ("force error " + std::to_string(felt.error.end) + " N*m, " + palpate::text(felt.status).word)
                 .c_str());
         return;
     }
@@ -117,14 +132,17 @@ void tick(benchmark::State& state, const S& initial, double expected) {
             structure.reset(felt.motion.front());
         }
     }
-    state.counters["force_error_end_Nm"] = felt.error_end;
-    state.counters["force_error_instant_Nm"] = felt.error_instant;
+    state.counters["force_error_end_Nm"] = felt.error.end;
+    state.counters["force_error_instant_Nm"] = felt.error.instant;
+    state.counters["force_error_mean_Nm"] = felt.error.mean;
+    state.counters["force_error_below_50_Hz_Nm"] = felt.error.band;
     state.counters["force_rms_Nm"] = felt.force;
     state.counters["evaluations"] = felt.evaluations;
 }
 
 // What every structure leaves of this object, from the table of its scene.
 constexpr double of_the_hold = 0.00362;
+constexpr double of_the_predicted_hold = 0.00184;
 constexpr double of_the_coupling = 0.1202;
 constexpr double of_the_mass = 0.1231;
 constexpr double of_the_papers_damping = 0.2530;
@@ -134,6 +152,10 @@ void direct_sum(benchmark::State& state) {
 }
 void direct_table(benchmark::State& state) {
     tick(state, palpate::Direct{compiled()}, of_the_hold);
+}
+
+void predicted_table(benchmark::State& state) {
+    tick(state, palpate::PredictedDirect{compiled(), 4}, of_the_predicted_hold);
 }
 
 void compensated_newton(benchmark::State& state) {
@@ -205,6 +227,7 @@ void explicit_substepped(benchmark::State& state) {
 
 BENCHMARK(direct_sum);
 BENCHMARK(direct_table);
+BENCHMARK(predicted_table);
 BENCHMARK(compensated_newton);
 BENCHMARK(compensated_table);
 BENCHMARK(massless_newton);

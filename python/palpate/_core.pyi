@@ -7,7 +7,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'balancing_shift', 'bench_for', 'certify', 'certify_bounds', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'narrowest_play', 'paper_sample_time_s', 'play', 'render', 'renderable_slopes', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'steepest_stick', 'stiffest_coupling', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['Bench', 'Certificate', 'DeviceProfile', 'EnvironmentFilters', 'ForceBounds', 'ForceModel', 'Hand', 'Inequality', 'LoopSettings', 'Scheme', 'Status', 'TransferFunction', 'balancing_shift', 'bench_for', 'certify', 'certify_bounds', 'device_difference', 'environment_filters', 'explicit_slope_limit', 'failure_map', 'failure_map_names', 'felt_slope', 'fingerprint', 'force_bounds', 'force_driven', 'force_error', 'guard_effects', 'longest_delay_s', 'measure', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'most_prediction_taps', 'most_simulated_ticks', 'motion_driven', 'narrowest_play', 'paper_sample_time_s', 'play', 'render', 'renderable_slopes', 'simulate', 'slope_bounds', 'solver_name', 'status_meanings', 'steepest_stick', 'stiffest_coupling', 'structure_names', 'usual_telemetry_hz', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.
@@ -632,7 +632,7 @@ class Bench:
         ...
     def __repr__(self) -> str:
         ...
-    def scheme(self, model: ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> Scheme:
+    def scheme(self, model: ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, predict: typing.SupportsInt | typing.SupportsIndex | None = None) -> Scheme:
         """
         What is given, in the model's own units; what is None follows the model in this bench's scale.
         """
@@ -726,6 +726,12 @@ def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[nump
     The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
     Arrays (n,) by name: force, environment_position, evaluations, status.
     """
+def force_error(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex, *, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], middle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mean_applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    RMS errors [N or N*m] of a simulated rendering against a model: at the end of the tick, at its
+    sampling instant, of its mean over the tick, and of that below 50 Hz; and the work of the error [J].
+    Arrays (n,) from simulate; play_radius 0 is the model's own.
+    """
 def guard_effects() -> list:
     """
     Every guard by itself: its cost where nothing is wrong, and what it makes of what is.
@@ -809,9 +815,10 @@ def simulate(model: ForceModel, scheme: Scheme, device: DeviceProfile, hand: Han
     The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. Ctrl-C
     ends it as in Python; ValueError for more than most_simulated_ticks.
     
-    Arrays (n,) by name: time_s, position (measured), velocity, handle_start and handle_end (the true
-    handle when sampled and at the end of the tick that holds the force), environment_position, force
-    (commanded), applied, evaluations, status, extrapolated.
+    Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and
+    handle_end (the true handle when sampled, and in the middle and at the end of the tick that holds the
+    force), environment_position, force (commanded), applied (at the end of the tick), mean_applied (over
+    the tick), evaluations, status, extrapolated.
     """
 def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """
@@ -862,7 +869,7 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
     (n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.
     """
 __version__: str = '0.1.0'
-failure_map_names: tuple = ('explicit', 'damping', 'period', 'encoder', 'play', 'coupling', 'falling', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
+failure_map_names: tuple = ('explicit', 'damping', 'prediction', 'period', 'encoder', 'play', 'coupling', 'falling', 'limit', 'coupled-encoder', 'hand', 'solver', 'pole', 'guard')
 most_prediction_taps: int = 16
 most_simulated_ticks: int = 3600000
 paper_sample_time_s: float = 0.001

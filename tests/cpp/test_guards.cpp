@@ -74,7 +74,8 @@ TEST(Guards, TouchNoForceOfTheComparisonScene) {
     }
     const DeviceProfile device;
     Guards guards = guards_of(settings_for(device), wall(60.0), direct(), period);
-    guards.tank = EnergyTank{{{.within = held}, 0.9 * device.viscous_damping, 0.0, period}};
+    guards.tank =
+        EnergyTank{{{.within = held}, 0.9 * device.viscous_damping, 0.0, device.encoder_step, period}};
     const auto forces = [&](const Guards& used) {
         SimulatedDevice knob{device};
         EXPECT_TRUE(knob.open());
@@ -98,6 +99,7 @@ TEST(Guards, TouchNoForceOfCertifiedScenes) {
         scene.device.force_limit = 1e9;
         GuardSettings settings = settings_for(scene.device);
         settings.buzz_force = 0.01;
+        settings.certified = true;
         Guards guards = guards_of(settings, scene.model, scene.scheme, scene.device.period_s);
         guards.reading = {};
         std::size_t acted = 0;
@@ -139,7 +141,7 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
 }
 
 TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
-    EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, period}};
+    EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, 0.0, period}};
     double force = -2.0;
     tank.book(-1.0, 1.0);  // what the object holds; the reserve of 0.25 is left
     EXPECT_EQ(tank.apply(force), Status::Ok);
@@ -156,9 +158,9 @@ TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
 }
 
 TEST(EnergyTank, DoesNotChargeWhatTheDeviceTakes) {
-    EnergyTank tank{TankSettings{{.within = 1.0}, 0.06, 0.02, period}};
-    tank.book(-30.0, 0.02);
-    EXPECT_NEAR(tank.given(), 0.6 - (0.06 * 0.02 * 0.02 / period + 0.02 * 0.02), 1e-12);
+    EnergyTank tank{TankSettings{{.within = 1.0}, 0.06, 0.02, 0.01, period}};
+    tank.book(-30.0, 0.03);
+    EXPECT_NEAR(tank.given(), 0.9 - (0.06 * 0.02 * 0.02 / period + 0.02 * 0.02), 1e-12);
 }
 
 TEST(StoredEnergy, GrowsWithWhereItHasBeen) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every way in which a session can be less than good is found, and named with its cure.
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -153,6 +154,18 @@ TEST(SessionVerdict, RepeatsWhatTheRecordingWarnsOf) {
     Judged kept;
     kept.expected.warnings = {"felt.csv appeared while this was recorded"};
     EXPECT_EQ(kept.text(), "usable: felt.csv appeared while this was recorded");
+}
+
+TEST(EnergyText, StatesTheEnergyOfTheRampSeparately) {
+    LoopReport report;
+    report.given_in_ramp = 0.0125;
+    report.given = 0.25;
+    report.most_stored = 0.5;
+    EXPECT_EQ(energy_text(report),
+              "given 0.0125 J during the ramp, 0.25 J after it; the object held at most 0.5 J");
+    report.most_stored = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(energy_text(report),
+              "given 0.0125 J during the ramp, 0.25 J after it; no bound is known of what the object held");
 }
 
 }  // namespace

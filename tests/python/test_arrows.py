@@ -36,6 +36,7 @@ INCLUDES = {
     "io": {"model", "device", "realtime", "rendering", "stability"},
     "bench": {"simulation", "rendering", "solver", "dynamics", "model", "device", "guard"},
     "loop": {"controller", "realtime", "io"},
+    "force_error": {"simulation", "rendering", "model"},
     "measure": {
         "session",
         "session_text",

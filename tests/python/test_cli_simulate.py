@@ -18,7 +18,14 @@ from palpate.cli.main import main
 from test_planning import keyswitch_by_hand, model_by_hand
 
 JSON_FIELDS = ["verdict", "structure", "duration_s", "ticks", "force_error_end", "force_error_instant"]
-JSON_FIELDS += ["force_error_share", "extrapolated", "status"]
+JSON_FIELDS += [
+    "force_error_mean",
+    "force_error_band",
+    "force_error_work",
+    "force_error_share",
+    "extrapolated",
+    "status",
+]
 
 
 @pytest.fixture
@@ -34,7 +41,8 @@ def test_what_was_rendered_is_written_and_measured(here: Path, capsys: pytest.Ca
     shown = capsys.readouterr()
     assert shown.err.startswith("read m.json: ")
     assert "simulated" in shown.err
-    assert "force error, end of tick" in shown.out
+    for name in ("end of tick", "mean of a tick", "below 50 Hz", "sampled"):
+        assert f"force error, {name}" in shown.out
     assert len(read_recording("r.csv")) == 500
     assert Path("r.png").read_bytes().startswith(b"\x89PNG")
 
@@ -54,6 +62,21 @@ def test_the_numbers_of_the_scheme_are_options(here: Path, capsys: pytest.Captur
         assert main(["simulate", "m.json", "--coupling-stiffness", stiffness, "--json"]) in (0, 1)
         errors.append(json.loads(capsys.readouterr().out)["force_error_end"])
     assert errors[0] > 5 * errors[1], "a stiffer coupling loses less"
+
+
+def test_predict_alone_renders_directly_with_less_force_error(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = []
+    for arguments in (["--structure", "direct"], ["--predict", "2"]):
+        assert main(["simulate", "m.json", *arguments, "--json"]) == 0
+        results.append(json.loads(capsys.readouterr().out))
+    plain, predicted = results
+    assert predicted["structure"] == "direct"
+    assert plain["force_error_mean"] > 3 * predicted["force_error_mean"]
+    assert plain["force_error_band"] > 4 * predicted["force_error_band"]
+    assert plain["force_error_work"] < 0.0
+    assert abs(predicted["force_error_work"]) < 0.1 * abs(plain["force_error_work"])
 
 
 @pytest.mark.parametrize(
@@ -260,15 +283,15 @@ def test_the_demo_calls_everything_simulated(demonstrated: tuple[Path, str, str]
 def test_the_demo_renders_every_structure(demonstrated: tuple[Path, str, str]) -> None:
     _, out, _ = demonstrated
     rows = re.findall(
-        r"^((?:direct|massless|implicit|explicit).*?)\s{2,}([\d.e-]+)\s+([\d.e-]+)$", out, re.MULTILINE
+        r"^((?:direct|massless|implicit|explicit).*?)\s{2,}([\d.e-]+)((?:\s+[\d.e-]+){3})$", out, re.MULTILINE
     )
     assert [name for name, _, _ in rows] == [
-        "direct", "massless, compensated", "massless",
+        "direct, predict 4", "direct", "massless, compensated", "massless",
         "implicit, m = 0.001, B_o = 0", "implicit, m = 0.001, B_o = 0.5", "explicit, m = 0.001, B_o = 0.5",
     ]  # fmt: skip
-    felt = [float(end) for _, end, _ in rows]
-    assert felt[0] < felt[2] < felt[4]
-    assert felt[1] == pytest.approx(felt[0], rel=0.1)
+    felt = [float(mean) for _, mean, _ in rows]
+    assert 2.0 * felt[0] < felt[1] < felt[3] < felt[5]
+    assert felt[2] == pytest.approx(felt[1], rel=0.1)
 
 
 def test_the_demo_s_model_explains_the_fresh_recording_to_its_noise(

@@ -98,6 +98,80 @@ def test_the_simplest_structure_that_holds_is_taken() -> None:
     assert chosen.certificate.certified
 
 
+@pytest.mark.parametrize(
+    ("damping", "samples"), [(1.0, 1), (0.049, 2), (0.036, 4), (0.030, 8), (0.0278, 16), (0.027, 0)]
+)
+def test_the_prediction_takes_the_fewest_samples_that_leave_a_tick_time_to_be_late(
+    damping: float, samples: int
+) -> None:
+    """A slope of 40 needs 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; 1.25 times as much."""
+    device = DeviceProfile(viscous_damping=damping, coulomb_friction=0.02)
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    chosen = plan(model, device)
+    assert chosen.scheme.predict == samples
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert chosen.certificate.longest_period_s >= 1.25 * device.period_s
+    assert plan(model, device, predict="off").scheme.predict == 0
+
+
+def test_a_prediction_never_costs_the_network_or_the_certificate() -> None:
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    for damping in (0.0201, 0.021, 0.023):
+        chosen = plan(model, DeviceProfile(viscous_damping=damping, coulomb_friction=0.02))
+        assert (chosen.limited, chosen.refused, chosen.scheme.predict) == (None, (), 0)
+        assert chosen.certificate is not None
+        assert chosen.certificate.certified
+
+
+def test_a_late_device_that_holds_a_model_only_with_a_prediction_gets_one() -> None:
+    """A sample of delay: slopes up to 40 need 0.060 without prediction, 0.052 with one of a sample."""
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3)
+    chosen = plan(model, device)
+    assert (chosen.limited, chosen.scheme.predict, str(chosen.verdict)) == (None, 1, "good")
+    without = plan(model, device, predict="off")
+    assert without.limited is not None
+
+
+def test_a_prediction_that_was_asked_for_is_taken_or_refused_but_not_dropped() -> None:
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    assert plan(model, DeviceProfile(coulomb_friction=0.02), predict=16).scheme.predict == 16
+    weak = plan(model, DeviceProfile(viscous_damping=0.03, coulomb_friction=0.02), predict=1)
+    assert weak.verdict.level == "no"
+    assert weak.scheme.predict == 1
+    assert "b >= T B(M, s_, m) needs 0.04" in weak.refused[0]
+    assert weak.needs.startswith("needs b >= 0.04")
+    for wrong in ("on", -1, 17, 2.0, True):
+        with pytest.raises(InputError, match="predict is"):
+            plan(model, KNOB, predict=wrong)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="predict is 4: must be 0"):
+        plan(model, KNOB, predict=4, coupling=True)
+
+
+def test_a_prediction_of_a_model_with_hysteresis_keeps_its_play_radius() -> None:
+    model = keyswitch_by_hand(play_radius=1e-4)
+    firm = slide(viscous_damping=20.0)
+    chosen = plan(model, firm)
+    assert chosen.scheme.predict == 1
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert plan(model, firm, predict=0).certificate != chosen.certificate
+
+
+def test_the_verb_takes_stores_and_names_the_samples_of_a_prediction(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model_by_hand(weight=[0.0], linear=[20.0]).save("soft.json")
+    for asked, samples in (("auto", 1), ("off", 0), ("4", 4)):
+        assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", asked, "-o", "p.json"]) == 0
+        shown = capsys.readouterr().out
+        assert (f"direct, predict {samples}" in shown) == (samples > 0)
+        assert Plan.of(load_model("p.json")).scheme.predict == samples
+    assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", "some"]) == 2
+    assert "give 0 to 16, auto or off" in capsys.readouterr().err
+
+
 def test_a_weak_device_gets_a_force_whose_slope_it_holds_and_is_told_the_loss() -> None:
     model = model_by_hand()
     chosen = plan(model, WEAK)
@@ -170,6 +244,26 @@ def test_an_object_with_mass_is_implicit_where_the_encoder_has_no_steps_and_else
     reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
     assert list(reasons) == ["direct", "direct, slope limited", "massless", "implicit", "energy-consistent"]
     assert "no bound is known" in reasons["implicit"]
+
+
+def test_a_falling_object_with_mass_is_stepped_energy_consistently_because_of_the_force_limit() -> None:
+    falling = model_by_hand(weight=[0.3])
+    chosen = plan(falling, SMOOTH, mass=1e-3)
+    assert chosen.structure == "energy-consistent"
+    reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
+    assert "use the energy-consistent structure" in reasons["implicit"]
+    damped = plan(falling, SMOOTH, mass=1e-3, damping=0.01)
+    assert damped.structure == "implicit", "2 B_o / T = 20 is above its steepest fall"
+
+
+def test_the_coupling_is_softer_on_a_late_device_and_still_certified() -> None:
+    stiffness = []
+    for delay_s in (0.0, 0.5e-3, 1e-3, 2e-3):
+        chosen = plan(model_by_hand(), DeviceProfile(id="late", encoder_step=0.0, delay_s=delay_s), mass=1e-3)
+        assert chosen.structure == "implicit"
+        stiffness.append(chosen.scheme.coupling_stiffness)
+    assert stiffness == sorted(stiffness, reverse=True)
+    assert stiffness[3] < 0.3 * stiffness[0]
 
 
 def test_a_plan_is_stored_and_holds_for_its_device_alone(tmp_path: Path) -> None:

@@ -233,10 +233,13 @@ def test_the_structures_stand_in_the_order_of_what_they_lose() -> None:
     model = model_by_hand(linear=[8.0])
     rows = compare_structures(model, bench_for(model), 4.0)
     assert [row.scheme.structure for row in rows] == [
-        "direct", "massless", "massless", "implicit", "implicit", "explicit",
+        "direct", "direct", "massless", "massless", "implicit", "implicit", "explicit",
     ]  # fmt: skip
-    assert [row.refused for row in rows] == [None] * 6
-    direct, compensated, massless, undamped, damped, explicit = (row.error.end for row in rows if row.error)
+    assert [row.refused for row in rows] == [None] * 7
+    predicted, direct, compensated, massless, undamped, damped, explicit = (
+        row.error.end for row in rows if row.error
+    )
+    assert predicted == pytest.approx(0.5 * direct, rel=0.1)
     assert compensated == pytest.approx(direct, rel=0.05)
     assert 3 * direct < massless < 1.1 * undamped < damped
     assert explicit == pytest.approx(damped, rel=0.02)
@@ -244,7 +247,7 @@ def test_the_structures_stand_in_the_order_of_what_they_lose() -> None:
 
 def test_compensation_of_a_slope_beyond_the_coupling_is_refused_with_its_reason() -> None:
     model = model_by_hand(linear=[95.0], upper=[0.05])
-    row = compare_structures(model, bench_for(model), 0.1)[1]
+    row = compare_structures(model, bench_for(model), 0.1)[2]
     assert row.recording is None
     assert row.error is None
     assert row.refused is not None

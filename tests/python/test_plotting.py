@@ -90,10 +90,10 @@ def test_recorded_is_dotted_and_rendered_is_solid() -> None:
 def test_structures_stand_from_top_to_bottom_with_both_errors() -> None:
     (one,) = axes(1)
     draw_structures(one, ["direct", "implicit, m = 0.001, B_o = 0"], [0.1, 0.2], [0.01, 0.15], "N")
-    end, instant = one.lines
-    np.testing.assert_array_equal(end.get_xdata(), [0.1, 0.2])
-    np.testing.assert_array_equal(instant.get_xdata(), [0.01, 0.15])
-    assert end.get_markerfacecolor() != instant.get_markerfacecolor()
+    mean, end = one.lines
+    np.testing.assert_array_equal(mean.get_xdata(), [0.1, 0.2])
+    np.testing.assert_array_equal(end.get_xdata(), [0.01, 0.15])
+    assert mean.get_markerfacecolor() != end.get_markerfacecolor()
     low, high = one.get_ylim()
     assert low > high, "the first structure stands at the top"
     assert one.get_xlabel() == "force error, RMS [N]"

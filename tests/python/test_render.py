@@ -32,6 +32,14 @@ def test_a_live_rendering_leaves_a_recording_and_its_timing(tmp_path: Path) -> N
     assert summary["lateness"]["p50_us"] <= summary["lateness"]["p999_us"] <= summary["lateness"]["max_us"]
 
 
+def test_the_energy_that_a_ramp_gives_is_told_apart() -> None:
+    energy = render(_core.Scheme(structure="direct"), duration_s=2.0)["energy"]
+    assert 0.0 <= energy["given_in_ramp_J"] <= energy["most_stored_J"]
+    assert 0.0 <= energy["given_J"] <= 1.1 * energy["most_stored_J"]
+    assert energy["sentence"].startswith("given ")
+    assert "J during the ramp" in energy["sentence"]
+
+
 def test_each_force_is_what_the_model_says_of_its_position(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
     model = load_model(MODEL)

@@ -11,6 +11,7 @@ from control_program import PATIENT, control, needs_program
 from palpate import Model, Recording, identify, read_recording, verify
 from palpate.cli.main import main
 from palpate.verification.flight import flight_of
+from test_planning import model_by_hand
 
 UNITS = {"position": "m", "force": "N"}
 
@@ -25,16 +26,16 @@ def keyswitch() -> Model:
 
 
 @needs_program
-@pytest.mark.parametrize("structure", ["direct", "massless"])
+@pytest.mark.parametrize(("structure", "predict"), [("direct", 0), ("massless", 0), ("direct", 4)])
 def test_a_flight_record_of_a_model_with_hysteresis_is_verified(
-    structure: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    structure: str, predict: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = keyswitch()
     assert model.kind == "hysteresis"
     assert model.play_radius is None
     model.save(tmp_path / "k.json")
     out = tmp_path / "again.csv"
-    words = ["--duration-s", 4, "--record", out, "--structure", structure, *PATIENT]
+    words = ["--duration-s", 4, "--record", out, "--structure", structure, "--predict", predict, *PATIENT]
     answer = control(tmp_path / "k.json", *words)
     assert answer.returncode == 0, answer.stderr
     assert main(["verify", str(tmp_path / "k.json"), str(out), "--json"]) == 0
@@ -49,3 +50,18 @@ def test_a_recording_that_is_no_flight_record_states_nothing() -> None:
     recording = Recording.from_arrays(np.arange(20.0), np.arange(20.0), metadata={"hand": "r = 3"})
     assert flight_of(recording).play_radius is None
     assert flight_of(recording).object_position is None
+
+
+@needs_program
+def test_a_flight_record_of_a_prediction_is_compared_at_the_predicted_position(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model_by_hand().save(tmp_path / "m.json")
+    out = tmp_path / "felt.csv"
+    answer = control(tmp_path / "m.json", "--duration-s", 2, "--record", out, "--predict", 4, *PATIENT)
+    assert answer.returncode == 0, answer.stderr
+    assert read_recording(out).metadata["structure"] == "direct, predict 4"
+    assert main(["verify", str(tmp_path / "m.json"), str(out), "--json"]) == 0
+    shown = capsys.readouterr()
+    assert json.loads(shown.out)["nrmse"] < 1e-6
+    assert "at the predicted position" in shown.out + shown.err

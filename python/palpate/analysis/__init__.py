@@ -9,12 +9,16 @@ from .failure_maps import (
     measure_failure_map,
     measure_guard_effects,
 )
+from .prediction import PREDICTIONS, PredictionGain, measure_prediction
 
 __all__ = [
+    "PREDICTIONS",
     "FailureLine",
     "FailureMap",
     "GuardEffect",
+    "PredictionGain",
     "failure_map_names",
     "measure_failure_map",
     "measure_guard_effects",
+    "measure_prediction",
 ]

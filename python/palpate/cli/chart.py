@@ -11,6 +11,7 @@ from .verb import Verbs
 
 _SUBJECTS = {
     "failures": "Where each method fails, measured beside its theory.",
+    "prediction": "Force error of the half-sample prediction, against the damping it needs.",
     "identification": "Identification beside its rivals, from the output of the benchmarks.",
     "speed": "Error against computing time, from the output of the benchmarks.",
 }

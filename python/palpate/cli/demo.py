@@ -114,6 +114,9 @@ def demo(output: Path, as_json: bool) -> None:
                             "scheme": row.name,
                             "force_error_end": None if row.error is None else row.error.end,
                             "force_error_instant": None if row.error is None else row.error.instant,
+                            "force_error_mean": None if row.error is None else row.error.mean,
+                            "force_error_band": None if row.error is None else row.error.band,
+                            "force_error_work": None if row.error is None else row.error.work,
                         }
                         for row in structures
                     ],
@@ -156,11 +159,17 @@ def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
     """Force error of each structure, or why it was refused."""
     print_line(f"force error of each structure, RMS in {unit}")
     print_table(
-        ("structure", "end of tick", "sampled"),
+        ("structure", "tick mean", "below 50 Hz", "end of tick", "sampled"),
         [
-            (row.name, number(row.error.end), number(row.error.instant))
+            (
+                row.name,
+                *(
+                    number(error)
+                    for error in (row.error.mean, row.error.band, row.error.end, row.error.instant)
+                ),
+            )
             if row.error is not None
-            else (row.name, "refused", "")
+            else (row.name, "refused", "", "", "")
             for row in rows
         ],
     )

@@ -188,8 +188,8 @@ def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, 
         draw_structures(
             axes,
             [name for name, _ in shown],
+            [error.mean for _, error in shown],
             [error.end for _, error in shown],
-            [error.instant for _, error in shown],
             force_unit,
         )
 

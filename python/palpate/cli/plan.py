@@ -32,6 +32,20 @@ if TYPE_CHECKING:
     from ..planning import Plan
 
 
+class Samples(click.ParamType[int | str]):
+    """A number of samples, auto or off; the function that takes it checks the range."""
+
+    name = "M|auto|off"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | str:
+        if value in ("auto", "off"):
+            return str(value)
+        try:
+            return int(value)
+        except ValueError:
+            self.fail(f"'{value}' is no number of samples: give 0 to 16, auto or off", param, ctx)
+
+
 class _PlanVerb(Verb):
     """The verb, or the list of example profiles, which needs neither model nor device."""
 
@@ -77,6 +91,13 @@ def _list_examples(*, as_json: bool) -> None:
 @click.option("--mass", type=float, default=None, help="m; the model's own. 0 leaves it out.")
 @click.option("--damping", type=float, default=None, help="B_o; the model's own. 0 leaves it out.")
 @click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
+@click.option(
+    "--predict",
+    type=Samples(),
+    default=None,
+    show_default="auto",
+    help="Samples used to predict the position half a sample ahead: M (0 to 16), auto or off. Direct only.",
+)
 @click.option(
     "--accept-force-error",
     type=float,
@@ -151,6 +172,8 @@ def structure_words(plan: Plan) -> str:
     words = [plan.structure]
     if plan.scheme.compensated:
         words.append("compensated")
+    if plan.scheme.predict:
+        words.append(f"predict {plan.scheme.predict}")
     if plan.limited is not None:
         words.append("with a limited network")
     return ", ".join(words)
@@ -193,6 +216,8 @@ def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: f
         )
     if plan.structure not in ("direct", "massless"):
         rows["object"] = f"m = {number(scheme.mass)}, B_o = {number(scheme.damping)}"
+    if scheme.predict:
+        rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
     if scheme.play_radius:
         rows["play radius"] = number(scheme.play_radius)
     felt, steepest = _felt_slopes(plan, certificate)

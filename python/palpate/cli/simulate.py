@@ -94,6 +94,9 @@ def simulate(
         "ticks": len(rendered),
         "force_error_end": error.end,
         "force_error_instant": error.instant,
+        "force_error_mean": error.mean,
+        "force_error_band": error.band,
+        "force_error_work": error.work,
         "force_error_share": share,
         "extrapolated": extrapolated,
         "status": dict(endings),
@@ -115,7 +118,11 @@ def simulate(
                 "duration": f"{number(duration_s)} s",
                 "force error, end of tick": f"{number(error.end)} {unit} RMS"
                 + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
+                "force error, mean of a tick": f"{number(error.mean)} {unit} RMS",
+                "force error, below 50 Hz": f"{number(error.band)} {unit} RMS",
                 "force error, sampled": f"{number(error.instant)} {unit} RMS",
+                "work of the force error": f"{number(error.work)}{' J' if unit else ''}"
+                + ("" if error.work >= 0.0 else ", given to the hand"),
                 "extrapolated": f"{100 * extrapolated:.3g} %",
                 "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
             }

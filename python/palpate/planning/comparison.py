@@ -15,6 +15,9 @@ from .simulation import ForceError, describe, force_error, simulate
 _COMPENSATED_DAMPING = 0.25
 """Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
 
+_PREDICT = 4
+"""Samples of the prediction that is compared [-]"""
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -34,9 +37,10 @@ class Comparison:
 def compare_structures(model: Model, bench: Bench, duration: float) -> tuple[Comparison, ...]:
     """Render a model with each structure and measure its force error.
 
-    The order is that of what they lose: direct; massless behind a coupling, with the coupling's spring taken
-    out of the model; massless; implicit with mass alone, then with the damping that the explicit structure
-    needs; explicit. A structure that the model or the device rules out is refused with its reason.
+    The order is that of what they lose: direct, with and without prediction; massless behind a coupling,
+    with the coupling's spring taken out of the model; massless; implicit with mass alone, then with the
+    damping that the explicit structure needs; explicit. A structure that the model or the device rules out is
+    refused with its reason.
 
     Parameters
     ----------
@@ -49,6 +53,7 @@ def compare_structures(model: Model, bench: Bench, duration: float) -> tuple[Com
     """
     quarter = _COMPENSATED_DAMPING * bench.scheme(model).coupling_damping
     schemes = (
+        bench.scheme(model, structure="direct", predict=_PREDICT),
         bench.scheme(model, structure="direct"),
         bench.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
         bench.scheme(model, structure="massless"),

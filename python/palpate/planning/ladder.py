@@ -7,8 +7,10 @@ import math
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from .. import _core
+from .._core import most_prediction_taps
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
@@ -30,6 +32,7 @@ def plan(
     mass: float | None = None,
     damping: float | None = None,
     play_radius: float | None = None,
+    predict: int | Literal["auto", "off"] = "auto",
     accept_force_error: float = ACCEPTED_FORCE_ERROR,
 ) -> Plan:
     """Choose the simplest structure that is certified for a model on a device.
@@ -53,6 +56,10 @@ def plan(
         them out.
     play_radius : float, optional
         r of a model with hysteresis [position].
+    predict : int, "auto" or "off"
+        Samples used to predict the position half a sample ahead, for direct rendering: a force that is held
+        for a sample comes half a sample late on average. "auto" takes the fewest of 1, 2, 4, 8 and 16 that
+        are certified and leave a tick a quarter of a period to be late; "off" is 0.
     accept_force_error : float
         Largest difference of the felt from the identified force that is accepted, as a share of the range of
         the identified force.
@@ -80,6 +87,7 @@ def plan(
         "accept_force_error": accept_force_error,
     }.items():
         _require_number(name, value)
+    samples = _samples_of(predict)
     unit = model.units["position"]
     if unit not in ("", device.position_unit):
         raise InputError(
@@ -100,12 +108,18 @@ def plan(
         mass=model.mass if mass is None else mass,
         damping=model.damping if damping is None else damping,
         play_radius=play_radius,
+        predict=samples,
     )
     bare = Model.from_dict(content)
     if bare.of_velocity and (wishes.coupling or wishes.dynamic):
         raise InputError(
             "a force of position and velocity is rendered directly: behind a coupling, or with a mass or "
             "damping beside it, no bound is known"
+        )
+    if samples and (bare.of_velocity or wishes.coupling or wishes.dynamic):
+        raise InputError(
+            f"predict is {samples}: must be 0 (off) for a coupling, a mass, a damping or a force of "
+            "velocity; a prediction is certified for direct rendering of a force of position"
         )
     refused: list[str] = []
     chosen: Plan | None = None
@@ -150,6 +164,15 @@ def find_profile(device: _core.DeviceProfile | str | os.PathLike[str]) -> _core.
             f"device is '{device}': there is no such file, and no such example; {_example_names()}"
         )
     return DeviceProfile.load(file)
+
+
+def _samples_of(predict: object) -> int | None:
+    """Samples of a prediction, None where they are to be chosen."""
+    if predict in ("auto", "off"):
+        return None if predict == "auto" else 0
+    if isinstance(predict, int) and not isinstance(predict, bool) and 0 <= predict <= most_prediction_taps:
+        return predict
+    raise InputError(f'predict is {predict!r}: must be "auto", "off" or 0 to {most_prediction_taps}')
 
 
 def _example_names() -> str:

@@ -53,7 +53,7 @@ def needed(
         Whether a plan that is only stable is not enough.
     """
     names = _rungs(model, wishes)
-    as_identified = replace(wishes, limited=False)
+    as_identified = replace(wishes, limited=False, predict=wishes.predict or 0)
 
     def fits(changed: DeviceProfile) -> bool:
         for name in names:

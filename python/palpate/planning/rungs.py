@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .. import _core
 from .._core import DeviceProfile, Scheme
@@ -34,6 +34,13 @@ _WIDER_PLAY = 1.02
 
 _NOT_LIMITED = "the model is to be rendered as it was identified"
 
+_PREDICTIONS = (1, 2, 4, 8, 16)
+"""Samples tried for a prediction. Few react faster, with less force error; many need less damping [-]"""
+
+_LATE_TICK = 1.25
+"""Time between two samples for which a chosen prediction must hold, unless none is certified that long
+[longest time between samples of the device]"""
+
 _LEAST_LOSS = 1.0 / 64.0
 """Smallest share of the loss h that is still worth rendering [-]"""
 
@@ -48,6 +55,8 @@ class Wishes:
     mass: float | None = None
     damping: float | None = None
     play_radius: float | None = None
+    predict: int | None = None
+    """Samples of the prediction; 0: none; None: chosen"""
     limited: bool = True
     """Whether a limited network may be rendered in place of the identified one"""
 
@@ -76,12 +85,13 @@ def direct(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         return "a coupling was asked for"
     plan = Plan(model, _direct_scheme(model, device, wishes)).certified_for(device)
     if not (plan.certificate and plan.certificate.refused and _chooses_play(model, wishes)):
-        return plan
+        return _predicted(plan, device, wishes)
     # Bounds of the sum g' + h / r can be wider than the sum of the bounds, from which r was chosen.
     longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
     wider = min(_WIDER_PLAY * plan.scheme.play_radius, longest)
-    again = Plan(model, Scheme(structure="direct", play_radius=wider)).certified_for(device)
-    return plan if again.certificate and again.certificate.refused else again
+    scheme = Scheme(structure="direct", play_radius=wider, predict=plan.scheme.predict)
+    again = Plan(model, scheme).certified_for(device)
+    return _predicted(plan if again.certificate and again.certificate.refused else again, device, wishes)
 
 
 def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
@@ -92,6 +102,8 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
         return "a coupling was asked for"
     if not wishes.limited:
         return _NOT_LIMITED
+    if wishes.predict:
+        return _only_direct(wishes)
     low, high = renderable_slopes(device, model=model)
     if high <= 0.0:
         return _no_slope(device)
@@ -102,7 +114,8 @@ def direct_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> Outco
     )
     if limited is None:
         return f"no network was found whose slopes lie between {low:.4g} and {high:.4g}"
-    return Plan(model, _direct_scheme(limited, device, wishes), limited=limited).certified_for(device)
+    plan = Plan(model, _direct_scheme(limited, device, wishes), limited=limited).certified_for(device)
+    return _predicted(plan, device, wishes)
 
 
 def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
@@ -155,6 +168,8 @@ def energy_consistent(model: Model, device: DeviceProfile, wishes: Wishes) -> Ou
 
 def explicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     """The paper's structure: stable at best."""
+    if wishes.predict:
+        return _only_direct(wishes)
     radius = wishes.play_radius or usual_play_radius(model, device)
     scheme = explicit_scheme(
         _core.force_bounds(model, radius, device.force_limit),
@@ -192,6 +207,30 @@ RUNGS: Mapping[str, Rung] = {
 }
 
 
+def _only_direct(wishes: Wishes) -> str:
+    return f"it has no prediction of the model as it was identified, and predict is {wishes.predict}"
+
+
+def _predicted(plan: Plan, device: DeviceProfile, wishes: Wishes) -> Plan:
+    """The same plan with the fewest samples of prediction that are certified; without where none are.
+
+    A prediction spends damping, and with it the time that a tick may be late: it must leave `_LATE_TICK`, or
+    what there is without it. Where nothing is certified without a prediction, any that is certified is taken.
+    """
+    assert plan.certificate is not None
+    if wishes.predict is not None or plan.model.of_velocity:
+        return plan
+    enough = min(_LATE_TICK * device.longest_period_s, plan.certificate.longest_period_s)
+    scheme = plan.scheme
+    for samples in _PREDICTIONS:
+        ahead = Scheme(structure="direct", play_radius=scheme.play_radius, predict=samples)
+        proposed = replace(plan, scheme=ahead).certified_for(device)
+        found = proposed.certificate
+        if found is not None and found.certified and found.longest_period_s >= enough:
+            return proposed
+    return plan
+
+
 def _no_slope(device: DeviceProfile) -> str:
     return (
         f"the device can hold no slope at all: friction {device.coulomb_friction:.4g}, damping "
@@ -209,7 +248,7 @@ def _direct_scheme(model: Model, device: DeviceProfile, wishes: Wishes) -> Schem
     if _chooses_play(model, wishes):
         travel = float(model.upper[0] - model.lower[0])
         radius = min(play_radius_for(model, device), LONGEST_PLAY * travel)
-    return Scheme(structure="direct", play_radius=radius)
+    return Scheme(structure="direct", play_radius=radius, predict=wishes.predict or 0)
 
 
 def _within(model: Model, low: float, high: float, device: DeviceProfile) -> Model | None:

@@ -68,7 +68,8 @@ def simulate(
         Position as the encoder reads it and force as the device applies it, with time, so that what was
         rendered can be identified and verified like anything else. Further columns: the handle's true
         position at the start, in the middle and at the end of each tick, the environment's position, the
-        commanded force, the mean force over the tick, the number of evaluations, the status as a word, and whether the model was extrapolated (1) or not (0).
+        commanded force, the mean force over the tick, the number of evaluations, the status as a word, and
+        whether the model was extrapolated (1) or not (0).
 
     Raises
     ------
@@ -131,7 +132,7 @@ class ForceError:
     band: float
     """Of that mean below 50 Hz: the part that a hand can follow"""
     work: float
-    """Work of the error on the handle's motion, over the whole time [J]; below 0 the rendering gives energy"""
+    """Work of the error over the whole time [J]; below 0 the rendering gives energy"""
 
 
 def force_error(plan: Plan, rendered: Recording) -> ForceError:
@@ -266,4 +267,3 @@ def describe(scheme: Scheme) -> str:
 
 def _suffix(unit: str) -> str:
     return f"_{COLUMN_SUFFIX[unit]}" if unit else ""
-

@@ -5,6 +5,7 @@ from .failure_maps import MeasuredLimit, draw_failure_map
 from .identification import Reached, draw_legend, draw_over_speed, draw_reached
 from .measured_and_modelled import draw_measured_and_modelled
 from .path import draw_path
+from .prediction import draw_prediction
 from .real_against_rendered import draw_real_against_rendered
 from .root_locus import draw_root_locus
 from .speed import (
@@ -34,6 +35,7 @@ __all__ = [
     "draw_over_speed",
     "draw_over_wavelets",
     "draw_path",
+    "draw_prediction",
     "draw_reached",
     "draw_real_against_rendered",
     "draw_rendered_force",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What each rendering structure costs: its force error, felt and sampled."""
+"""What each rendering structure costs: its force error."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .look import grid, plain_decades, scale_for
 
 
 def draw_structures(
-    axes: Axes, names: Sequence[str], end: Sequence[float], instant: Sequence[float], force_unit: str
+    axes: Axes, names: Sequence[str], mean: Sequence[float], end: Sequence[float], force_unit: str
 ) -> None:
-    """RMS force error of each structure, at the end of the tick and at its sampling instant, on a log axis.
+    """RMS force error of each structure, of the mean of a tick and at its end, on a log axis.
 
     Parameters
     ----------
@@ -22,29 +22,29 @@ def draw_structures(
         Where to draw.
     names : sequence of str
         The structures, best first; drawn from top to bottom.
-    end, instant : sequence of float
+    mean, end : sequence of float
         Their force errors [N*m or N].
     force_unit : str
         The unit of both.
     """
-    x = scale_for(force_unit, end, instant)
+    x = scale_for(force_unit, mean, end)
     place = np.arange(len(names), dtype=np.float64)
     axes.plot(
-        np.multiply(end, x.factor),
+        np.multiply(mean, x.factor),
         place - 0.12,
         linestyle="none",
         marker="o",
         color="black",
-        label="end of tick",
+        label="mean of a tick",
     )
     axes.plot(
-        np.multiply(instant, x.factor),
+        np.multiply(end, x.factor),
         place + 0.12,
         linestyle="none",
         marker="o",
         color="black",
         markerfacecolor="white",
-        label="sampling instant",
+        label="end of tick",
     )
     axes.set_xscale("log")
     plain_decades(axes.xaxis)

@@ -25,7 +25,9 @@ class FlightRecord:
     play_radius: float | None = None
     """[position]"""
     object_position: Float1D | None = None
-    """(n,) position of the virtual object behind a coupling"""
+    """(n,) position at which the force was computed: behind a coupling, or predicted"""
+    predicted: bool = False
+    """True if it is a predicted position of the handle"""
 
 
 def flight_of(recording: Recording) -> FlightRecord:
@@ -33,9 +35,11 @@ def flight_of(recording: Recording) -> FlightRecord:
     structure = recording.metadata.get(_STRUCTURE, "")
     found = re.search(r"\br = ([0-9.eE+-]+)", structure)
     radius = float(found.group(1)) if found else None
-    if not structure or structure.startswith("direct") or "compensated" in structure:
+    predicted = ", predict " in structure
+    directly = structure.startswith("direct") and not predicted
+    if not structure or directly or "compensated" in structure:
         return FlightRecord(radius)
     for name, cells in recording.columns.items():
         if name.startswith(_OBJECT_POSITION) and cells.dtype.kind == "f" and np.isfinite(cells).all():
-            return FlightRecord(radius, np.asarray(cells, dtype=np.float64))
+            return FlightRecord(radius, np.asarray(cells, dtype=np.float64), predicted)
     return FlightRecord(radius)

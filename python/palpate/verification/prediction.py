@@ -53,7 +53,8 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
     direction, time and play radius, the strokes are those of the order of rows. Without a direction, or with
     a play radius, its play operator follows the positions in their order. The radius is the first of these
     that is known: `play_radius`, the flight record's, the model's, its plan's, 1 % of the travel.
-    A flight record behind a virtual coupling is compared at the position of the virtual object.
+    A flight record behind a virtual coupling is compared at the position of the virtual object, one of a
+    predicted position at that.
 
     Raises
     ------
@@ -111,8 +112,10 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
     if flight.object_position is not None:
         position = flight.object_position
         notes = (
-            "the force is compared at the position of the virtual object: a virtual coupling lies between it "
-            "and the handle",
+            "the force is compared at the predicted position, half a sample ahead of the handle"
+            if flight.predicted
+            else "the force is compared at the position of the virtual object: a virtual coupling lies "
+            "between it and the handle",
         )
     side = None
     if not model.hysteretic:
@@ -148,7 +151,7 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
         resting = (f"{left_out} rows without a direction (pause, hold) are left out",) if left_out else ()
         return _State(recording.direction.astype(float), rows, resting)
     radius, origin = _radius(model, flight, play_radius)
-    if flight.object_position is None:
+    if flight.object_position is None or flight.predicted:
         whole = recording.motion
     else:
         whole = Motion(flight.object_position, recording.time, np.arange(len(recording)))
@@ -161,7 +164,12 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
     )
     if left_out := int(np.count_nonzero(~known)):
         notes += (f"{left_out} rows before the motion has covered the play are left out",)
-    return _State(play.side[whole.rows], known, notes)
+    side = play.side[whole.rows]
+    if flight.predicted and flight.object_position is not None:
+        # The play follows the handle; the force is that of a trial move from there.
+        ahead = flight.object_position - recording.position
+        side = np.clip(side + ahead / radius, -1.0, 1.0)
+    return _State(side, known, notes)
 
 
 def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:

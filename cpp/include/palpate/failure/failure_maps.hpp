@@ -22,19 +22,21 @@ struct NamedFailureMap {
 };
 
 /// Every map that can be measured.
-inline constexpr std::array<NamedFailureMap, 14> failure_maps{{{"explicit", explicit_map},
-                                                               {"damping", damping_map},
-                                                               {"prediction", prediction_map},
-                                                               {"period", period_map},
-                                                               {"encoder", encoder_map},
-                                                               {"play", play_map},
-                                                               {"coupling", coupling_map},
-                                                               {"falling", falling_map},
-                                                               {"limit", limit_map},
-                                                               {"coupled-encoder", coupled_encoder_map},
-                                                               {"hand", hand_map},
-                                                               {"solver", solver_map},
-                                                               {"pole", pole_map},
-                                                               {"guard", guard_map}}};
+inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
+    {"explicit", explicit_map},
+    {"damping", damping_map},
+    {"prediction", prediction_map},
+    {"period", period_map},
+    {"encoder", encoder_map},
+    {"play", play_map},
+    {"coupling", coupling_map},
+    {"falling", falling_map},
+    {"limit", limit_map},
+    {"coupled-encoder", coupled_encoder_map},
+    {"hand", hand_map},
+    {"solver", solver_map},
+    {"pole", pole_map},
+    {"guard", guard_map},
+});
 
 }  // namespace palpate

@@ -28,8 +28,8 @@ struct GuardSettings {
     double device_damping = 0.0;   ///< b that the device is known to have [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< f_c likewise [N or N*m]
     double encoder_step = 0.0;     ///< [m or rad]
-    /// A certificate holds for this run: the energy tank counts on all of the device's damping and friction, and on what
-    /// the object stores beyond its domain.
+    /// A certificate holds for this run: the energy tank counts on the motion that readings prove, on all
+    /// of the device's damping and friction, and on what the object stores beyond its domain.
     bool certified = false;
 };
 

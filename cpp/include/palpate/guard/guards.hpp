@@ -84,15 +84,18 @@ struct Guards {
     guards.limit = force_limit(settings);
     guards.ramp = force_ramp(settings, period_s);
     guards.slew = slew_limit(settings, period_s);
-    guards.motion = ReadMotion{settings.encoder_step};
+    guards.motion = ReadMotion{settings.certified ? settings.encoder_step : 0.0};
     if (settings.energy_tank) {
         StoredEnergySettings stored = stored_energy(model, scheme, settings.force_limit, period_s);
         if (!settings.certified) {
             stored = {.within = stored.within};
         }
         const double share = settings.certified ? 1.0 : uncertified_credit;
-        guards.tank =
-            EnergyTank{{stored, share * settings.device_damping, share * settings.device_friction, period_s}};
+        guards.tank = EnergyTank{{.stored = stored,
+                                  .damping = share * settings.device_damping,
+                                  .friction = share * settings.device_friction,
+                                  .unsure = settings.certified ? 0.0 : settings.encoder_step,
+                                  .period_s = period_s}};
     }
     if (settings.buzz_force > 0.0) {
         guards.buzz = LimitCycleDetector{{settings.buzz_force, longest_swing, settings.encoder_step}};

@@ -23,23 +23,37 @@ namespace palpate {
 /// D alone rings on stiff walls. With the switch it stands in for f(y) only where f(y) would generate energy,
 /// (f(y) - D)(y - y_{k-1}) < 0.
 ///
+/// Every root keeps the energy account. With f' >= -s, D + p y = q has one root y_D where p > s/2, because D falls
+/// by at most s/2; the switched step has one where p > s, and up to three between. The step takes y_D if D stands in
+/// for f there. Otherwise f + p y - q has changed its sign between y_{k-1} and y_D, and the step takes its root that
+/// is nearest to y_{k-1}: D + p y < q there, so that f stands for itself. `Solver` finds that root; one that cannot
+/// tell the nearest may find another between y_{k-1} and y_D.
+///
 /// A force limit acts as in `Implicit`: beyond it device and object both get G = +-F_max.
-template <Environment E>
+template <Environment E, class Solver = LoadLineSolver>
 class EnergyConsistent {
   public:
     /// `shortest`: steps below it take D from Gauss points of f, because the quotient loses digits; 1e-2 of
     /// the finest wavelet's width is right.
     EnergyConsistent(E environment, Inertia inertia, VirtualCoupling coupling, double period,
                      double shortest = 1e-4, bool switched = true,
-                     double force_limit = std::numeric_limits<double>::infinity())
+                     double force_limit = std::numeric_limits<double>::infinity(), Solver solver = {})
         : environment_{std::move(environment)},
           inertia_{inertia},
           coupling_{coupling},
           period_{period},
           shortest_{shortest},
           switched_{switched},
-          force_limit_{force_limit} {
+          force_limit_{force_limit},
+          solver_{std::move(solver)} {
         reset(0.0);
+    }
+
+    /// p of every step behind the coupling.
+    [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
+                                                double period) noexcept {
+        return 2.0 * inertia.mass / (period * period) + inertia.damping / period + coupling.stiffness +
+               coupling.damping / period;
     }
 
     void reset(double position) noexcept {
@@ -53,7 +67,7 @@ class EnergyConsistent {
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
         const double push = coupling_.force(device, device_velocity + position_ / period_);
-        const Solution solution = solve(coupling_, push, position_);
+        const Solution solution = solve(coupling_, push);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
@@ -61,7 +75,7 @@ class EnergyConsistent {
                                              device_velocity - (solution.position - position_) / period_);
         if (std::abs(force) > force_limit_) {
             const double limited = std::copysign(force_limit_, force);
-            const Solution driven = solve({0.0, 0.0}, limited, solution.position);
+            const Solution driven = search({0.0, 0.0}, limited, solution.position);
             if (driven.status == Status::NonFinite) {
                 return detail::refused(position_);
             }
@@ -77,7 +91,7 @@ class EnergyConsistent {
 
     /// Without the coupling: a given force drives the environment.
     [[nodiscard]] Rendered drive(double force) noexcept {
-        const Solution solution = solve({0.0, 0.0}, force, position_);
+        const Solution solution = solve({0.0, 0.0}, force);
         return solution.status == Status::NonFinite ? detail::refused(position_) : moved_to(solution, force);
     }
 
@@ -96,8 +110,7 @@ class EnergyConsistent {
         [[nodiscard]] EnvironmentSample at(double y, const State& state) const noexcept {
             EnvironmentSample sample = environment.at(y, state);
             const double moved = y - from;
-            const double quotient =
-                std::abs(moved) > shortest ? (sample.energy - energy) / moved : mean(y, state);
+            const double quotient = mean(y, sample, state);
             if (!switched || (sample.force - quotient) * moved < 0.0) {
                 // D' = (f - D) / (y - from), and half of f' where that is nothing over nothing.
                 sample.slope =
@@ -109,8 +122,18 @@ class EnergyConsistent {
         void advance(double y, State& state) const noexcept { environment.advance(y, state); }
         [[nodiscard]] State start(double y) const noexcept { return environment.start(y); }
 
-        /// The mean of f between `from` and y by three Gauss points.
-        [[nodiscard]] double mean(double y, const State& state) const noexcept {
+        /// Whether f would generate energy at y.
+        [[nodiscard]] bool generates(double y, const State& state) const noexcept {
+            const EnvironmentSample sample = environment.at(y, state);
+            return (sample.force - mean(y, sample, state)) * (y - from) < 0.0;
+        }
+
+        /// D, near `from` by three Gauss points.
+        [[nodiscard]] double mean(double y, const EnvironmentSample& at_y,
+                                  const State& state) const noexcept {
+            if (std::abs(y - from) > shortest) {
+                return (at_y.energy - energy) / (y - from);
+            }
             const double middle = 0.5 * (from + y);
             const double offset = 0.7745966692414834 * 0.5 * (y - from);
             return (5.0 * environment.at(middle - offset, state).force +
@@ -120,17 +143,71 @@ class EnergyConsistent {
         }
     };
 
-    /// The end of the step, searched from `start`. `push` is what the coupling would exert on an environment at
-    /// rest at 0, its damper's memory included.
-    [[nodiscard]] Solution solve(VirtualCoupling coupling, double push, double start) const noexcept {
-        const double memory = 2.0 * inertia_.mass / (period_ * period_) + inertia_.damping / period_;
-        const LoadLine line{memory + coupling.stiffness + coupling.damping / period_,
-                            memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + push};
-        const Stepped stepped{environment_, position_, environment_.at(position_, state_).energy, shortest_,
-                              switched_};
-        Solution solution = LoadLineSolver{}.solve(stepped, state_, line, start);
+    /// `push` is what the coupling would exert on an environment at rest at 0, its damper's memory included.
+    [[nodiscard]] LoadLine line_of(VirtualCoupling coupling, double push) const noexcept {
+        const double memory = load_line_slope(inertia_, {0.0, 0.0}, period_);
+        return {load_line_slope(inertia_, coupling, period_),
+                memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + push};
+    }
+
+    [[nodiscard]] Stepped stepped(bool switched) const noexcept {
+        return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
+    }
+
+    /// The first root of the step that is met from `start`.
+    [[nodiscard]] Solution search(VirtualCoupling coupling, double push, double start) const noexcept {
+        Solution solution =
+            LoadLineSolver{}.solve(stepped(switched_), state_, line_of(coupling, push), start);
         ++solution.evaluations;
         return solution;
+    }
+
+    /// The end of the step.
+    [[nodiscard]] Solution solve(VirtualCoupling coupling, double push) const noexcept {
+        const LoadLine line = line_of(coupling, push);
+        const Stepped quotient = stepped(false);
+        const LoadLineSolver newton;
+        int evaluations = 1;
+        const auto generates = [&](const Solution& solution) {
+            evaluations += solution.evaluations + 1;
+            return quotient.generates(solution.position, state_);
+        };
+        const auto up_to = [&](double y) {
+            return Bracket{std::fmin(position_, y), std::fmax(position_, y)};
+        };
+        const auto end = [&](Solution solution, int more) {
+            solution.evaluations = evaluations + more;
+            return solution;
+        };
+        typename Solver::Memory memory{position_};
+        if (switched_ && solver_.unique(line.slope)) {
+            const Solution by_force = solver_.solve(environment_, state_, line, memory);
+            if (by_force.status != Status::Ok || !generates(by_force)) {
+                return end(by_force, 0);
+            }
+            // The one root of the step is y_D, because it cannot be that of f.
+            const Solution by_energy =
+                newton.solve(quotient, state_, line, by_force.position, up_to(by_force.position));
+            return end(by_energy, by_energy.evaluations);
+        }
+        const Solution by_energy = newton.solve(quotient, state_, line, position_);
+        if (!switched_ || by_energy.status != Status::Ok) {
+            return end(by_energy, by_energy.evaluations);
+        }
+        if (generates(by_energy)) {
+            return end(by_energy, 0);
+        }
+        const Bracket between = up_to(by_energy.position);
+        if (solver_.tabulated()) {
+            const Solution nearest = solver_.solve(environment_, state_, line, memory);
+            if (nearest.status == Status::Ok && nearest.position >= between.low &&
+                nearest.position <= between.high) {
+                return end(nearest, nearest.evaluations);
+            }
+            evaluations += nearest.evaluations;
+        }
+        const Solution any = newton.solve(environment_, state_, line, by_energy.position, between);
+        return generates(any) ? end(by_energy, 0) : end(any, 0);
     }
 
     [[nodiscard]] Rendered moved_to(const Solution& solution, double force) noexcept {
@@ -147,6 +224,7 @@ class EnergyConsistent {
     double shortest_;
     bool switched_;
     double force_limit_;  ///< F_max
+    Solver solver_;
     typename E::State state_;
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}

@@ -171,9 +171,13 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
                 return visit(Implicit{std::move(environment), scheme.inertia, scheme.coupling, period_s,
                                       solver_of(p), force_limit, solver_of(alone)});
             }
-            case StructureKind::EnergyConsistent:
+            case StructureKind::EnergyConsistent: {
+                const double p =
+                    EnergyConsistent<E>::load_line_slope(scheme.inertia, scheme.coupling, period_s);
                 return visit(EnergyConsistent{std::move(environment), scheme.inertia, scheme.coupling,
-                                              period_s, 1e-2 * model.finest_width(), true, force_limit});
+                                              period_s, 1e-2 * model.finest_width(), true, force_limit,
+                                              solver_of(p)});
+            }
             case StructureKind::Explicit:
                 break;
         }

@@ -340,32 +340,29 @@ class CertifiedSolver {
         return {static_cast<std::size_t>(above - borders_.begin()), turned};
     }
 
-    /// Where the chords of the sheets over cell k reach q.
+    /// Where the chords of the sheets over cell k reach q. On a half-line its end: every sheet is a line there.
     [[nodiscard]] double interpolated(std::size_t k, double turned, LoadLine line,
                                       double play) const noexcept {
+        if (k == 0 || k == borders_.size()) {
+            return borders_[k == 0 ? 0 : k - 1].position + turned;
+        }
         const Cell cell = cell_at(k, turned);
-        const bool half_line = k == 0 || k == borders_.size();
-        const Border& from = borders_[k == 0 ? 0 : k - 1];
-        const Border& to = borders_[half_line ? 0 : k];
-        const double end_slope = line.slope + (k == 0 ? slope_below_ : slope_above_);
-        const double y = from.position + turned;
-        const auto chord = [&](double at_from, double at_to, double gain) {
-            const double missing = line.intercept - (from.force + at_from + line.slope * y);
-            if (half_line) {
-                return y + missing / (end_slope + gain);
-            }
-            const double width = to.position - from.position;
-            return y + width * missing / (to.force - from.force + at_to - at_from + line.slope * width);
+        const Border& from = borders_[k - 1];
+        const Border& to = borders_[k];
+        const double width = to.position - from.position;
+        const double missing = line.intercept - (from.force + line.slope * cell.low);
+        const double rise = to.force - from.force + line.slope * width;
+        const auto chord = [&](double from_s, double to_s) {
+            const double at_from = from_s * from.loss;
+            return cell.low + width * (missing - at_from) / (rise + to_s * to.loss - at_from);
         };
         double start = 0.0;
         if (may_stick(cell, play)) {
-            const double from_s = (y - play) * by_radius_;
-            const double to_s = (to.position + turned - play) * by_radius_;
-            start = median(chord(from.loss, to.loss, 0.0), chord(-from.loss, -to.loss, 0.0),
-                           chord(from_s * from.loss, to_s * to.loss, from.loss * by_radius_));
+            start = median(chord(1.0, 1.0), chord(-1.0, -1.0),
+                           chord((cell.low - play) * by_radius_, (cell.high - play) * by_radius_));
         } else {
             const double s = direction(cell, play);
-            start = chord(s * from.loss, s * to.loss, 0.0);
+            start = chord(s, s);
         }
         return std::clamp(start, cell.low, cell.high);
     }
@@ -484,7 +481,6 @@ class CertifiedSolver {
                 if (!(p + slope + std::min(0.0, gain) > 0.0) || piece.loss.linear[0] != 0.0) {
                     return;
                 }
-                (std::isfinite(lower) ? slope_above_ : slope_below_) = slope;
                 continue;
             }
             for (double from = lower; from < upper;) {
@@ -514,10 +510,8 @@ class CertifiedSolver {
     double radius_;     ///< r of a hysteresis; else 0
     double by_radius_;  ///< 1 / r; else 0
     double travel_;
-    double period_;     ///< of a knob; else 0
-    double tolerance_;  ///< of the position
-    double slope_below_ = 0.0;
-    double slope_above_ = 0.0;
+    double period_;                  ///< of a knob; else 0
+    double tolerance_;               ///< of the position
     double least_slope_ = infinity;  ///< p for which the cells are certified; larger ones are as well
     std::vector<Border> borders_;
 };

@@ -89,7 +89,7 @@ namespace detail {
                     late ? "b >= T (B(M_h, s_h, t_d) + L_h / 2)" : "b >= T (M_h + L_h) / 2"),
                 detail::friction_inequality(
                     device, gain * bounds.sliding + (gain + 1.0) * bounds.loss_per_play, bounds.mean_force,
-                    "(q max(|g'| + |h'|) + (q + 1) max h / r) Delta / 2")};
+                    "((m + 3) max(|g'| + |h'|) + (2 m + 4) max h / r) / (m + 1) Delta / 2")};
     }
     const auto hold = [&](double more, const std::string& added) {
         return detail::hold_inequality(device, {bounds.rising() + more, bounds.falling() + more}, 0.0,
