@@ -44,6 +44,7 @@ namespace palpate::energy_search {
         }
         damping("prediction, steep shapes", n == 0.0,
                 [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
+        damping("prediction, hysteresis", false, draw_predicted_hysteresis);
         damping("prediction", false,
                 [](R& random, double delay) { return draw_prediction(random, delay, false); });
         damping("wheel", false, [](R& random, double delay) { return draw_wheel(random, delay, false); });
@@ -64,6 +65,9 @@ namespace palpate::energy_search {
                 behind(StructureKind::EnergyConsistent, Regime::Limited));
         if (!whole) {
             continue;
+        }
+        if (n == 0.0) {
+            friction("wheel with hysteresis, mean", false, draw_hysteresis_wheel);
         }
         friction("wheel, mean", false,
                  [](R& random, double delay) { return draw_wheel(random, delay, true); });
