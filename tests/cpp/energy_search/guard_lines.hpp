@@ -228,8 +228,12 @@ template <class MeanOf>
                      cost.damping *= damping;
                      cost.friction *= friction;
                      ValueIteration search{shared->scene.read.grid, shared->levels.back(), cost};
-                     for (auto level = shared->levels.rbegin(); level != shared->levels.rend(); ++level) {
-                         search.precede(*level);
+                     const std::vector<ForceTable>& levels = shared->levels;
+                     for (std::size_t level = levels.size(); level-- > 0;) {
+                         if (cost.late > 0.0 && level + 1 < levels.size()) {
+                             search.precede_once(levels[level + 1], levels[level]);
+                         }
+                         search.precede(levels[level]);
                          if (search.run(shared->scene.held).violated()) {
                              return true;
                          }
@@ -281,8 +285,12 @@ template <class MeanOf>
                      if (search.run(shared->scene.held).violated()) {
                          return true;
                      }
-                     for (auto table = shared->rising.rbegin(); table != shared->rising.rend(); ++table) {
-                         search.precede_once(*table);
+                     const std::vector<ForceTable>& rising = shared->rising;
+                     if (cost.late > 0.0) {
+                         search.precede_once(shared->scene.table, rising.back());
+                     }
+                     for (std::size_t k = rising.size(); k-- > 0;) {
+                         search.precede_once(rising[k], rising[k > 0 ? k - 1 : 0]);
                      }
                      return search.found(shared->scene.held).violated();
                  },

@@ -131,8 +131,8 @@ struct Cost {
     double late = 0.0;      ///< tau, the further part of a sample during which the last command still acts
 
     /// Least energy that the hand pays for a move d while the force changes from `old` to `now` after tau T.
-    /// Within each part the path is straight: an uneven one costs more.
-    [[nodiscard]] double of_move(double d, double old, double now) const noexcept {
+    /// Within each part the path is straight: an uneven one costs more. The first part stays within [down, up].
+    [[nodiscard]] double of_move(double d, double old, double now, double down, double up) const noexcept {
         if (late == 0.0) {
             return now * d + damping * d * d + friction * std::abs(d);
         }
@@ -145,6 +145,7 @@ struct Cost {
         } else if (part < low) {
             part = std::min(low, late * d - (old - now - 2.0 * friction) * shift);
         }
+        part = std::clamp(part, down, up);
         const double rest = d - part;
         return old * part + now * rest + damping * (part * part / late + rest * rest / (1.0 - late)) +
                friction * (std::abs(part) + std::abs(rest));
@@ -170,7 +171,7 @@ struct Finding {
     double taken = 0.0;      ///< largest of -E - (S_0 - S_min) over the starts at rest [J]
     bool cycle = false;      ///< some motion takes energy out again and again
     bool converged = false;  ///< no motion on the grid takes more
-    double scale = 0.0;      ///< largest force times longest move [J]
+    double scale = 0.0;      ///< largest force times the way from end to end [J]
 
     [[nodiscard]] bool violated() const noexcept { return cycle || taken > 1e-6 * scale; }
 };
@@ -183,6 +184,7 @@ class ValueIteration {
     ValueIteration(const Grid& grid, const ForceTable& table, const Cost& cost)
         : grid_{grid},
           table_{&table},
+          before_{&table},
           cost_{cost},
           windows_{grid, cost.delay + table.memory + (cost.late > 0.0 ? 1 : 0)},
           nodes_{grid.nodes()},
@@ -196,6 +198,7 @@ class ValueIteration {
     ValueIteration(const Grid& grid, const ForceTable& table, const Clock& clock)
         : grid_{grid},
           table_{&table},
+          before_{&table},
           cost_{},
           windows_{grid, clock.older()},
           nodes_{grid.nodes()},
@@ -208,13 +211,14 @@ class ValueIteration {
     /// `held[i]` is S_0 - S_min at node i, at rest. Stops at the first motion that takes energy out.
     [[nodiscard]] Finding run(const std::vector<double>& held, int sweeps = 2000) {
         Finding finding;
-        finding.scale = largest_force_ * longest_move_ + 1e-300;
-        const double least_gain = 1e-11 * finding.scale;
+        finding.scale =
+            largest_force_ * std::max(longest_move_, grid_.position.back() - grid_.position.front()) + 1e-300;
+        const double least_gain = 1e-11 * largest_force_ * longest_move_;
         for (int sweep = 0; sweep < sweeps && !finding.violated(); ++sweep) {
             const double gain = sweep_once(sweep % 2 == 0, least_gain);
             finding.converged = gain <= least_gain;
             if (sweep % 8 == 7 || finding.converged) {
-                finding.cycle = a_cycle_pays(1e-10 * finding.scale);
+                finding.cycle = a_cycle_pays(10.0 * least_gain);
                 finding.taken = taken_at_rest(held);
             }
             if (finding.converged) {
@@ -226,14 +230,18 @@ class ValueIteration {
 
     /// Goes on with another force, kept from the first sample until the motion goes over to what was searched before.
     void precede(const ForceTable& table) {
-        table_ = &table;
+        table_ = before_ = &table;
         std::fill(policy_.begin(), policy_.end(), none);
         fill();
     }
 
-    /// One sample of another force before everything that was searched before.
-    void precede_once(const ForceTable& table) {
-        precede(table);
+    /// One sample before everything that was searched before. Its own command is of `table`, one that still acts from
+    /// the sample before is of `before`.
+    void precede_once(const ForceTable& table, const ForceTable& before) {
+        table_ = &table;
+        before_ = &before;
+        std::fill(policy_.begin(), policy_.end(), none);
+        fill();
         const std::vector<double> later = value_;
         for (std::size_t state = 0; state < value_.size(); ++state) {
             value_[state] = 0.0;
@@ -246,7 +254,8 @@ class ValueIteration {
     /// The most that is taken out by motions that start at rest.
     [[nodiscard]] Finding found(const std::vector<double>& held) const {
         Finding finding;
-        finding.scale = largest_force_ * longest_move_ + 1e-300;
+        finding.scale =
+            largest_force_ * std::max(longest_move_, grid_.position.back() - grid_.position.front()) + 1e-300;
         finding.taken = taken_at_rest(held);
         finding.converged = true;
         return finding;
@@ -282,7 +291,7 @@ class ValueIteration {
                 next_play_[state] = static_cast<std::size_t>(later);
                 now_[state] = force;
                 if (late) {
-                    old_[state] = force;
+                    old_[state] = before_->of[play * read.count() + read.number(w, newest)];
                     now_[state] = table_->of[next_play_[state] * read.count() + read.number(w, newest - 1)];
                 }
                 exists_[state] = 1;
@@ -347,6 +356,15 @@ class ValueIteration {
     [[nodiscard]] bool can_move(int from, int jump) const noexcept {
         return grid_.repeats() || (from + jump >= 0 && from + jump < nodes_);
     }
+    /// The way from a node to both ends of the grid.
+    [[nodiscard]] double down(int from) const noexcept {
+        return grid_.repeats() ? -HUGE_VAL
+                               : grid_.position.front() - grid_.position[static_cast<std::size_t>(from)];
+    }
+    [[nodiscard]] double up(int from) const noexcept {
+        return grid_.repeats() ? HUGE_VAL
+                               : grid_.position.back() - grid_.position[static_cast<std::size_t>(from)];
+    }
     [[nodiscard]] int target(int from, int jump) const noexcept {
         const int node = from + jump;
         return node < 0 ? node + nodes_ : node >= nodes_ ? node - nodes_ : node;
@@ -384,7 +402,8 @@ class ValueIteration {
                 samples_[2 * state + static_cast<std::size_t>(target(place(state), jump) % 2)];
             return (sample.force + sample.damping * d) * d - sample.uneven;
         }
-        return cost_.of_move(d, old_.empty() ? 0.0 : old_[state], now_[state]);
+        return cost_.of_move(d, old_.empty() ? 0.0 : old_[state], now_[state], down(place(state)),
+                             up(place(state)));
     }
 
     /// Improves every state once; the largest improvement.
@@ -408,7 +427,8 @@ class ValueIteration {
                                                       : base + static_cast<std::size_t>(target(from, jump)) *
                                                                    windows_.stride() * plays_;
                 const double total =
-                    (samples_.empty() ? cost_.of_move(move(from, jump), old, now) : paid(state, jump)) +
+                    (samples_.empty() ? cost_.of_move(move(from, jump), old, now, down(from), up(from))
+                                      : paid(state, jump)) +
                     value_[next];
                 if (total < best) {
                     best = total;
@@ -463,6 +483,7 @@ class ValueIteration {
 
     const Grid& grid_;
     const ForceTable* table_;
+    const ForceTable* before_;  ///< of the command before
     Cost cost_;
     Windows windows_;
     int nodes_;
