@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -202,10 +203,15 @@ void trapezoidal(benchmark::State& state) {
 
 void energy_consistent(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
-    const auto over = [&](const auto& environment) {
-        return palpate::EnergyConsistent{environment, SpringWall::inertia, SpringWall::coupling, period};
+    const double p = palpate::EnergyConsistent<CompiledNetwork>::load_line_slope(
+        SpringWall::inertia, SpringWall::coupling, period);
+    const auto over = [&](const auto& environment, const auto& solver) {
+        constexpr double none = std::numeric_limits<double>::infinity();
+        return palpate::EnergyConsistent{
+            environment, SpringWall::inertia, SpringWall::coupling, period, 1e-4, true, none, solver};
     };
-    step(state, object, over(CompiledNetwork{object}), over(object), 1e-9);
+    step(state, object, over(CompiledNetwork{object}, Resolvent{object.curve(), p}),
+         over(object, LoadLineSolver{}), 1e-9);
 }
 
 void substepped(benchmark::State& state) {

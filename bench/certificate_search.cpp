@@ -18,8 +18,8 @@ int main(int count, char** words) {
     using namespace palpate::energy_search;
     const std::size_t scenes = count > 1 ? static_cast<std::size_t>(std::atoi(words[1])) : 100;
     const std::string only = count > 2 ? words[2] : "";
-    std::printf("%-28s %5s %7s %8s %8s %10s %9s %6s\n", "line", "delay", "scenes", "median", "worst",
-                "at 0.95", "violated", "s");
+    std::printf("%-17s %-32s %5s %7s %8s %8s %10s %9s %6s\n", "line", "scenes", "delay", "number", "median",
+                "worst", "at 0.95", "violated", "s");
     std::size_t violated = 0;
     for (const Line& line : all_lines()) {
         if (line.name.find(only) == std::string::npos) {
@@ -37,14 +37,14 @@ int main(int count, char** words) {
                 std::printf("scene %zu gives energy: %s\n", index, trial.text.c_str());
             }
             failures += fails(0.95) ? 1 : 0;
-            measured.push_back(largest_violating(fails, 0.2, 1.0 + 1e-9, 0.002));
+            measured.push_back(largest_violating(fails, 0.05, 1.0 + 1e-9, 0.001));
         }
         std::sort(measured.begin(), measured.end());
         const double seconds =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        std::printf("%-28s %5.2f %7zu %8.3f %8.3f %6zu%s %9zu %6.1f\n", line.name.c_str(), line.delay, scenes,
-                    measured.at(scenes / 2), measured.back(), failures, line.tight ? " (t)" : "    ",
-                    violations, seconds);
+        std::printf("%-17s %-32s %5.2f %7zu %8.3f %8.3f %6zu%s %9zu %6.1f\n", line.id.c_str(),
+                    line.name.c_str(), line.delay, scenes, measured.at(scenes / 2), measured.back(), failures,
+                    line.tight ? " (t)" : "    ", violations, seconds);
         std::fflush(stdout);
         violated += violations;
     }

@@ -92,10 +92,11 @@ std::ostream& operator<<(std::ostream& out, const CoupledScene& scene) {
                << ", b = " << scene.device.viscous_damping;
 }
 
-/// The least energy that a hand has put in after any sample, and the throughput. `parts` holds, for each sample, the
+/// The least energy that a hand has put in after any sample, that after the last one, and the throughput. `parts` holds, for each sample, the
 /// motion before the command changes and the motion after it.
 struct Account {
     double least = 0.0;
+    double last = 0.0;  ///< after the last sample
     double throughput = 0.0;
 };
 
@@ -121,6 +122,7 @@ Account account_of(S structure, const CoupledScene& scene, const Parts& parts) {
         energy += work + loss;
         account.throughput += std::abs(work) + loss;
         account.least = std::min(account.least, energy);
+        account.last = energy;
         x += before + after;
     }
     return account;
@@ -167,7 +169,7 @@ CoupledScene random_scene(test::Random& random, bool linear) {
     scene.scheme.structure = kinds[random() % kinds.size()];
     scene.switched = random() % 2 == 0;
     scene.scheme.coupling = {1.0, random() % 3 == 0 ? 0.0 : test::uniform(random, 0.01, 1.0)};
-    scene.object.stiffness = std::exp(test::uniform(random, -3.0, 4.0));
+    scene.object.stiffness = linear && random() % 2 == 0 ? 0.0 : std::exp(test::uniform(random, -3.0, 4.0));
     for (std::size_t bumps = linear ? 0 : 1 + random() % 3; bumps > 0; --bumps) {
         scene.object.bumps.push_back({test::uniform(random, -0.3, 0.3), test::uniform(random, -1.0, 1.0),
                                       std::exp(test::uniform(random, -2.0, 0.0))});
@@ -183,7 +185,7 @@ CoupledScene random_scene(test::Random& random, bool linear) {
     }
     scene.device.force_limit = random() % 4 == 0 ? 1e9 : std::exp(test::uniform(random, -3.0, 1.0));
     // From rest: the nearest place without force.
-    for (int k = 0; k < 300; ++k) {
+    for (int k = 0; k < 300 && !linear; ++k) {
         const double force = scene.object.at(scene.start, {}).force;
         scene.start -= std::clamp(force / scene.slopes.largest(), -0.1, 0.1);
     }
@@ -196,7 +198,7 @@ CoupledScene random_scene(test::Random& random, bool linear) {
 }
 
 /// The least energy that optimised motions leave, over their throughput: swings of many frequencies, sizes and
-/// lengths, then random changes of the best one, kept where they give more.
+/// lengths, strokes with rests between, then random changes of the best one, kept where they give more.
 double optimised(test::Random& random, const CoupledScene& scene, int trials) {
     const std::size_t samples = 60 + random() % 120;
     const double share = scene.device.delay_fraction();
@@ -206,12 +208,12 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
     Parts best;
     const auto consider = [&](const Parts& parts) {
         const Account account = account_of(scene, parts);
-        const double given = (account.least + scene.held) / (account.throughput + 1e-12);
+        const double size = account.throughput + 1e-12;
         if (account.least + scene.held < -1e-9 * (1e-3 + account.throughput)) {
-            least = std::min(least, given);
+            least = std::min(least, (account.least + scene.held) / size);
         }
-        if (given < best_value) {
-            best_value = given;
+        if (account.last / size < best_value) {
+            best_value = account.last / size;
             best = parts;
         }
     };
@@ -227,8 +229,14 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
             const double first = share > 0.0 ? test::uniform(random, 0.0, 1.2) : 0.0;
             const std::size_t end = samples / 2 + random() % (samples / 2);
             parts.assign(samples, {0.0, 0.0});
+            const bool strokes = random() % 2 == 0;  // at an even speed, with rests between
+            double speed = 0.0;
             for (std::size_t k = 0; k < end; ++k) {
-                const double d = reach * std::sin(theta * static_cast<double>(k + 1) + phase);
+                if (random() % 12 == 0) {
+                    speed = random() % 2 == 0 ? 0.0 : reach * test::uniform(random, -1.0, 1.0);
+                }
+                const double d =
+                    strokes ? speed : reach * std::sin(theta * static_cast<double>(k + 1) + phase);
                 parts[k] = {first * d, (1.0 - first) * d};
             }
         } else {
@@ -264,7 +272,7 @@ TEST(CoupledAccount, OptimisedMotionsGetNoEnergyOutOfCertifiedScenes) {
             continue;
         }
         ++tried;
-        EXPECT_EQ(optimised(random, scene, 150), 0.0) << "scene " << tried << ": " << scene;
+        EXPECT_EQ(optimised(random, scene, 200), 0.0) << "scene " << tried << ": " << scene;
     }
 }
 

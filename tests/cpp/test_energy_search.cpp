@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A search for motions that take energy out of certified scenes. Its account, its motions and the stored energy are
 // written apart from the core's: sum F d + (b/T) d^2 + f_c |d| >= -(S_0 - S_min) for every motion of every length.
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -71,6 +72,62 @@ TEST(EnergySearch, FindsTheKnownNeedOfASpringAtAFractionalDelay) {
         EXPECT_NEAR(spring_need(200, 4, 0, late), exact, 0.01 * exact) << "late by " << late;
         EXPECT_NEAR(late_need(1.0, 0.0, 0, late), exact, 1e-3 * exact);
     }
+}
+
+// b >= T M / 2 + t_d L does not hold between whole samples.
+TEST(EnergySearch, FindsEnergyWhereAFractionalDelayIsCountedWithItsShareOfASample) {
+    EXPECT_GT(spring_need(200, 4, 0, 0.25), 0.5 + 0.25 + 0.03);
+}
+
+/// True if turning a wheel without friction takes energy out; `command` is the force that is sent for f(x).
+template <class Command>
+bool wheel_gives_energy(const std::vector<double>& forces, const Command& command) {
+    const Pieces wheel{0.0, 1.0 / static_cast<double>(forces.size()), forces, true};
+    HeldScene scene;
+    scene.read = even_grid(0.0, 1.0 / 3000, 3000, 1, true);
+    scene.table.of.clear();
+    for (const double x : scene.read.grid.position) {
+        scene.table.of.push_back(command(wheel.at(x).value));
+    }
+    scene.held = held_energy(scene.read.grid, [&](double x) { return command(wheel.at(x).value); });
+    scene.need = {0.5 * bounds_of(wheel).rising(), 0.0, 0, 0.0};
+    return scene.search(1.0 + 1e-9, 1.0).violated();
+}
+
+// A peak of 8 N m on a device that makes 5: its mean is 0, that of the clipped force is not.
+TEST(EnergySearch, FindsTheMotorThatAForceLimitMakes) {
+    std::vector<double> forces(10, -8.0 / 9.0);
+    forces[3] = 8.0;
+    const auto clip = [](double force) { return std::clamp(force, -5.0, 5.0); };
+    EXPECT_FALSE(wheel_gives_energy(forces, [](double force) { return force; }));
+    EXPECT_TRUE(wheel_gives_energy(forces, clip));
+    const auto mean = [&](const std::vector<double>& points) {
+        const Pieces wheel{0.0, 0.1, points, true};
+        return mean_over(1.0, [&](double x) { return clip(wheel.at(x).value); });
+    };
+    forces = balanced(forces, mean);
+    EXPECT_FALSE(wheel_gives_energy(forces, clip));
+    EXPECT_FALSE(wheel_gives_energy(forces, [&](double force) { return 0.7 * clip(force); }));
+    EXPECT_TRUE(wheel_gives_energy(forces, [&](double force) { return clip(0.7 * force); }))
+        << "softening before the limit";
+}
+
+/// Damping below which energy is taken out of a mass of 0.05 kg behind 90 N/m on a device that makes 5 N.
+double thrown_mass_need(double limit_inside) {
+    constexpr double period = 1e-3;
+    Implicit structure{test::Spring{0.0}, {0.05, 0.0}, {90.0, 0.0}, period, LoadLineSolver{}, limit_inside};
+    const Places places{.low = -0.5, .high = 0.5, .finest = 1e-3, .widest = 2.0};
+    test::Random random{1};
+    MotionSearch search{structure, places, 5.0};
+    return period * search.most(
+                        random, 24, 150, [](const Account& account) { return account.damping(0.0, 0.0); },
+                        [](const Account& account) { return account.gain(45.0, 0.0, 0.0); });
+}
+
+TEST(EnergySearch, FindsTheEnergyOfAMassThrownBeyondTheForceLimit) {
+    constexpr double enough = 90.0 * 1e-3 / 2.0;
+    EXPECT_GT(thrown_mass_need(1e9), 1.2 * enough) << "limit outside the step";
+    EXPECT_LE(thrown_mass_need(5.0), enough * (1.0 + 1e-9)) << "limit inside the step";
 }
 
 }  // namespace

@@ -19,51 +19,56 @@ namespace palpate::energy_search {
     std::vector<Line> lines;
     for (const double n : {0.0, 1.0, 2.0, 0.25, 0.5, 1.3}) {
         const bool whole = n == std::floor(n);
-        const auto damping = [&](const char* name, bool tight, auto draw) {
-            lines.push_back(
-                {name, n, Part::Damping, tight, [draw, n](test::Random& random) { return draw(random, n); }});
+        const auto add = [&](const char* id, Part part) {
+            return [&lines, id, part, n](const char* name, bool tight, auto draw) {
+                lines.push_back(
+                    {id, name, n, part, tight, [draw, n](test::Random& random) { return draw(random, n); }});
+            };
         };
-        const auto friction = [&](const char* name, bool tight, auto draw) {
-            lines.push_back({name, n, Part::Friction, tight,
-                             [draw, n](test::Random& random) { return draw(random, n); }});
-        };
+        const auto hold = add("damping-hold", Part::Damping);
+        const auto coupling = add("damping-coupling", Part::Damping);
+        const auto friction = add("friction-steps", Part::Friction);
         using R = test::Random;
         const auto behind = [](StructureKind kind, Regime regime) {
             return
                 [kind, regime](R& random, double delay) { return draw_coupled(random, kind, delay, regime); };
         };
-        damping("direct", n == 0.0, draw_direct);
-        damping("direct, steep shapes", n < 1.1, draw_direct_steep);
-        damping("hysteresis", n == 0.0, draw_hysteresis);
-        damping("velocity", false, draw_velocity);
+        hold("direct", n == 0.0, draw_direct);
+        hold("direct, steep shapes", n < 1.1, draw_direct_steep);
+        hold("hysteresis", n == 0.0, draw_hysteresis);
+        hold("velocity", false, draw_velocity);
         if (n > 0.0) {
-            damping("jitter", false,
-                    [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Any); });
-            damping("jitter, steep shapes", false,
-                    [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Steep); });
+            hold("jitter", false,
+                 [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Any); });
+            hold("jitter, steep shapes", false,
+                 [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Steep); });
         }
-        damping("prediction, steep shapes", n == 0.0,
-                [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
-        damping("prediction", false,
-                [](R& random, double delay) { return draw_prediction(random, delay, false); });
-        damping("wheel", false, [](R& random, double delay) { return draw_wheel(random, delay, false); });
-        damping("wheel of wavelets", false,
-                [](R& random, double delay) { return draw_network_wheel(random, delay, false); });
-        damping("softening", false, draw_softening);
-        damping("ramp", false, draw_ramp);
-        damping("massless, no damper", false, draw_spring_behind_coupling);
-        damping("massless", false, behind(StructureKind::Massless, Regime::Usual));
-        damping("implicit", false, behind(StructureKind::Implicit, Regime::Usual));
-        damping("energy-consistent", false, behind(StructureKind::EnergyConsistent, Regime::Usual));
-        damping("massless, firm object", n == 0.0, behind(StructureKind::Massless, Regime::Firm));
-        damping("implicit, firm object", n == 0.0, behind(StructureKind::Implicit, Regime::Firm));
-        damping("energy-consistent, firm object", n == 0.0,
-                behind(StructureKind::EnergyConsistent, Regime::Firm));
-        damping("implicit, limited", false, behind(StructureKind::Implicit, Regime::Limited));
-        damping("energy-consistent, limited", false,
-                behind(StructureKind::EnergyConsistent, Regime::Limited));
+        hold("prediction, steep shapes", n == 0.0,
+             [](R& random, double delay) { return draw_prediction(random, delay, false, Shapes::Steep); });
+        hold("prediction, hysteresis", false, draw_predicted_hysteresis);
+        hold("prediction", false,
+             [](R& random, double delay) { return draw_prediction(random, delay, false); });
+        hold("wheel", false, [](R& random, double delay) { return draw_wheel(random, delay, false); });
+        hold("wheel of wavelets", false,
+             [](R& random, double delay) { return draw_network_wheel(random, delay, false); });
+        hold("softening", false, draw_softening);
+        hold("ramp", false, draw_ramp);
+        hold("massless, no damper", false, draw_spring_behind_coupling);
+        coupling("massless", false, behind(StructureKind::Massless, Regime::Usual));
+        coupling("implicit", false, behind(StructureKind::Implicit, Regime::Usual));
+        coupling("energy-consistent", false, behind(StructureKind::EnergyConsistent, Regime::Usual));
+        coupling("massless, firm object", n == 0.0, behind(StructureKind::Massless, Regime::Firm));
+        coupling("implicit, firm object", n == 0.0, behind(StructureKind::Implicit, Regime::Firm));
+        coupling("energy-consistent, firm object", n == 0.0,
+                 behind(StructureKind::EnergyConsistent, Regime::Firm));
+        coupling("implicit, limited", false, behind(StructureKind::Implicit, Regime::Limited));
+        coupling("energy-consistent, limited", false,
+                 behind(StructureKind::EnergyConsistent, Regime::Limited));
         if (!whole) {
             continue;
+        }
+        if (n == 0.0) {
+            friction("wheel with hysteresis, mean", false, draw_hysteresis_wheel);
         }
         friction("wheel, mean", false,
                  [](R& random, double delay) { return draw_wheel(random, delay, true); });

@@ -315,4 +315,36 @@ template <class Structure>
                           starts, steps);
 }
 
+/// A force with hysteresis at a predicted position. The play follows the measured one.
+[[nodiscard]] inline std::optional<Trial> draw_predicted_hysteresis(test::Random& random, double delay) {
+    CoupledScene scene;
+    scene.scheme.structure = StructureKind::Direct;
+    scene.scheme.predict = 1 + static_cast<int>(random() % 4);
+    scene.device = random_device(random, delay);
+    scene.places.delay = scene.device.whole_delay_samples();
+    scene.places.late = scene.device.delay_fraction();
+    const int count = 12;
+    const double step = std::exp(test::uniform(random, -6.0, -2.0));
+    const Pieces g = closed_pieces(random, count, step, random_slopes(random));
+    const std::vector<double> h(g.points().size(), largest_of(g.points()) * test::uniform(random, 0.0, 1.0));
+    const HysteresisPair<Pieces> pair{g, Pieces{g.from(), step, h}, step * test::uniform(random, 0.3, 6.0)};
+    limit_by(random, scene.device, largest_of(g.points()));
+    const ForceBounds bounds = bounds_of(pair);
+    scene.slopes = bounds.slope;
+    const auto need = certified_need(
+        scene.device, [&](const DeviceProfile& generous) { return certify(bounds, scene.scheme, generous); });
+    if (!need || need->damping <= 0.0) {
+        return std::nullopt;
+    }
+    const Least least = least_energy(-5.0 * step * count, 6.0 * step * count,
+                                     [&](double x) { return clipped(g.at(x).value, scene.device); });
+    scene.places.start = least.place;
+    scene.places.high = step * count;
+    scene.places.finest = 1e-2 * step;
+    scene.places.widest = 3.0 * step * count;
+    constexpr int starts = 6;
+    constexpr int steps = 60;
+    return motion_trial(random, PredictedDirect{pair, scene.scheme.predict}, scene, *need, starts, steps);
+}
+
 }  // namespace palpate::energy_search

@@ -31,6 +31,7 @@ class Pieces {
         }
     }
 
+    [[nodiscard]] double from() const noexcept { return from_; }
     [[nodiscard]] double step() const noexcept { return step_; }
     [[nodiscard]] std::size_t cells() const noexcept { return force_.size() - 1; }
     [[nodiscard]] const std::vector<double>& points() const noexcept { return force_; }

@@ -125,6 +125,46 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
+/// A wheel with hysteresis, turned slowly. Its loss may be more than its mean pushes.
+[[nodiscard]] inline std::optional<Trial> draw_hysteresis_wheel(test::Random& random, double delay) {
+    const int nodes = 300;
+    const int cells = 10;
+    const int radius = 20 + static_cast<int>(random() % 80);
+    const double size = std::exp(test::uniform(random, -1.0, 2.0));
+    const Pieces g{0.0, 1.0 / cells,
+                   random_wheel(random, cells, size, size * test::uniform(random, -0.5, 0.5)), true};
+    std::vector<double> losses;
+    const double loss = size * test::uniform(random, 0.0, 0.4);
+    for (int k = 0; k < cells; ++k) {
+        losses.push_back(loss * test::uniform(random, 0.5, 1.0));
+    }
+    const Pieces h{0.0, 1.0 / cells, losses, true};
+    const HysteresisPair<Pieces> pair{g, h, static_cast<double>(radius) / nodes};
+    DeviceProfile device = random_device(random, delay);
+    limit_by(random, device, largest_of(g.points()));
+    const auto mean = [&](double s) {
+        return mean_over(1.0, [&](double x) { return clipped(g.at(x).value + s * h.at(x).value, device); });
+    };
+    ForceBounds bounds = bounds_of(pair);
+    bounds.mean_force = std::max({0.0, mean(-1.0), -mean(1.0)}) * (1.0 + 1e-6);
+    if (bounds.mean_force <= 0.02 * size) {
+        return std::nullopt;  // too small for this grid
+    }
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    const auto need = certified_need(
+        device, [&](const DeviceProfile& generous) { return certify(bounds, scheme, generous); });
+    if (!need) {
+        return std::nullopt;
+    }
+    HeldScene scene;
+    scene.read = even_grid(0.0, 1.0 / nodes, nodes, 1, true);
+    scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
+    scene.held.assign(static_cast<std::size_t>(nodes),
+                      10.0 * (size + loss));  // only motion without end counts
+    return trial_of(std::move(scene), *need, device);
+}
+
 /// The guard that makes the object softer after it has found `buzzes` limit cycles.
 [[nodiscard]] inline LimitCycleDetector softened(int buzzes) {
     LimitCycleDetector detector{{1e-9, 1000, 0.0}};

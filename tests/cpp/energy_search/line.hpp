@@ -73,7 +73,8 @@ enum class Part { Damping, Friction };
 
 /// A line of the certificate and the scenes that try it.
 struct Line {
-    std::string name;
+    std::string id;      ///< of the inequality
+    std::string name;    ///< of the scenes
     double delay = 0.0;  ///< [samples]
     Part part = Part::Damping;
     bool tight = false;  ///< some motion comes close to the bound in at least half of the scenes

@@ -279,7 +279,7 @@ class CertifiedSolver {
         const auto [k, turned] = locate(line, play);
         const Cell cell = cell_at(k, turned);
         double y = interpolated(k, turned, line, play);
-        if (32.0 * std::abs(guess - y) <= cell.high - cell.low) {
+        if (32.0 * std::abs(guess - y) <= std::fmin(cell.high - cell.low, travel_)) {
             y = guess;
         }
         for (int steps = 1;; ++steps) {

@@ -19,7 +19,7 @@ namespace palpate {
 
 namespace detail {
 
-/// A delay as texts name it.
+/// True if forces come late.
 [[nodiscard]] inline bool late(const DeviceProfile& device) noexcept {
     return device.late_samples() > 0;
 }
