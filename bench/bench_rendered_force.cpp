@@ -142,7 +142,7 @@ void tick(benchmark::State& state, const S& initial, double expected) {
 
 // What every structure leaves of this object, from the table of its scene.
 constexpr double of_the_hold = 0.00362;
-constexpr double of_the_predicted_hold = 0.00184;
+constexpr double of_the_predicted_hold = 0.00194;
 constexpr double of_the_coupling = 0.1202;
 constexpr double of_the_mass = 0.1231;
 constexpr double of_the_papers_damping = 0.2530;
