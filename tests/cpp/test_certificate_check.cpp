@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a certificate that stood in a file is believed: nothing, and bounds that are wider than necessary.
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
@@ -137,6 +138,17 @@ TEST(CertificateCheck, RefusesAnEditedDeviceEvenIfNoLineUsesTheField) {
     EXPECT_TRUE(refused([](auto& d) { d.inertia *= 2.0; }));
     EXPECT_TRUE(refused([](auto& d) { d.force_limit *= 2.0; }));
     EXPECT_TRUE(refused([](auto& d) { d.delay_s = 1e-15; }));
+}
+
+TEST(CertificateCheck, AcceptsItsResultAgainAfterRoundingOnAnotherMachine) {
+    const ForceModel model = hysteretic();
+    Certificate stored = certify(model, direct(), strong());
+    for (Inequality& line : stored.inequalities) {
+        line.right = std::nextafter(line.right, 1e9);
+    }
+    stored.longest_period_s = std::nextafter(stored.longest_period_s, 1e9);
+    stored.fingerprint = fingerprint_of(stored);
+    EXPECT_EQ(disagreement(checked(stored, model), model), "");
 }
 
 TEST(CertificateCheck, ComparesNoText) {

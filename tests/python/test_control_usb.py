@@ -97,7 +97,7 @@ def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
     answer = control(*words, device=LOCK_STEP, model=planned(tmp_path))
     # On a busy machine the first late packet ends it: nothing else is certified.
     assert answer.returncode == 0 or "zero force sent" in answer.stderr, answer.stderr
-    assert "direct; emulated knob EMU-1" in answer.stderr
+    assert "direct, predict 1; emulated knob EMU-1" in answer.stderr
     assert "uncertified" not in answer.stderr
     assert "# certified: yes" in record.read_text(encoding="utf-8")
 

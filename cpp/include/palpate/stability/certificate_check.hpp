@@ -128,6 +128,9 @@ namespace detail {
     for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
         const std::string path = "inequalities[" + std::to_string(k) + "]";
         require(detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]));
+        // Another machine may round differently: keep the stored numbers, which the fingerprint covers.
+        now.inequalities[k].left = stored.inequalities[k].left;
+        now.inequalities[k].right = stored.inequalities[k].right;
     }
     if (!agree(stored.longest_period_s, now.longest_period_s)) {
         require(detail::disagrees("longest_period_s", stored.longest_period_s, now.longest_period_s));
@@ -136,6 +139,7 @@ namespace detail {
         require("certificate.fingerprint is \"" + stored.fingerprint + "\": must be \"" + right +
                 "\"; the certificate was edited, plan it again");
     }
+    now.longest_period_s = stored.longest_period_s;
     now.model = stored.model;
     now.fingerprint = stored.fingerprint;
     return now;
