@@ -4,7 +4,8 @@
 python tools/example_output.py [--check]
 
 A comment `<!-- output: COMMAND -->` before a text block says what prints it. The commands of a page run in
-one empty folder, in their order. The check compares words exactly and numbers within 5 %; durations are not compared.
+one empty folder, in their order. The check compares words exactly and numbers within 5 %; durations are not
+compared.
 """
 
 import argparse
