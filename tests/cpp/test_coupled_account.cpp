@@ -208,12 +208,12 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
     Parts best;
     const auto consider = [&](const Parts& parts) {
         const Account account = account_of(scene, parts);
-        const double size = account.throughput + 1e-12;
+        const double handled = account.throughput + 1e-12;
         if (account.least + scene.held < -1e-9 * (1e-3 + account.throughput)) {
-            least = std::min(least, (account.least + scene.held) / size);
+            least = std::min(least, (account.least + scene.held) / handled);
         }
-        if (account.last / size < best_value) {
-            best_value = account.last / size;
+        if (account.last / handled < best_value) {
+            best_value = account.last / handled;
             best = parts;
         }
     };
