@@ -72,12 +72,11 @@ void tick(benchmark::State& state, const palpate::ForceModel& model, palpate::St
         Playback device{palpate::bench::hand_motion(4000)};
         palpate::GuardSettings settings;
         settings.force_limit = 50.0;
-        palpate::Controller controller{
-            device, std::move(structure),
-            palpate::Guards{.reading = palpate::reading_guard(settings, 1e-3),
-                            .limit = palpate::force_limit(settings),
-                            .ramp = palpate::force_ramp(settings, 1e-3),
-                            .slew = palpate::slew_limit(settings, 1e-3)}};
+        palpate::Controller controller{device, std::move(structure),
+                                       palpate::Guards{.reading = palpate::reading_guard(settings, 1e-3),
+                                                       .limit = palpate::force_limit(settings),
+                                                       .ramp = palpate::force_ramp(settings, 1e-3),
+                                                       .slew = palpate::slew_limit(settings, 1e-3)}};
         (void)controller.start();
         for (auto _ : state) {
             benchmark::DoNotOptimize(controller.tick());

@@ -212,8 +212,8 @@ TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
 TEST(Controller, RaisesTheForceFromZeroAndSaysSo) {
     ScriptedDevice device;
     device.next.position = 0.2;
-    Controller<ScriptedDevice, Direct<test::Spring>> controller{
-        device, Direct{test::Spring{10.0}}, Guards{.limit = {5.0}, .ramp = {4, 0}}};
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
+                                                                Guards{.limit = {5.0}, .ramp = {4, 0}}};
     (void)controller.start();
     for (const double expected : {0.0, 0.5, 1.0, 1.5}) {
         EXPECT_EQ(controller.tick().status, Status::Ramp);
