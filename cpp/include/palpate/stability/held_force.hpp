@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -80,7 +81,7 @@ namespace detail {
 }
 
 /// How the maximum over frequency of a trigonometric polynomial of degree N is found from `resolution` N + 1 values.
-enum class Maximum {
+enum class Maximum : std::uint8_t {
     Likely,  ///< by a parabola through the largest value and its neighbours
     Proved,  ///< never below the true maximum, rounding included
 };

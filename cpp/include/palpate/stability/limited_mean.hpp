@@ -125,7 +125,12 @@ struct PeriodicStrokes {
         low = high;
         high *= 2.0;
     }
-    for (double middle = 0.5 * (low + high); middle > low && middle < high; middle = 0.5 * (low + high)) {
+    constexpr int halvings = 1100;  // to neighbouring numbers, wherever they lie
+    for (int k = 0; k < halvings; ++k) {
+        const double middle = 0.5 * (low + high);
+        if (!(middle > low && middle < high)) {
+            break;
+        }
         (pushes(middle) ? low : high) = middle;
     }
     return side * high;

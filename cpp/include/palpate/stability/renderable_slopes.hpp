@@ -25,7 +25,9 @@ template <class Holds>
     double low = 0.0;
     double high = most;
     // First the order of magnitude, then 50 bits.
-    for (double guess = most; low == 0.0 && guess > 1e-18 * most; guess *= 0.125) {
+    constexpr int eighths = 20;
+    for (int k = 1; k < eighths && low == 0.0; ++k) {
+        const double guess = std::ldexp(most, -3 * k);
         (holds(guess) ? low : high) = guess;
     }
     for (int k = 0; k < 50; ++k) {
