@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from scipy.sparse import csc_array
 
 import palpate
 from palpate import read_recording
@@ -100,6 +101,23 @@ def test_matlab_7_3_is_refused_with_the_cure(tmp_path: Path) -> None:
     assert refusal(tmp_path / "a.mat").endswith("save it in MATLAB as version 7: save('NEW.mat', '-v7')")
 
 
+def test_matlab_files_of_all_kinds_are_read(tmp_path: Path) -> None:
+    more = {
+        "text": "é",
+        "z": 1j * X,
+        "cells": np.array(["a", 1, X], dtype=object),
+        "nothing": np.empty((0, 0)),
+        "table": {"x": X, "words": ["ab", "cde"]},
+        "sparse": csc_array(np.eye(3)),
+    }
+    for compressed in (False, True):
+        path = tmp_path / f"{compressed}.mat"
+        savemat(path, {"depth_mm": X, "force_N": F, **more}, do_compression=compressed)
+        check(path)
+    savemat(tmp_path / "four.mat", {"depth_mm": X, "force_N": F}, format="4")
+    check(tmp_path / "four.mat")
+
+
 def mcap(path: Path, topics: dict[str, list[dict[str, Any]]], encoding: str = "json") -> Path:
     writer_module = pytest.importorskip("mcap.writer")
     with path.open("wb") as stream:
@@ -147,8 +165,7 @@ def test_a_broken_file_is_refused_by_its_name(tmp_path: Path, kind: str) -> None
     whole = path.read_bytes()
     random = np.random.default_rng(5)
     sentences = []
-    # scipy.io.loadmat crashes on some damaged files: those are only cut off.
-    for damage in range(20 if kind == "mat" else 60):
+    for damage in range(60):
         broken = bytearray(whole)
         if damage < 20:
             broken = broken[: len(broken) * damage // 20]
@@ -164,6 +181,23 @@ def test_a_broken_file_is_refused_by_its_name(tmp_path: Path, kind: str) -> None
     for sentence in sentences:
         assert sentence.startswith(f"a.{kind}")
         assert len(sentence) < 1000
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "element"),
+    [(5, 0xFF, 128), (8, 200, 136), (17, 0x08, 128), (56, 200, 184), (61, 0xFF, 184)],
+    ids=["size_of_array", "type_of_flags", "complex", "type_of_values", "size_of_values"],
+)
+def test_a_damaged_matlab_file_is_refused_with_the_byte(
+    tmp_path: Path, at: int, value: int, element: int
+) -> None:
+    path = tmp_path / "a.mat"
+    MADE["mat"](path)
+    broken = bytearray(path.read_bytes())
+    broken[128 + at] = value
+    path.write_bytes(bytes(broken))
+    told = f"a.mat is not readable as MATLAB (.mat): the element at byte {element} is damaged"
+    assert refusal(path) == told
 
 
 @pytest.mark.parametrize(

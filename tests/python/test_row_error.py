@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reported error is that of the rows through the final model, whatever the numbers' size."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,21 @@ def test_slope_bounds_hold_for_huge_forces() -> None:
 def test_numbers_beyond_the_bound_are_refused_with_it(x: Array, y: Array, words: str) -> None:
     with pytest.raises(palpate.InputError, match=rf"{words} .*e[+-]\d+; .*Use another unit"):
         palpate.identify(recorded(x, y))
+
+
+@pytest.mark.parametrize("scale", [1e154, 1e200, 1e300, -1e300, 2.9e307])
+@pytest.mark.parametrize("out_of_core", [False, True], ids=["in_memory", "out_of_core"])
+def test_a_file_of_forces_beyond_the_bound_is_refused_without_warnings(
+    tmp_path: Path, scale: float, out_of_core: bool
+) -> None:
+    x = np.tile(np.concatenate([np.linspace(0.0, 4.0, 400), np.linspace(4.0, 0.0, 400)]), 2)
+    side = np.tile(np.repeat([0.1, -0.1], 400), 2)
+    table = np.column_stack([x, scale * (np.sin(5.0 * x) + 2.0 * x - 3.0 + side)])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="depth_mm,force_N", comments="")
+    with pytest.raises(palpate.InputError, match=r"force reaches .*; the limit is 1e\+100"):
+        (palpate.identify_files if out_of_core else palpate.identify)(tmp_path / "a.csv")
+    with pytest.raises(palpate.InputError, match=r"force reaches .*; the limit is 1e\+100"):
+        palpate.verify(PLAIN, tmp_path / "a.csv")
 
 
 def test_few_extreme_forces_do_not_hide_the_error_of_the_others() -> None:

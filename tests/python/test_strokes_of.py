@@ -11,6 +11,7 @@ import pytest
 from palpate import InputError, Model, Recording, identify, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.strokes import strokes_of
+from palpate.recording.scales import scale_findings
 from palpate.recording.strokes import strokes_from_order
 
 MEASURED = ("keyswitches", "rubber_domes", "switch_springs")
@@ -48,6 +49,33 @@ def test_one_file_for_each_stroke_gives_the_same_model() -> None:
     assert found.kind == "hysteresis"
     assert "2 recordings, 1 press, 1 release" in notes(found)
     assert found.fit.nrmse == identify(Recording.from_arrays(IN_AND_OUT, loop())).fit.nrmse
+
+
+@pytest.mark.parametrize("stated", [False, True], ids=["unstated", "stated"])
+def test_one_file_for_each_stroke_is_not_taken_for_two_objects(stated: bool) -> None:
+    def recorded(rows: np.ndarray, factor: float = 1.0) -> Recording:
+        side = SIDE[rows] if stated else None
+        return Recording.from_arrays(IN_AND_OUT[rows], factor * loop(h=1.0)[rows], direction=side)
+
+    press, release = recorded(PRESS), recorded(RELEASE)
+    both = recorded(np.arange(800))
+    for recordings in ([press, release], [release, press], [both, press, release]):
+        assert str(identify(recordings).verdict) == "good"
+    for other in (recorded(RELEASE, 3.0), recorded(RELEASE, 1 / 3), recorded(PRESS, 1.5)):
+        assert "two objects" in str(identify([press, other]).verdict)
+        assert "probably of two objects" in str(identify([both, other]).verdict)
+
+
+def test_two_files_parted_by_their_force_are_not_taken_for_two_objects() -> None:
+    recordings = [bare(PRESS, loop(h=1.0)), bare(RELEASE[::-1], loop(h=1.0))]
+    assert "recording 1 is taken as press, recording 2 as release" in str(identify(recordings).verdict)
+    assert "probably of two objects" not in str(identify(recordings).verdict)
+    assert "probably of two objects" in str(identify(recordings, inputs="position").verdict)
+
+
+def test_a_release_above_the_press_is_taken_for_another_object() -> None:
+    force = loop(h=-1.0)
+    assert "two objects" in str(identify([bare(PRESS, force), bare(RELEASE, force)]).verdict)
 
 
 @pytest.mark.parametrize("first", [PRESS, RELEASE[::-1]], ids=["press_first", "release_first"])
@@ -105,6 +133,13 @@ def test_one_stroke_with_noise_gives_no_finding(noise: float, step: float) -> No
     force = loop(noise=noise)
     force = np.round(force / step) * step if step else force
     assert not strokes_of([bare(PRESS, force)], named=False).findings
+
+
+@pytest.mark.parametrize("times", [2, 3, 4, 5, 6, 7, 10])
+def test_repeated_rows_of_one_stroke_with_noise_give_no_finding(times: int) -> None:
+    rows = np.repeat(PRESS, times)
+    for seed in range(4):
+        assert not strokes_of([bare(rows, IN_AND_OUT + loop(seed, noise=0.3))], named=False).findings
 
 
 def test_strokes_that_do_not_differ_leave_the_model_as_it_was() -> None:
@@ -201,3 +236,14 @@ def test_measured_recordings_without_direction_are_identified_as_well(data: Path
         with_order, with_column = identify(unstated), identify(stated)
         assert with_order.kind == "hysteresis", path.name
         assert with_order.fit.nrmse <= 1.05 * with_column.fit.nrmse, path.name
+
+
+def test_measured_files_of_one_stroke_each_are_not_taken_for_two_objects(data: Path) -> None:
+    for path in measured_files(data):
+        whole = replace(read_recording(path), time=None)
+        assert whole.direction is not None
+        stated = [whole.without(whole.direction != side) for side in (1, -1)]
+        assert not scale_findings(stated), path.name
+        assert not scale_findings([replace(each, direction=None) for each in stated]), path.name
+        stiffer = replace(stated[1], force=3.0 * stated[1].force)
+        assert scale_findings([stated[0], stiffer]), path.name

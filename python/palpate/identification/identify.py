@@ -22,6 +22,7 @@ from .inputs import observations
 from .isolated import without_isolated
 from .judgement import verdict_of
 from .options import RESERVED_INPUTS, IdentifyOptions, described_fields, kind_of, options_from
+from .usable import require_in_range
 
 
 def identify(
@@ -79,6 +80,9 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify them apart"
             )
     recordings, isolated = without_isolated(recordings)
+    for each in recordings:
+        require_in_range("position", each.position)
+        require_in_range("force", each.force)
     seen = observations(recordings, settings)
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
@@ -89,7 +93,8 @@ def identify(
         network, notes=seen.notes + network.notes, findings=(*isolated, *seen.findings, *network.findings)
     )
     source = Source.merged(part.source for part in recordings)
-    verdict = verdict_of(network, recordings)
+    every_row = seen.side is not None and len(seen.side) == sum(map(len, recordings))
+    verdict = verdict_of(network, recordings, seen.side if every_row else None)
     return model_of(network, recordings[0].units, source, settings, verdict)
 
 

@@ -31,6 +31,7 @@ from .options import IdentifyOptions, options_from
 from .periodic import modulo
 from .row_error import evaluator
 from .summary import Summary, merged, summarise
+from .usable import require_in_range
 from .workers import in_order
 
 LEAST_KNOWN = 0.5
@@ -162,6 +163,8 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
     for block in recording.blocks(part):
         summary = None
         if len(block.position):
+            require_in_range("position", block.position)
+            require_in_range("force", block.force)
             stated = block.direction is not None
             side = block.direction if stated else strokes_from_order(block.position)
             summary = summarise(block.position, block.force, side)

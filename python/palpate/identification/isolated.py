@@ -47,6 +47,7 @@ NAMED = 3
 """Rows that a finding names."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a range may exceed the largest number; it is refused later
 def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Finding]]:
     """The recordings without isolated rows, and findings on these rows."""
     counts = [len(recording) for recording in recordings]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .._typing import Float1D
 from ..recording import Recording
 from ..recording.quality import findings_of
 from ..verdict import Finding, Verdict, no, usable
@@ -66,9 +67,11 @@ def size_findings(network: IdentifiedNetwork, recordings: Sequence[Recording]) -
     ]
 
 
-def verdict_of(network: IdentifiedNetwork, recordings: Sequence[Recording]) -> Verdict:
-    """The verdict on a network that was identified from recordings."""
-    findings = [*findings_of(recordings), *network.findings]
+def verdict_of(
+    network: IdentifiedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
+) -> Verdict:
+    """The verdict on a network that was identified from recordings, with the direction (n,) of all rows."""
+    findings = [*findings_of(recordings, side), *network.findings]
     findings += size_findings(network, recordings)
     findings += error_findings(network.nrmse, "the rows of the identification")
     return Verdict(tuple(dict.fromkeys(findings)))

@@ -95,7 +95,8 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
         findings = (
             usable(
                 f"{note} by {difference:.3g}{unit} on average; no direction is stated, and all positions run "
-                f"the same way. If these are repetitions of one stroke, give --inputs position; else {CURE}"
+                f"the same way. If these are two objects, identify them one by one; if they are repetitions "
+                f"of one stroke, give --inputs position; else {CURE}"
             ),
         )
     elif not named and not _Cells.of(position, force, side).differ:
@@ -184,11 +185,12 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
 def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> Strokes:
     """Hysteresis cannot be tested; reports by how much the strokes may differ, where the rows show it."""
     seen = f"hysteresis was not tested: {why or 'the position never turns back in the order of rows'}"
-    order = np.argsort(position, kind="stable")
-    if len(order) < LEAST_WINDOWS * WINDOW:
+    # Repetitions of a row would be groups of one force.
+    rows = np.unique(position + 1j * force)
+    if len(rows) < LEAST_WINDOWS * WINDOW:
         return Strokes(None, (seen,))
     reach = float(np.ptp(force)) or 1.0
-    shares, gaps, spreads = _two_groups(position[order], force[order])
+    shares, gaps, spreads = _two_groups(rows.real, rows.imag)
     gap, most, spread = float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(np.median(spreads))
     levels = np.diff(np.unique(force))
     step = float(levels[levels > 1e-9 * reach].min(initial=reach))

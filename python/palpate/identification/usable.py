@@ -39,8 +39,7 @@ def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> 
                 f"{name} in row {bad[0]} is {column[bad[0]]}; every value must be a finite number"
             )
     for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
-        if (largest := float(np.abs(column).max())) > LARGEST:
-            raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")
+        require_in_range(name, column)
     if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST:
         raise InputError(
             f"the largest force is {largest:.3g}; the least is {1.0 / LARGEST:g}, or 0. Use another unit"
@@ -55,3 +54,15 @@ def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> 
                 f"{name} takes only {len(np.unique(column))} distinct values; "
                 f"{LEAST_POSITIONS} or more are needed"
             )
+
+
+def require_in_range(name: str, values: Float1D) -> None:
+    """Refuse values (n,), n >= 1, whose squares would overflow.
+
+    Raises
+    ------
+    InputError
+        Names the largest value and the limit.
+    """
+    if (largest := float(np.abs(values).max())) > LARGEST:
+        raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")

@@ -104,7 +104,10 @@ class DeviceProfile(_core.DeviceProfile):
         except RecursionError:
             raise InputError(f"{file}: it is nested too deeply; a profile has no tables") from None
         except ValueError as error:  # an integer with more digits than Python converts, a date that is none
-            raise InputError(f"{file}: a value cannot be read: {error}") from None
+            reason = str(error)
+            if "integer string conversion" in reason:
+                reason = f"a number has more than {sys.get_int_max_str_digits()} digits; write 17 or fewer"
+            raise InputError(f"{file}: a value cannot be read: {reason}") from None
         expected = device_record(_core.DeviceProfile())
         for name in content:
             if name not in expected:

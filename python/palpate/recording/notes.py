@@ -34,9 +34,16 @@ def chosen(
 
 def noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
     """Report once what looks mirrored; no sign is turned without an option."""
+    x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
     against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0
     return mirrored(correlation, against)
+
+
+def _scaled(values: Float1D) -> Float1D:
+    """The values divided by a power of two, so that no square overflows and no digit changes."""
+    _, exponent = np.frexp(np.abs(values).max(initial=0.0))
+    return np.asarray(np.ldexp(values, -exponent))
 
 
 def mirrored(correlation: float, against: bool = False) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .._typing import Float1D
 from ..verdict import Finding
 from .branches import merged_findings
 from .cells import Travel, cell_rows
@@ -20,8 +21,11 @@ LEAST_ROWS = 10
 """Rows below which a recording is not checked."""
 
 
-def findings_of(recordings: Sequence[Recording]) -> list[Finding]:
-    """Findings on each recording, named where there are several, and on all of them together."""
+def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
+    """Findings on each recording, named where there are several, and on all of them together.
+
+    `side` (n,) is the direction of the rows of all recordings, where they do not state it.
+    """
     if len(recordings) == 1:
         return quality_findings(recordings[0])
     found = [
@@ -31,7 +35,7 @@ def findings_of(recordings: Sequence[Recording]) -> list[Finding]:
         for number, recording in enumerate(recordings, 1)
         for finding in quality_findings(recording)
     ]
-    return [*found, *scale_findings(recordings)]
+    return [*found, *scale_findings(recordings, side)]
 
 
 def quality_findings(recording: Recording) -> list[Finding]:

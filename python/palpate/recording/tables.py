@@ -16,6 +16,7 @@ from ..errors import InputError
 from .csv_file import CsvFile
 from .files import readable
 from .header import decimal_mark, find_header, first_row_as_header, named, refuse_marks
+from .matlab_file import refuse_damaged
 from .names import listed, shortened, visible
 from .parquet_file import ParquetFile
 from .table import MISSING, Cells, TableFile, parse_with, to_numbers
@@ -201,6 +202,7 @@ def _matlab(path: Path) -> TableFile:
     from scipy.io import loadmat
 
     with readable(path, "MATLAB (.mat)"):
+        refuse_damaged(path.read_bytes())
         try:
             found = loadmat(path, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:

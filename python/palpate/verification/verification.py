@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .._typing import Float1D
 from ..arguments import instance_of
 from ..errors import InputError
+from ..identification.usable import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
 from ..recording.given import Given, recording_from
@@ -108,6 +109,8 @@ def verify(
     """
     instance_of("model", model, Model, "make one with palpate.identify or palpate.load_model")
     recording = recording_from(recording, force, time, direction, inputs=columns_of(model))
+    require_in_range("position", recording.position)
+    require_in_range("force", recording.force)
     prediction = predict(model, recording, play_radius=play_radius)
     rows = prediction.rows
     reference = recording.force[rows]
