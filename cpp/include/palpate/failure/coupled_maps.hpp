@@ -179,7 +179,7 @@ template <Structure S>
     const VirtualCoupling coupling{90.0, 0.0};
     DeviceProfile device = smooth_knob();
     device.viscous_damping = device.period_s * coupling_need(coupling, device.period_s, 0);
-    FailureMap map{"limit", "wind-up of the coupling [rad]", "work of the hand [N*m*rad]", {}};
+    FailureMap map{"limit", "wind-up of the coupling [rad]", "work of the hand [J]", {}};
     map.linear = true;
     const auto add = [&](const char* name, auto build) {
         FailureLine line{name, logarithmic(0.05, 0.6, points), {}, {}};
