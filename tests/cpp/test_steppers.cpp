@@ -213,7 +213,7 @@ struct SwitchedStep {
         }
         return count;
     }
-    /// The root that spec_certificate section 4 takes.
+    /// The root that the rule of the class comment takes.
     [[nodiscard]] double expected(double far) const {
         const double root = first_root([&](double y) { return by_energy(y); }, from, far);
         return generates(root) ? root : first_root([&](double y) { return by_force(y); }, from, root);
@@ -259,7 +259,7 @@ TEST(Steppers, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
     EXPECT_GT(three, tried / 300) << "the case is about steps with several roots";
 }
 
-// spec_certificate section 4: G eta >= the gain of stored and kinetic energy, for any slope and any root.
+// docs/certificate.md, behind a coupling: G eta >= the gain of stored and kinetic energy, for any slope and any root.
 TEST(Steppers, TheSwitchKeepsTheEnergyInequalityOfEveryStep) {
     test::Random random{92};
     int most = 0;
