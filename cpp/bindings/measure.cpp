@@ -102,13 +102,13 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
     GuardSettings guards = bench.guards();
     guards.ramp_s = probe || wanted.push ? guards.ramp_s : 0.0;  // what makes no force has none to begin with
     guards.force_limit = probe ? probe->force_limit : guards.force_limit;
-    Outlets outlets;
-    outlets.real_object = !wanted.push;
-    outlets.keeps = wanted.keep;
+    RecordSinks sinks;
+    sinks.real_object = !wanted.push;
+    sinks.keeps = wanted.keep;
     const Opened opened = device.open();
     detail::require(static_cast<bool>(opened), opened.reason);
     if (!wanted.record.empty()) {
-        const std::string reason = outlets.file.open(wanted.record, wanted.units, metadata, wanted.force);
+        const std::string reason = sinks.file.open(wanted.record, wanted.units, metadata, wanted.force);
         if (!reason.empty()) {
             device.close();
             throw std::invalid_argument(reason);
@@ -119,25 +119,25 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
     const auto watch = [&](const SessionView& view) { watcher(view); };
     const auto measured = [&](auto moves) {
         const py::gil_scoped_release unlocked;
-        return measure_live(device, std::move(moves), guards, wanted.session, outlets, asked, watch);
+        return measure_live(device, std::move(moves), guards, wanted.session, sinks, asked, watch);
     };
     const SessionReport report = probe         ? measured(Probe{*probe, period_s})
                                  : wanted.push ? measured(Pulses{{*wanted.push}, period_s})
                                                : measured(FreeMotion{});
     SessionExpectation expected{false, guards.encoder_step, {}, wanted.units.position, {}};
-    const std::vector<std::string> notes = close_record(outlets, report, wanted.session.loop, wanted.units,
+    const std::vector<std::string> notes = close_record(sinks, report, wanted.session.loop, wanted.units,
                                                         metadata, wanted.record, wanted.force, expected);
     watcher.rethrow();
-    py::dict summary = summary_of(report, wanted.session.loop, outlets, wanted.record, notes, expected);
+    py::dict summary = summary_of(report, wanted.session.loop, sinks, wanted.record, notes, expected);
     summary["device"] = bench.device.id;
     summary["encoder_step"] = bench.device.encoder_step;
     summary["force_limit"] = bench.device.force_limit;
     summary["transducer"] = wanted.transducer;
-    summary["position_range"] = std::pair{outlets.positions.lower, outlets.positions.upper};
-    summary["force_range"] = std::pair{outlets.forces.lower, outlets.forces.upper};
+    summary["position_range"] = std::pair{sinks.positions.lower, sinks.positions.upper};
+    summary["force_range"] = std::pair{sinks.forces.lower, sinks.forces.upper};
     if (wanted.keep) {
         summary["profile"] = bench.device;
-        summary["kept"] = columns(outlets.kept);
+        summary["kept"] = columns(sinks.kept);
     }
     told(summary);
     return summary;

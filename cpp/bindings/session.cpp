@@ -50,13 +50,13 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
                                               simulated_metadata(bench), model_name, scheme, guards, rate_hz);
     validate(scheme, model, period_s);
     SimulatedDevice device{bench.device, bench.hand, simulated_substeps(period_s)};
-    Outlets outlets;
+    RecordSinks sinks;
     if (telemetry_port) {
-        const std::string reason = outlets.telemetry.open(*telemetry_port, telemetry_hz, units);
+        const std::string reason = sinks.telemetry.open(*telemetry_port, telemetry_hz, units);
         detail::require(reason.empty(), reason);
     }
     if (!record.empty()) {
-        const std::string reason = outlets.file.open(record, units, metadata, force);
+        const std::string reason = sinks.file.open(record, units, metadata, force);
         detail::require(reason.empty(), reason);
     }
     const Opened opened = device.open();
@@ -67,16 +67,16 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
     Watcher watcher{progress, &LoopProgress::force, asked};
     {
         const py::gil_scoped_release unlocked;
-        report = render_live(model, scheme, device, guards, settings, outlets, asked,
+        report = render_live(model, scheme, device, guards, settings, sinks, asked,
                              [&](const SessionView& view) { watcher(view); });
     }
     const Domain& domain = model.domain();
     SessionExpectation expected{
         false, guards.encoder_step, {domain.lower[0], domain.upper[0]}, units.position};
     const std::vector<std::string> notes =
-        close_record(outlets, report, settings.loop, units, metadata, record, force, expected);
+        close_record(sinks, report, settings.loop, units, metadata, record, force, expected);
     watcher.rethrow();
-    py::dict summary = summary_of(report, settings.loop, outlets, record, notes, expected);
+    py::dict summary = summary_of(report, settings.loop, sinks, record, notes, expected);
     summary["energy"] = energy_of(report.loop);
     return summary;
 }

@@ -63,8 +63,8 @@ void bind_bounds(py::module_& module) {
     constexpr double none = std::numeric_limits<double>::infinity();
     module.def(
         "force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0, "force_limit"_a = none,
-        "Proved bounds of a model of one position, or of position and velocity, on a device that limits its\n"
-        "force; play_radius in place of its own where above 0.");
+        "Returns proved bounds of a model of one position, or of position and velocity, on a device with a\n"
+        "force limit. A play_radius above 0 replaces the model's own.");
     module.def("balancing_shift", py::overload_cast<const ForceModel&, double>(&balancing_shift), "model"_a,
                "force_limit"_a,
                "Shift of a force that repeats with which the limited force does not push on average; 0 for "

@@ -88,7 +88,7 @@ class Watcher {
 
 /// Renames the recording, if there is one; `record` becomes its name. Returns notes for a person: privileges that were
 /// refused, and every other difference from what was asked for. What the verdict needs is added to `expected`.
-inline std::vector<std::string> close_record(Outlets& outlets, const SessionReport& report,
+inline std::vector<std::string> close_record(RecordSinks& sinks, const SessionReport& report,
                                              const LoopSettings& settings, const RecordUnits& units,
                                              const Metadata& metadata, std::string& record, bool force,
                                              SessionExpectation& expected) {
@@ -96,12 +96,12 @@ inline std::vector<std::string> close_record(Outlets& outlets, const SessionRepo
     if (record.empty()) {
         return notes;
     }
-    if (const std::string& aside = outlets.file.file().set_aside_as(); !aside.empty()) {
+    if (const std::string& aside = sinks.file.file().set_aside_as(); !aside.empty()) {
         notes.push_back("a recording that was cut off earlier is kept as " + aside);
     }
     const std::string asked_for = record;
     expected.recorded = true;
-    expected.warnings = finish_record(outlets.file, report, settings, record);
+    expected.warnings = finish_record(sinks.file, report, settings, record);
     notes.insert(notes.end(), expected.warnings.begin(), expected.warnings.end());
     if (!is_orderly(report.loop.ending)) {
         notes.push_back(write_last_ticks(asked_for, force, units, metadata, report, settings));
@@ -118,26 +118,25 @@ inline py::list findings_of(const std::vector<SessionFinding>& findings) {
 }
 
 /// What a session did, by name. `record` is the name that its recording has, empty without one.
-inline py::dict summary_of(const SessionReport& report, const LoopSettings& settings, const Outlets& outlets,
-                           const std::string& record, const std::vector<std::string>& notes,
-                           const SessionExpectation& expected) {
-    const std::vector<SessionFinding> findings = judge_session(report, settings, outlets, expected);
-    return py::dict("verdict"_a = verdict_text(findings), "findings"_a = findings_of(findings),
-                    "orderly"_a = is_orderly(report.loop.ending),
-                    "ended"_a = ending_text(report.loop, settings),
-                    "status"_a = text(report.loop.status).word, "ticks"_a = report.loop.timing.ticks(),
-                    "rate_hz"_a = report.loop.timing.rate_hz(), "wanted_rate_hz"_a = settings.rate_hz,
-                    "period"_a = microseconds(report.loop.timing.period),
-                    "lateness"_a = microseconds(report.loop.timing.lateness),
-                    "missed_deadlines"_a = report.loop.timing.missed,
-                    "longest_gap_us"_a = 1e-3 * static_cast<double>(report.loop.timing.period.largest()),
-                    "ticks_by_status"_a = statuses(report.loop), "lost_samples"_a = report.loop.lost_samples,
-                    "repeated_samples"_a = report.loop.repeated_samples,
-                    "record"_a = record.empty() ? py::object(py::none()) : py::cast(record),
-                    "recorded"_a = outlets.file.written(),
-                    "lost_records"_a = report.lost_records + outlets.file.refused(),
-                    "telemetry_sent"_a = outlets.telemetry.sent(),
-                    "telemetry_dropped"_a = outlets.telemetry.dropped(), "notes"_a = notes);
+inline py::dict summary_of(const SessionReport& report, const LoopSettings& settings,
+                           const RecordSinks& sinks, const std::string& record,
+                           const std::vector<std::string>& notes, const SessionExpectation& expected) {
+    const std::vector<SessionFinding> findings = judge_session(report, settings, sinks, expected);
+    return py::dict(
+        "verdict"_a = verdict_text(findings), "findings"_a = findings_of(findings),
+        "orderly"_a = is_orderly(report.loop.ending), "ended"_a = ending_text(report.loop, settings),
+        "status"_a = text(report.loop.status).word, "ticks"_a = report.loop.timing.ticks(),
+        "rate_hz"_a = report.loop.timing.rate_hz(), "wanted_rate_hz"_a = settings.rate_hz,
+        "period"_a = microseconds(report.loop.timing.period),
+        "lateness"_a = microseconds(report.loop.timing.lateness),
+        "missed_deadlines"_a = report.loop.timing.missed,
+        "longest_gap_us"_a = 1e-3 * static_cast<double>(report.loop.timing.period.largest()),
+        "ticks_by_status"_a = statuses(report.loop), "lost_samples"_a = report.loop.lost_samples,
+        "repeated_samples"_a = report.loop.repeated_samples,
+        "record"_a = record.empty() ? py::object(py::none()) : py::cast(record),
+        "recorded"_a = sinks.file.written(), "lost_records"_a = report.lost_records + sinks.file.refused(),
+        "telemetry_sent"_a = sinks.telemetry.sent(), "telemetry_dropped"_a = sinks.telemetry.dropped(),
+        "notes"_a = notes);
 }
 
 }  // namespace palpate::bindings

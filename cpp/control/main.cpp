@@ -108,11 +108,11 @@ Job job_of(const Options& options, ModelFile file, RecordUnits units, const Sche
     return job;
 }
 
-void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
-                  Outlets& outlets) {
+void open_sinks(const Options& options, const Metadata& metadata, const RecordUnits& units,
+                RecordSinks& sinks) {
     if (options.telemetry_port) {
         if (const std::string reason =
-                outlets.telemetry.open(*options.telemetry_port, options.telemetry_hz, units);
+                sinks.telemetry.open(*options.telemetry_port, options.telemetry_hz, units);
             !reason.empty()) {
             refuse(reason);
         }
@@ -122,11 +122,11 @@ void open_outlets(const Options& options, const Metadata& metadata, const Record
         if (std::filesystem::equivalent(options.record, options.model, ignored)) {
             refuse("--record " + options.record + " is the model; writing there would destroy it");
         }
-        if (const std::string reason = outlets.file.open(options.record, units, metadata, options.force);
+        if (const std::string reason = sinks.file.open(options.record, units, metadata, options.force);
             !reason.empty()) {
             refuse("--record " + reason);
         }
-        if (const std::string& aside = outlets.file.file().set_aside_as(); !aside.empty()) {
+        if (const std::string& aside = sinks.file.file().set_aside_as(); !aside.empty()) {
             std::cerr << "a recording that was cut off earlier is kept as " << aside << "\n";
         }
     }
@@ -211,8 +211,8 @@ void occupy_closed_streams() {
     }
 }
 
-/// The exit code, once standard output has taken everything: 1 where it has not.
-int told(int code) {
+/// Flushes standard output and returns the exit code; 1 if the output could not be written.
+int exit_code_after_output(int code) {
     errno = 0;
     if (std::cout.flush()) {
         return code;
@@ -253,7 +253,7 @@ int main(int count, char** words) {
     palpate::control::Options options;
     try {
         const auto code = palpate::control::read_options(count, words, options);
-        return palpate::control::told(code ? *code : palpate::control::run(options));
+        return palpate::control::exit_code_after_output(code ? *code : palpate::control::run(options));
     } catch (const std::exception& error) {
         std::cerr << "error: " << error.what() << "\n";
         return 2;

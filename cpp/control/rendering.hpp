@@ -41,8 +41,8 @@ struct Job {
 [[nodiscard]] Job job_of(const Options& options, ModelFile file, RecordUnits units, const Scheme& scheme,
                          const GuardSettings& guards, const LoopSettings& loop);
 
-void open_outlets(const Options& options, const Metadata& metadata, const RecordUnits& units,
-                  Outlets& outlets);
+void open_sinks(const Options& options, const Metadata& metadata, const RecordUnits& units,
+                RecordSinks& sinks);
 
 /// Set by the signals that end a run.
 [[nodiscard]] const std::atomic<bool>& asked_to_stop();
@@ -56,9 +56,9 @@ int render_on(D& device, const std::string& called, const Options& options, cons
     const Metadata metadata =
         flight_metadata(std::string("palpate-control ") + PALPATE_VERSION, about_device, options.model,
                         job.scheme, job.guards, job.settings.loop.rate_hz);
-    Outlets outlets;
+    RecordSinks sinks;
     try {
-        open_outlets(options, metadata, job.units, outlets);
+        open_sinks(options, metadata, job.units, sinks);
     } catch (...) {
         device.close();
         throw;
@@ -78,7 +78,7 @@ int render_on(D& device, const std::string& called, const Options& options, cons
     handle_signals();
     LiveView view{job.settings.loop, job.units};
     const SessionReport report =
-        render_live(model, job.scheme, device, job.guards, job.settings, outlets, asked_to_stop(),
+        render_live(model, job.scheme, device, job.guards, job.settings, sinks, asked_to_stop(),
                     [&](const SessionView& now) { view.show(now); });
     view.end();
 
@@ -87,7 +87,7 @@ int render_on(D& device, const std::string& called, const Options& options, cons
     SessionExpectation expected{
         !record.empty(), job.guards.encoder_step, {domain.lower[0], domain.upper[0]}, job.units.position};
     if (!record.empty()) {
-        expected.warnings = finish_record(outlets.file, report, job.settings.loop, record);
+        expected.warnings = finish_record(sinks.file, report, job.settings.loop, record);
     }
     for (const std::string& warning : expected.warnings) {
         std::cerr << "warning: " << warning << "\n";
@@ -102,8 +102,8 @@ int render_on(D& device, const std::string& called, const Options& options, cons
                       << "\n";
         }
     }
-    const std::vector<SessionFinding> findings = judge_session(report, job.settings.loop, outlets, expected);
-    tell_summary(report, job.settings, outlets, record, findings, story(), options.as_json);
+    const std::vector<SessionFinding> findings = judge_session(report, job.settings.loop, sinks, expected);
+    tell_summary(report, job.settings, sinks, record, findings, story(), options.as_json);
     // The exit code states how the loop ended; the verdict in the summary judges what was rendered.
     return is_orderly(report.loop.ending) ? 0 : 1;
 }

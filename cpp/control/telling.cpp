@@ -105,11 +105,11 @@ void LiveView::show(const SessionView& view) {
     }
 }
 
-void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
+void tell_summary(const SessionReport& report, const SessionSettings& settings, const RecordSinks& sinks,
                   const std::string& record, const std::vector<SessionFinding>& findings, const Story& device,
                   bool as_json) {
     const LoopReport& loop = report.loop;
-    const RecordingFile& file = outlets.file;
+    const RecordingFile& file = sinks.file;
     const std::string ending = ending_text(loop, settings.loop);
     if (as_json) {
         nlohmann::json summary{
@@ -129,8 +129,8 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
             {"record", record.empty() ? nlohmann::json() : nlohmann::json(record)},
             {"recorded", file.written()},
             {"lost_records", report.lost_records + file.refused()},
-            {"telemetry_sent", outlets.telemetry.sent()},
-            {"telemetry_dropped", outlets.telemetry.dropped()},
+            {"telemetry_sent", sinks.telemetry.sent()},
+            {"telemetry_dropped", sinks.telemetry.dropped()},
             {"energy",
              {{"given_in_ramp_J", loop.given_in_ramp},
               {"given_J", loop.given},
@@ -170,9 +170,9 @@ void tell_summary(const SessionReport& report, const SessionSettings& settings, 
         std::cout << "recorded   " << record << ": " << file.written() << " rows, "
                   << report.lost_records + file.refused() << " lost\n";
     }
-    if (outlets.telemetry.sent() + outlets.telemetry.dropped() > 0) {
-        std::cout << "telemetry  " << outlets.telemetry.sent() << " lines sent, "
-                  << outlets.telemetry.dropped() << " dropped\n";
+    if (sinks.telemetry.sent() + sinks.telemetry.dropped() > 0) {
+        std::cout << "telemetry  " << sinks.telemetry.sent() << " lines sent, " << sinks.telemetry.dropped()
+                  << " dropped\n";
     }
     std::cout << std::flush;
 }

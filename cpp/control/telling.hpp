@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "palpate/io/outlets.hpp"
+#include "palpate/io/record_sinks.hpp"
 #include "palpate/session.hpp"
 #include "palpate/session_verdict.hpp"
 
@@ -44,7 +44,7 @@ struct Story {
 [[nodiscard]] nlohmann::json microseconds(const DurationHistogram& histogram);
 
 /// Prints the verdict and the summary on standard output, as lines or as one JSON object.
-void tell_summary(const SessionReport& report, const SessionSettings& settings, const Outlets& outlets,
+void tell_summary(const SessionReport& report, const SessionSettings& settings, const RecordSinks& sinks,
                   const std::string& record, const std::vector<SessionFinding>& findings, const Story& device,
                   bool as_json);
 

@@ -718,8 +718,8 @@ def fingerprint(model: ForceModel) -> str:
     """
 def force_bounds(model: ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
-    Proved bounds of a model of one position, or of position and velocity, on a device that limits its
-    force; play_radius in place of its own where above 0.
+    Returns proved bounds of a model of one position, or of position and velocity, on a device with a
+    force limit. A play_radius above 0 replaces the model's own.
     """
 def force_driven(model: ForceModel, scheme: Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """

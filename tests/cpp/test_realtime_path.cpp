@@ -198,9 +198,9 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
             EXPECT_TRUE(device.open());
             Controller controller{device, std::move(structure),
                                   guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
-            Outlets outlets;
-            using Recorder = FlightRecorder<TickRecord, Outlets>;
-            Recorder recorder{outlets, 4096, std::chrono::milliseconds{5}};
+            RecordSinks sinks;
+            using Recorder = FlightRecorder<TickRecord, RecordSinks>;
+            Recorder recorder{sinks, 4096, std::chrono::milliseconds{5}};
             LastRecords<TickRecord> last{100};
             LoopProgress progress;
             const auto report = std::make_unique<LoopReport>();

@@ -17,7 +17,7 @@ namespace {
 struct Judged {
     std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // large: not on the stack
     LoopSettings settings;
-    Outlets outlets;
+    RecordSinks sinks;
     SessionExpectation expected{false, 1e-3, {0.0, 1.0}, "rad", {}};
 
     Judged() {
@@ -25,8 +25,8 @@ struct Judged {
             tick(k * 1'000'000LL);
         }
         count(Status::Ok) = 1000;
-        outlets.positions = {0.0, 1.0};
-        outlets.forces = {-1.0, 2.0};
+        sinks.positions = {0.0, 1.0};
+        sinks.forces = {-1.0, 2.0};
     }
     void tick(Nanoseconds now, std::uint64_t skipped = 0) {
         report->loop.timing.add({.deadline = now, .now = now, .skipped = skipped});
@@ -39,7 +39,7 @@ struct Judged {
         count(status) += ticks;
     }
     [[nodiscard]] std::string text() const {
-        return verdict_text(judge_session(*report, settings, outlets, expected));
+        return verdict_text(judge_session(*report, settings, sinks, expected));
     }
 };
 
@@ -93,7 +93,7 @@ TEST(SessionVerdict, NamesTicksWhoseForceWasNotTheModelsAboveOnePercent) {
         expect(many, "usable: 11 of 1000 (1.1 %) ticks ", sentence);
     }
     Judged outside;
-    outside.outlets.extrapolated = 300;
+    outside.sinks.extrapolated = 300;
     expect(outside, "usable: 300 of 1000 (30 %) ticks lay outside the model's data, from 0 to 1 rad",
            "stay within");
     Judged ramp;
@@ -103,18 +103,18 @@ TEST(SessionVerdict, NamesTicksWhoseForceWasNotTheModelsAboveOnePercent) {
 
 TEST(SessionVerdict, RefusesASessionWithoutForce) {
     Judged none;
-    none.outlets.forces = {0.0, 0.0};
+    none.sinks.forces = {0.0, 0.0};
     expect(none, "no: every force was zero: the handle did not touch the object between 0 and 1 rad",
            "move it");
 }
 
 TEST(SessionVerdict, RefusesARecordingWithoutMotion) {
     Judged still;
-    still.outlets.positions = {0.5, 0.5015};  // less than two steps of the encoder
+    still.sinks.positions = {0.5, 0.5015};  // less than two steps of the encoder
     expect(still, "usable: the handle covered 0.0015 rad", "move it over the whole object");
     still.expected.recorded = true;
     expect(still, "no: ", "so no force over position is known");
-    still.outlets.positions = {0.5, 0.5021};
+    still.sinks.positions = {0.5, 0.5021};
     still.expected.recorded = false;
     expect(still, "usable: the handle covered 0.0021 rad, 0.21 % of the model's domain", "move it");
 }
@@ -123,7 +123,7 @@ TEST(SessionVerdict, NamesARealObjectOfWhichFewPositionsAreKnown) {
     Judged object;
     object.expected.domain = {};
     EXPECT_EQ(object.text(), "good");
-    object.outlets.positions = {0.0, 0.049};
+    object.sinks.positions = {0.0, 0.049};
     expect(object, "usable: the handle covered 0.049 rad, 49 steps of the encoder",
            "move it over the whole object");
 }
@@ -145,8 +145,8 @@ TEST(SessionVerdict, RefusesARunThatWasStoppedAndPutsThatFirst) {
 TEST(SessionVerdict, NamesNoMotionOfARunThatWasStopped) {
     Judged stopped;
     stopped.report->loop.ending = Ending::RateTooLow;
-    stopped.outlets.positions = {0.5, 0.5};
-    stopped.outlets.forces = {0.0, 0.0};
+    stopped.sinks.positions = {0.5, 0.5};
+    stopped.sinks.forces = {0.0, 0.0};
     EXPECT_EQ(stopped.text().find("handle"), std::string::npos) << stopped.text();
 }
 

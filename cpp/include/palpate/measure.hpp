@@ -12,7 +12,7 @@
 #include "palpate/device/device.hpp"
 #include "palpate/device/simulated.hpp"
 #include "palpate/guard/guard_settings.hpp"
-#include "palpate/io/outlets.hpp"
+#include "palpate/io/record_sinks.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/probe.hpp"
@@ -27,7 +27,7 @@ namespace palpate {
 /// itself (Probe, Pulses). Everything else is as in a rendering. Throws std::invalid_argument before anything moves.
 template <Device D, Structure S, class Watch>
 [[nodiscard]] SessionReport measure_live(D& device, S moves, const GuardSettings& guards,
-                                         const SessionSettings& settings, Outlets& outlets,
+                                         const SessionSettings& settings, RecordSinks& sinks,
                                          const std::atomic<bool>& asked, Watch watch) {
     validate(settings.loop);
     validate(guards);
@@ -37,7 +37,7 @@ template <Device D, Structure S, class Watch>
                                  .limit = force_limit(guards),
                                  .ramp = force_ramp(guards, period_s),
                                  .slew = slew_limit(guards, period_s)}};
-    return run_session(controller, settings, outlets, asked, watch);
+    return run_session(controller, settings, sinks, asked, watch);
 }
 
 /// A probe that suits a bench: its size follows the bench's, its range is given, its limit is the device's.

@@ -31,7 +31,7 @@
 #include "palpate/guard/reading_guard.hpp"
 #include "palpate/guard/stored_energy.hpp"
 #include "palpate/io/growing_file.hpp"
-#include "palpate/io/outlets.hpp"
+#include "palpate/io/record_sinks.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/io/telemetry.hpp"
 #include "palpate/io/tick_record.hpp"

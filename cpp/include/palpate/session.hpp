@@ -16,7 +16,7 @@
 #include "palpate/controller.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/guards.hpp"
-#include "palpate/io/outlets.hpp"
+#include "palpate/io/record_sinks.hpp"
 #include "palpate/io/tick_record.hpp"
 #include "palpate/loop.hpp"
 #include "palpate/realtime/flight_recorder.hpp"
@@ -67,10 +67,10 @@ struct LoopSink {
 }  // namespace detail
 
 /// Renders until the loop ends. The device is open; when this returns it is closed, at zero force, and every
-/// record has reached the outlets. `watch(const SessionView&)` is called now and then, and may set `asked`.
+/// record has reached the sinks. `watch(const SessionView&)` is called now and then, and may set `asked`.
 template <class Control, class Watch>
 [[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
-                                        Outlets& outlets, const std::atomic<bool>& asked, Watch watch) {
+                                        RecordSinks& sinks, const std::atomic<bool>& asked, Watch watch) {
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
@@ -81,8 +81,8 @@ template <class Control, class Watch>
     LastRecords<TickRecord> last{settings.last_ticks};
     const LockedMemory memory;
     const WakefulCores cores;
-    using Recorder = FlightRecorder<TickRecord, Outlets>;
-    Recorder recorder{outlets, capacity, settings.hand_over_every};
+    using Recorder = FlightRecorder<TickRecord, RecordSinks>;
+    Recorder recorder{sinks, capacity, settings.hand_over_every};
 
     std::thread loop{[&] {
         report.refused = become_real_time(settings.real_time, memory, cores);
@@ -95,7 +95,7 @@ template <class Control, class Watch>
     while (!over.load(std::memory_order_acquire)) {
         std::this_thread::sleep_for(std::chrono::milliseconds{20});
         const bool known = asked_for_privileges.load(std::memory_order_acquire);
-        watch(SessionView{progress, known ? &report.refused : nullptr, outlets.file.error()});
+        watch(SessionView{progress, known ? &report.refused : nullptr, sinks.file.error()});
     }
     loop.join();
     recorder.stop();
@@ -109,14 +109,14 @@ template <class Control, class Watch>
 template <Device D, class Watch>
 [[nodiscard]] SessionReport render_live(const ForceModel& model, const Scheme& scheme, D& device,
                                         const GuardSettings& guards, const SessionSettings& settings,
-                                        Outlets& outlets, const std::atomic<bool>& asked, Watch watch) {
+                                        RecordSinks& sinks, const std::atomic<bool>& asked, Watch watch) {
     validate(settings.loop);
     validate(guards);
     const double period_s = 1.0 / settings.loop.rate_hz;
     validate(scheme, model, period_s);
     return with_structure(model, scheme, period_s, guards.force_limit, [&](auto structure) {
         Controller controller{device, std::move(structure), guards_of(guards, model, scheme, period_s)};
-        return run_session(controller, settings, outlets, asked, watch);
+        return run_session(controller, settings, sinks, asked, watch);
     });
 }
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/io/outlets.hpp"
+#include "palpate/io/record_sinks.hpp"
 #include "palpate/loop.hpp"
 #include "palpate/readable.hpp"
 #include "palpate/session.hpp"
@@ -25,7 +25,7 @@ struct SessionFinding {
     std::string sentence;
 };
 
-/// What a session is judged by beside its report and its outlets.
+/// What a session is judged by beside its report and its sinks.
 struct SessionExpectation {
     bool recorded = false;      ///< a recording was asked for
     double encoder_step = 0.0;  ///< of the device [m or rad]; 0 = not quantised
@@ -84,7 +84,7 @@ inline void judge_losses(const SessionReport& report, const LoopSettings& settin
 }
 
 /// Findings about ticks whose force was not the model's.
-inline void judge_forces(const LoopReport& loop, const Outlets& outlets, const SessionExpectation& expected,
+inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
     const std::uint64_t ticks = loop.timing.ticks();
     const auto count = [&](Status status) { return loop.ticks_by_status[static_cast<std::size_t>(status)]; };
@@ -99,26 +99,25 @@ inline void judge_forces(const LoopReport& loop, const Outlets& outlets, const S
             "reduced the force, because the rendering gave energy: choose its structure with palpate plan");
     changed(count(Status::MaxIterations) + count(Status::NotUnique),
             "did not solve the load line: choose the structure with palpate plan");
-    changed(outlets.extrapolated, "lay outside the model's data, from " + readable(expected.domain.lower) +
-                                      " to " + readable(expected.domain.upper) + " " +
-                                      expected.position_unit +
-                                      ": stay within, or identify the model over a larger range");
+    changed(sinks.extrapolated, "lay outside the model's data, from " + readable(expected.domain.lower) +
+                                    " to " + readable(expected.domain.upper) + " " + expected.position_unit +
+                                    ": stay within, or identify the model over a larger range");
     if (ticks > 0 && count(Status::Ramp) == ticks) {
         findings.push_back({"usable", "all " + std::to_string(ticks) +
                                           " ticks lay within the ramp at the start: run for a longer time"});
     }
-    if (ticks > 0 && outlets.forces.lower == 0.0 && outlets.forces.upper == 0.0) {
+    if (ticks > 0 && sinks.forces.lower == 0.0 && sinks.forces.upper == 0.0) {
         findings.push_back({"no", "every force was zero: the handle did not touch the object between " +
-                                      readable(outlets.positions.lower) + " and " +
-                                      readable(outlets.positions.upper) + " " + expected.position_unit +
+                                      readable(sinks.positions.lower) + " and " +
+                                      readable(sinks.positions.upper) + " " + expected.position_unit +
                                       "; move it against the object"});
     }
 }
 
 /// Findings about the motion of the handle.
-inline void judge_motion(const Outlets& outlets, const SessionExpectation& expected,
+inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
-    const double covered = outlets.positions.upper - outlets.positions.lower;
+    const double covered = sinks.positions.upper - sinks.positions.lower;
     const double domain = expected.domain.upper - expected.domain.lower;
     const std::string range = "the handle covered " + readable(covered) + " " + expected.position_unit;
     if (!(covered > 2.0 * expected.encoder_step)) {
@@ -138,26 +137,26 @@ inline void judge_motion(const Outlets& outlets, const SessionExpectation& expec
 /// Judges a session: an empty list means "good". The most serious finding comes first.
 [[nodiscard]] inline std::vector<SessionFinding> judge_session(const SessionReport& report,
                                                                const LoopSettings& settings,
-                                                               const Outlets& outlets,
+                                                               const RecordSinks& sinks,
                                                                const SessionExpectation& expected) {
     std::vector<SessionFinding> findings;
     if (!is_orderly(report.loop.ending)) {
         findings.push_back({"no", ending_text(report.loop, settings)});
     }
     const auto usable_rows = report.loop.ticks_by_status[static_cast<std::size_t>(Status::Ok)];
-    if (expected.recorded && outlets.file.written() == 0) {
+    if (expected.recorded && sinks.file.written() == 0) {
         findings.push_back({"no", "nothing was recorded"});
     } else if (expected.recorded && usable_rows == 0) {
         findings.push_back({"no", "the recording has no usable row, because none of its " +
-                                      std::to_string(outlets.file.written()) +
+                                      std::to_string(sinks.file.written()) +
                                       " forces is the object's alone: record for a longer time"});
     }
     for (const std::string& warning : expected.warnings) {
         findings.push_back({"usable", warning});
     }
     if (is_orderly(report.loop.ending)) {  // a run that was stopped early says nothing about the motion
-        detail::judge_forces(report.loop, outlets, expected, findings);
-        detail::judge_motion(outlets, expected, findings);
+        detail::judge_forces(report.loop, sinks, expected, findings);
+        detail::judge_motion(sinks, expected, findings);
     }
     detail::judge_losses(report, settings, findings);
     std::stable_partition(findings.begin(), findings.end(),

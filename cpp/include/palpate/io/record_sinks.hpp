@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-/// Least and largest of what was seen; NaN before anything was.
+/// Smallest and largest value seen; NaN before the first value.
 struct Range {
     double lower = std::numeric_limits<double>::quiet_NaN();
     double upper = std::numeric_limits<double>::quiet_NaN();
@@ -24,22 +24,21 @@ struct Range {
     }
 };
 
-/// Where ticks go besides the device: a file, a network, memory, all of them or nowhere. Also keeps their ranges.
-struct Outlets {
+/// Passes the records of ticks to a file, to telemetry and to memory, and keeps their ranges.
+struct RecordSinks {
     RecordingFile file;
     Telemetry telemetry;
     std::vector<TickRecord> kept;
-    bool keeps = false;  ///< whether every tick is kept in memory
-    bool real_object =
-        false;  ///< whether the force to be told is that of a real object, not of a virtual one
+    bool keeps = false;        ///< true if every tick is kept in memory
+    bool real_object = false;  ///< true if the recorded force is that of a real object, not of a virtual one
 
     void take(std::span<const TickRecord> ticks) noexcept {
         if (real_object) {
-            told_.assign(ticks.begin(), ticks.end());
-            for (TickRecord& tick : told_) {
+            recorded_.assign(ticks.begin(), ticks.end());
+            for (TickRecord& tick : recorded_) {
                 tick.force = object_force(tick);
             }
-            ticks = told_;
+            ticks = recorded_;
         }
         for (const TickRecord& tick : ticks) {
             positions.add(tick.position);
@@ -56,11 +55,11 @@ struct Outlets {
     }
 
     Range positions;                 ///< of the ticks taken
-    Range forces;                    ///< of the ticks taken, of a real object where there is one
+    Range forces;                    ///< of the ticks taken, of a real object if there is one
     std::uint64_t extrapolated = 0;  ///< ticks outside the model's data
 
   private:
-    std::vector<TickRecord> told_;
+    std::vector<TickRecord> recorded_;
 };
 
 }  // namespace palpate
