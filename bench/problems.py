@@ -50,11 +50,11 @@ def problem(name: str, draw: int = 0) -> Problem:
     """
     noise = np.random.default_rng([int(name[1]), draw])
     if name in ("P1", "P6"):
-        x = _hand(10_000 if name == "P1" else 1_000_000, 0.0, 0.6, seed=[11, draw])
-        return _one_input(name, x, _spring_wall, 0.02, noise, seed=901)
+        x = hand(np.random.default_rng([11, draw]), 10_000 if name == "P1" else 1_000_000, 0.0, 0.6)
+        return _one_input(name, x, spring_wall, 0.02, noise, seed=901)
     if name == "P2":
-        x = _hand(10_000, 0.0, 4.0, seed=[12, draw])
-        return _one_input(name, x, _tactile_switch, 0.005, noise, seed=902)
+        x = hand(np.random.default_rng([12, draw]), 10_000, 0.0, 4.0)
+        return _one_input(name, x, tactile_switch, 0.005, noise, seed=902)
     if name == "P3":
         low, high = [-0.002, -0.2], [0.01, 0.2]
         X = np.random.default_rng([103, draw]).uniform(low, high, (20_000, 2))
@@ -83,9 +83,8 @@ def _one_input(name: str, x: Array, force, sigma: float, noise: np.random.Genera
     )
 
 
-def _hand(n: int, low: float, high: float, seed: list[int]) -> Array:
+def hand(random: np.random.Generator, n: int, low: float, high: float) -> Array:
     """A hand at 1 kHz: slow sweeps of wandering frequency and width with jitter, reflected at the ends."""
-    random = np.random.default_rng(seed)
     knots = max(8, n // 1500)
     at, knot = np.arange(n), np.linspace(0, n, knots)
     frequency = np.interp(at, knot, random.uniform(0.2, 0.9, knots))
@@ -95,7 +94,7 @@ def _hand(n: int, low: float, high: float, seed: list[int]) -> Array:
     return low + (high - low) * (1.0 - np.abs(1.0 - u))
 
 
-def _spring_wall(x: Array) -> Array:
+def spring_wall(x: Array) -> Array:
     """2 N*m/rad up to 0.4 rad, then 60 N*m/rad, the change 0.01 rad wide."""
     return 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
 
@@ -105,7 +104,7 @@ _SWITCH = CubicHermiteSpline(
 )
 
 
-def _tactile_switch(x: Array) -> Array:
+def tactile_switch(x: Array) -> Array:
     """N over mm: a bump whose slopes have kinks, and a stop of 20 N/mm at 3.8 mm."""
     return _SWITCH(x) + 20.0 * 0.01 * np.logaddexp(0.0, (x - 3.8) / 0.01)
 

@@ -9,6 +9,7 @@ PALPATE_DATA names the folder of measured recordings; without it the cases are o
 from __future__ import annotations
 
 import argparse
+import importlib
 import re
 import sys
 import time
@@ -22,12 +23,13 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
-from scipy.signal import lfilter
 
 import palpate
 from conftest import measured_data
 from palpate.recording.sample import sample_recording
+
+sys.path.append(str(Path(__file__).parents[2] / "bench"))
+problems = importlib.import_module("problems")
 
 Array = NDArray[np.float64]
 
@@ -95,30 +97,6 @@ class Case:
 # ------------------------------------------------------------------------------------ clean recordings
 
 
-def _hand(random: Generator, n: int, low: float, high: float) -> Array:
-    """A hand at 1 kHz: sweeps of wandering frequency and width with jitter, reflected at the ends."""
-    knots = max(8, n // 1500)
-    at, knot = np.arange(n), np.linspace(0, n, knots)
-    frequency = np.interp(at, knot, random.uniform(0.2, 0.9, knots))
-    width = np.interp(at, knot, random.uniform(0.42, 0.53, knots))
-    jitter = lfilter([1.0], [1.0, -0.995], random.normal(0.0, 4e-4, n))
-    u = np.abs(0.5 - width * np.cos(2.0 * np.pi * np.cumsum(frequency) * 1e-3) + jitter)
-    return low + (high - low) * (1.0 - np.abs(1.0 - u))
-
-
-def _spring_wall(x: Array) -> Array:
-    return 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
-
-
-_SWITCH = CubicHermiteSpline(
-    [0.0, 1.0, 1.2, 1.6, 1.8, 4.2], [0.0, 0.5, 0.6, 0.35, 0.42, 1.62], [0.5, 0.5, 0.0, 0.0, 0.5, 0.5]
-)
-
-
-def _switch(x: Array) -> Array:
-    return _SWITCH(1e3 * x) + 20.0 * 0.01 * np.logaddexp(0.0, (1e3 * x - 3.8) / 0.01)
-
-
 _ANGLE = {"position": "rad", "force": "N*m"}
 _LENGTH = {"position": "m", "force": "N"}
 
@@ -130,14 +108,15 @@ def _sample(random: Generator) -> Rows:
 
 
 def _p1(random: Generator) -> Rows:
-    x = _hand(random, 5000, 0.0, 0.6)
-    f = _spring_wall(x) + random.normal(0.0, 0.02, len(x))
+    x = problems.hand(random, 5000, 0.0, 0.6)
+    f = problems.spring_wall(x) + random.normal(0.0, 0.02, len(x))
     return Rows(x, f, None, None, _ANGLE)
 
 
 def _p2(random: Generator) -> Rows:
-    x = _hand(random, 5000, 0.0, 4e-3)
-    return Rows(x, _switch(x) + random.normal(0.0, 5e-3, len(x)), 1e-3 * np.arange(len(x)), None, _LENGTH)
+    x = problems.hand(random, 5000, 0.0, 4e-3)
+    f = problems.tactile_switch(1e3 * x) + random.normal(0.0, 5e-3, len(x))
+    return Rows(x, f, 1e-3 * np.arange(len(x)), None, _LENGTH)
 
 
 def _loop(random: Generator) -> Rows:
@@ -145,7 +124,7 @@ def _loop(random: Generator) -> Rows:
     x = np.linspace(0.0, 4e-3, 800)
     x, d = np.r_[x, x[::-1]], np.repeat([1, -1], 800).astype(np.int8)
     h = 0.05 + 0.1 * np.exp(-(((1e3 * x - 1.5) / 0.5) ** 2))
-    f = _switch(x) + d * h + random.normal(0.0, 3e-3, len(x))
+    f = problems.tactile_switch(1e3 * x) + d * h + random.normal(0.0, 3e-3, len(x))
     return Rows(x, f, None, d, _LENGTH)
 
 

@@ -2,6 +2,7 @@
 """The outcome of an identification, as plain arrays in the units of the data."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +66,21 @@ class IdentifiedNetwork:
     """Rows of the identification, fewer where repeats or correlated noise make them depend on each other"""
     findings: tuple[Finding, ...] = ()
     """Reservations for the verdict"""
+
+    def parameters(self) -> dict[str, Any]:
+        """Returns network and domain as keyword arguments of :class:`ForceModel`."""
+        return {
+            "alpha": self.alpha,
+            "beta": self.beta,
+            "weight": self.weight,
+            "linear": self.linear,
+            "bias": self.bias,
+            "weight_hysteresis": self.weight_hysteresis,
+            "linear_hysteresis": self.linear_hysteresis,
+            "bias_hysteresis": self.bias_hysteresis,
+            "lower": self.lower,
+            "upper": self.upper,
+        }
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from .._core import ForceModel
 from .._typing import Float1D
 from ..arguments import path_of
 from ..errors import InputError
@@ -29,7 +30,6 @@ from .isolated import refuse_isolated
 from .judgement import verdict_of
 from .options import IdentifyOptions, options_from
 from .periodic import modulo
-from .row_error import evaluator
 from .summary import Summary, merged, summarise
 from .usable import require_in_range
 from .workers import in_order
@@ -196,7 +196,7 @@ def _error_on_rows(
     position, lower = summary.position, float(network.lower[0])
     if period is not None:
         position = lower + period * modulo((position - lower) / period)
-    model = evaluator(network)
+    model = ForceModel(**network.parameters())
     given = {} if side is None or network.weight_hysteresis is None else {"direction": side}
     force, slope = (np.asarray(read(position, **given)) for read in (model.force, model.slope))
     inside = summary.yy - 2.0 * slope * summary.xy + slope**2 * summary.xx

@@ -145,25 +145,9 @@ def beyond_rows(network: IdentifiedNetwork, force: Float1D, *, repeats: bool) ->
     ]
 
 
-def evaluator(network: IdentifiedNetwork) -> ForceModel:
-    """The evaluator that models are rendered with."""
-    return ForceModel(
-        alpha=network.alpha,
-        beta=network.beta,
-        weight=network.weight,
-        linear=network.linear,
-        bias=network.bias,
-        weight_hysteresis=network.weight_hysteresis,
-        linear_hysteresis=network.linear_hysteresis,
-        bias_hysteresis=network.bias_hysteresis,
-        lower=network.lower,
-        upper=network.upper,
-    )
-
-
 def modelled(network: IdentifiedNetwork, positions: Float2D, side: Float1D | None) -> Float1D:
     """Force of the network at rows (n, d)."""
-    two, model = network.weight_hysteresis is not None, evaluator(network)
+    two, model = network.weight_hysteresis is not None, ForceModel(**network.parameters())
     inside = np.clip(positions, network.lower, network.upper)
     if len(network.lower) > 1:
         return np.asarray(model.predict(inside))

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,19 @@ class FrameRows:
         return "" if value is None or value is pd.NA else shown(str(value))[1:-1]
 
 
+@contextmanager
+def _python_arguments() -> Iterator[None]:
+    """Names the arguments of Python in a message about a file, in place of the command line's options."""
+    try:
+        yield
+    except InputError as error:
+        message = re.sub(r"--units (\w+)=(\w+)", r'units={"\1": "\2"}', str(error))
+        message = re.sub(r"--([a-z_]+) (\w+)", r'\1="\2"', message)
+        message = message.replace("correct the file", "correct the frame").replace("--", "")
+        raise InputError(message) from None
+
+
+@_python_arguments()
 def recording_of_frame(
     frame: pd.DataFrame,
     *,
@@ -53,29 +67,6 @@ def recording_of_frame(
     drop: bool,
 ) -> Recording:
     """See :meth:`palpate.Recording.from_frame`."""
-    try:
-        return _recording_of_frame(frame, position, force, time, direction, inputs, units, drop)
-    except InputError as error:
-        raise InputError(_with_arguments(str(error))) from None
-
-
-def _with_arguments(message: str) -> str:
-    """A message about a file, with the arguments of Python in place of the command line's options."""
-    message = re.sub(r"--units (\w+)=(\w+)", r'units={"\1": "\2"}', message)
-    message = re.sub(r"--([a-z_]+) (\w+)", r'\1="\2"', message)
-    return message.replace("correct the file", "correct the frame").replace("--", "")
-
-
-def _recording_of_frame(
-    frame: pd.DataFrame,
-    position: str | None,
-    force: str | None,
-    time: str | None,
-    direction: str | None,
-    inputs: Sequence[str],
-    units: Mapping[str, str] | None,
-    drop: bool,
-) -> Recording:
     if not isinstance(frame, pd.DataFrame):
         raise InputError(f"frame is {shown(frame)}; it must be a pandas DataFrame")
     if isinstance(frame.index.name, str) and frame.index.name not in frame.columns:
