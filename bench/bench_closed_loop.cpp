@@ -7,10 +7,10 @@
 
 #include <benchmark/benchmark.h>
 
-#include "palpate/closed_loop.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "scene.hpp"
 
 namespace {

@@ -11,10 +11,10 @@
 
 #include <benchmark/benchmark.h>
 
-#include "palpate/controller.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/controller.hpp"
 #include "scene.hpp"
 
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rendered force against time, for every structure and solver: a click and a wall on a simulated knob, a hand
 // that presses through both. Beside the time of a step along that motion stand the RMS force errors of
-// palpate/force_error.hpp: at the end of a tick, at its sampling instant, of its mean, and of that below 50 Hz.
+// palpate/simulation/force_error.hpp: at the end of a tick, at its sampling instant, of its mean, and of that below 50 Hz.
 
 #include <cmath>
 #include <cstddef>
@@ -12,9 +12,6 @@
 
 #include <benchmark/benchmark.h>
 
-#include "palpate/controller.hpp"
-#include "palpate/device/simulated.hpp"
-#include "palpate/force_error.hpp"
 #include "palpate/io/model_file.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/rendering/compensated.hpp"
@@ -26,6 +23,9 @@
 #include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/substepped.hpp"
 #include "palpate/rendering/trapezoidal.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/force_error.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 #include "palpate/solver/one_newton_step.hpp"
 #include "palpate/solver/resolvent.hpp"
 

@@ -36,7 +36,7 @@ def moved(
     v = np.gradient(x, time)
     force = sample_force(x) + mass * np.gradient(v, time) + damping * v
     if hysteresis:
-        force = force + hysteresis * np.clip((x - _core.play(x, PLAY)) / PLAY, -1.0, 1.0)
+        force = force + hysteresis * np.clip((x - _core.model.play(x, PLAY)) / PLAY, -1.0, 1.0)
     return Recording.from_arrays(
         np.round(x / ENCODER_STEP) * ENCODER_STEP,
         force + random.normal(0.0, FORCE_NOISE, len(x)),

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from palpate._core.simulation import motion_driven, simulate
+from palpate._core.stability import certify, force_bounds
 
-from palpate import DeviceProfile, Hand, Model, Scheme, _core, identify, plan, read_recording
+from palpate import DeviceProfile, Hand, Model, Scheme, identify, plan, read_recording
 from palpate.identification.constraints import slope_limited
 from palpate.planning import Plan
 from palpate.planning.choices import renderable_slopes
@@ -117,14 +119,14 @@ def error(
     """RMS of commanded force less the identified model's at the end of the tick; infinite where it breaks."""
     start = float(np.clip(0.0, model.lower[0], model.upper[0]))
     try:
-        trace = _core.simulate(rendered, scheme, device, hand, seconds, start_position=start)
+        trace = simulate(rendered, scheme, device, hand, seconds, start_position=start)
     except ValueError:
         return float("inf")
     end = np.asarray(trace["handle_end"])
     if not np.isfinite(end).all() or np.abs(end).max() > 1e3:
         return float("inf")
     felt = Scheme(structure="direct", play_radius=scheme.play_radius if model.hysteretic else 0.0)
-    truth = _core.motion_driven(model, felt, end, device.period_s)["force"]
+    truth = motion_driven(model, felt, end, device.period_s)["force"]
     return float(np.sqrt(np.mean((np.asarray(trace["force"]) - truth) ** 2)))
 
 
@@ -153,7 +155,7 @@ def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile)
             position_unit=device.position_unit,
         )
         start = place + PUSH * (upper - lower)
-        trace = _core.simulate(rendered, scheme, held, hand, 4.0, start_position=start)
+        trace = simulate(rendered, scheme, held, hand, 4.0, start_position=start)
         if not np.ptp(np.asarray(trace["handle_end"])[-500:]) <= SWING * device.encoder_step:
             return True
     return False
@@ -180,7 +182,7 @@ def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, floa
     """Share of the travel where the nearest force within the device's slopes is the identified one, and the
     largest departure of what is rendered from it there. A stick's h / r counts as slope."""
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
-    stick = _core.force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
+    stick = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
     low, high = renderable_slopes(device, stick, model)
     forces = strokes(model, x)
     unchanged = np.ones(SAMPLES, dtype=bool)
@@ -206,7 +208,7 @@ def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid
         rendered.items(), candidates(model, device, chosen.scheme.play_radius, grid)
     ):
         try:
-            known = not _core.certify(shown, scheme, device).refused
+            known = not certify(shown, scheme, device).refused
         except ValueError:
             continue  # impossible: a compensated model that is too steep for its coupling
         found = error(model, shown, scheme, device, hand, seconds), scheme.structure + words

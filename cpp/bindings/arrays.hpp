@@ -15,6 +15,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include "palpate/model/parameters.hpp"
+
 namespace palpate::bindings {
 
 /// Any array-like of numbers, as contiguous float64.
@@ -126,6 +128,11 @@ template <class T>
     pybind11::capsule free(owner.release(),
                            [](void* pointer) { delete static_cast<std::vector<T>*>(pointer); });
     return pybind11::array_t<T>(size, data, free);
+}
+
+inline void require_period(double period_s) {
+    palpate::detail::require(std::isfinite(period_s) && period_s > 0.0,
+                             "period_s is " + std::to_string(period_s) + ", must be > 0");
 }
 
 }  // namespace palpate::bindings

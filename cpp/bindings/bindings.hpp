@@ -5,17 +5,17 @@
 
 namespace palpate::bindings {
 
-// One function a topic, in the file of that name. Later topics may use the types of earlier ones.
+// Each function fills the submodule named after the header folder. Later ones use the types of earlier ones.
 void bind_status(pybind11::module_& module);
-void bind_wavelet(pybind11::module_& module);
 void bind_model(pybind11::module_& module);
+void bind_wavelet(pybind11::module_& module);
 void bind_dynamics(pybind11::module_& module);
 void bind_device(pybind11::module_& module);
 void bind_rendering(pybind11::module_& module);
-void bind_failure(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
-void bind_bench(pybind11::module_& module);
-void bind_session(pybind11::module_& module);
+void bind_simulation(pybind11::module_& module);
+void bind_run(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
+void bind_failure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

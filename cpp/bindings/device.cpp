@@ -4,7 +4,6 @@
 #include "bindings.hpp"
 #include "fields.hpp"
 #include "palpate/device/device_profile.hpp"
-#include "palpate/device/hand.hpp"
 
 namespace palpate::bindings {
 
@@ -67,21 +66,6 @@ void bind_device(py::module_& module) {
     define_by_fields(device_profile,
                      {"id", "period_s", "inertia", "viscous_damping", "coulomb_friction", "encoder_step",
                       "force_step", "delay_s", "force_limit", "jitter_s", "position_unit"});
-
-    const Hand hand;
-    py::class_<Hand> simulated_hand(
-        module, "Hand",
-        "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.");
-    simulated_hand
-        .def(py::init<double, double, double, double, double>(), py::kw_only(),
-             "stiffness"_a = hand.stiffness, "damping"_a = hand.damping, "lower"_a = hand.lower,
-             "upper"_a = hand.upper, "frequency_hz"_a = hand.frequency_hz)
-        .def_readonly("stiffness", &Hand::stiffness, "[N/m or N*m/rad]")
-        .def_readonly("damping", &Hand::damping, "[N*s/m or N*m*s/rad]")
-        .def_readonly("lower", &Hand::lower, "[m or rad]")
-        .def_readonly("upper", &Hand::upper, "[m or rad]")
-        .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]");
-    define_by_fields(simulated_hand, {"stiffness", "damping", "lower", "upper", "frequency_hz"});
 }
 
 }  // namespace palpate::bindings

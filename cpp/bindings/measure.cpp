@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/measure.hpp"
+#include "palpate/run/measure.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -17,11 +17,11 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
-#include "palpate/bench.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/rendering/free_motion.hpp"
 #include "palpate/rendering/probe.hpp"
 #include "palpate/rendering/pulses.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/test_rig.hpp"
 #include "summary.hpp"
 
 #ifdef PALPATE_HAS_USB

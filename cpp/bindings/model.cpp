@@ -10,6 +10,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "palpate/model/fingerprint.hpp"
 #include "palpate/model/force_model.hpp"
 
 namespace palpate::bindings {
@@ -378,6 +379,8 @@ void bind_model(py::module_& module) {
         "slope_bounds", &slope_bounds,
         "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
         "times max|f'| wider than the true range.");
+    module.def("fingerprint", &fingerprint, "model"_a,
+               "16 hexadecimal digits that change with every number of which the model's force is made.");
 }
 
 }  // namespace palpate::bindings

@@ -20,19 +20,34 @@ void translate_invalid_argument(std::exception_ptr thrown) {
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
-    module.doc() = "The C++ core of palpate: evaluation, filters, solvers, structures and simulation.";
+    module.doc() = "The C++ core of palpate, one submodule for each folder of its headers.";
     module.attr("__version__") = PALPATE_VERSION;
-
     pybind11::register_local_exception_translator(&translate_invalid_argument);
-    palpate::bindings::bind_status(module);
-    palpate::bindings::bind_wavelet(module);
-    palpate::bindings::bind_model(module);
-    palpate::bindings::bind_dynamics(module);
-    palpate::bindings::bind_device(module);
-    palpate::bindings::bind_rendering(module);
-    palpate::bindings::bind_failure(module);
-    palpate::bindings::bind_stability(module);
-    palpate::bindings::bind_bench(module);
-    palpate::bindings::bind_session(module);
-    palpate::bindings::bind_measure(module);
+
+    using namespace palpate::bindings;
+    bind_status(module);
+    const auto submodule = [&](const char* name, const char* doc) {
+        pybind11::module_ made = module.def_submodule(name, doc);
+        // `from palpate._core.model import ...` looks here first
+        pybind11::module_::import("sys").attr("modules")[made.attr("__name__")] = made;
+        return made;
+    };
+    auto model = submodule("model", "Force laws: wavelets, networks, hysteresis and their proved bounds.");
+    bind_wavelet(model);
+    bind_model(model);
+    auto dynamics = submodule("dynamics", "Transfer functions and the filters of the paper.");
+    bind_dynamics(dynamics);
+    auto device = submodule("device", "Profiles of haptic devices.");
+    bind_device(device);
+    auto rendering = submodule("rendering", "Structures between a model and a device.");
+    bind_rendering(rendering);
+    auto stability = submodule("stability", "Certificates and the inequalities they consist of.");
+    bind_stability(stability);
+    auto simulation = submodule("simulation", "Rendering in virtual time on a simulated device.");
+    bind_simulation(simulation);
+    auto run = submodule("run", "Rendering and measuring in real time.");
+    bind_run(run);
+    bind_measure(run);
+    auto failure = submodule("failure", "Limits at which each method fails.");
+    bind_failure(failure);
 }

@@ -202,13 +202,11 @@ void bind_stability(py::module_& module) {
         "none.\n"
         "`damping` is B_c; `falling` the steepest fall of the object's force.");
     module.def(
-        "felt_slope", &felt_slope, "slope"_a, "coupling_stiffness"_a,
-        "K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.");
-    module.def(
         "device_difference", &device_difference, "certified"_a, "device"_a,
         "The first field in which a device is not the certified one, as a sentence; empty where it is.");
-    module.def("fingerprint", &fingerprint, "model"_a,
-               "16 hexadecimal digits that change with every number of which the model's force is made.");
+    module.def(
+        "felt_slope", &felt_slope, "slope"_a, "coupling_stiffness"_a,
+        "K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.");
 }
 
 }  // namespace palpate::bindings

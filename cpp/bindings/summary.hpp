@@ -12,9 +12,9 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
-#include "palpate/session.hpp"
-#include "palpate/session_text.hpp"
-#include "palpate/session_verdict.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/run/session_verdict.hpp"
 
 namespace palpate::bindings {
 

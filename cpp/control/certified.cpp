@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 
 namespace palpate::control {
 

@@ -4,9 +4,9 @@
 #include <string>
 
 #include "options.hpp"
-#include "palpate/bench.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/io/model_file.hpp"
+#include "palpate/simulation/test_rig.hpp"
 #include "rendering.hpp"
 
 namespace palpate::control {

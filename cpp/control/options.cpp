@@ -13,7 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "palpate/device/device_profile.hpp"
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 #include "usb.hpp"
 
 namespace palpate::control {

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "palpate/bench.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/telemetry.hpp"
-#include "palpate/loop.hpp"
 #include "palpate/realtime/privileges.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/loop.hpp"
+#include "palpate/simulation/test_rig.hpp"
 
 namespace palpate::control {
 

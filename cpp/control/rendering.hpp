@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "options.hpp"
-#include "palpate/bench.hpp"
 #include "palpate/io/model_file.hpp"
-#include "palpate/session.hpp"
-#include "palpate/session_text.hpp"
-#include "palpate/session_verdict.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/run/session_verdict.hpp"
+#include "palpate/simulation/test_rig.hpp"
 #include "telling.hpp"
 
 namespace palpate::control {

@@ -15,7 +15,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "palpate/session_text.hpp"
+#include "palpate/run/session_text.hpp"
 
 namespace palpate::control {
 

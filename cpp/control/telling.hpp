@@ -7,9 +7,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "palpate/io/record_sinks.hpp"
-#include "palpate/session.hpp"
-#include "palpate/session_verdict.hpp"
+#include "palpate/run/record_sinks.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_verdict.hpp"
 
 namespace palpate::control {
 

@@ -8,10 +8,10 @@
 #include <optional>
 #include <ostream>
 
-#include "palpate/closed_loop.hpp"
-#include "palpate/device/hands.hpp"
 #include "palpate/model/energy.hpp"
 #include "palpate/rendering/compensated.hpp"
+#include "palpate/simulation/closed_loop.hpp"
+#include "palpate/simulation/hands.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "support.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The simulated bench: how large its numbers are beside a model, and which of them somebody chose.
-#include "palpate/bench.hpp"
+#include "palpate/simulation/test_rig.hpp"
 
 #include <cmath>
 #include <optional>

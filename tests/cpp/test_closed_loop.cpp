@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/closed_loop.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/controller.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/implicit.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -16,11 +16,11 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/device/faulty.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/rendering/scheme.hpp"
-#include "palpate/session.hpp"
-#include "palpate/session_text.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/simulation/faulty_device.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/force_error.hpp"
+#include "palpate/simulation/force_error.hpp"
 
 namespace palpate {
 namespace {

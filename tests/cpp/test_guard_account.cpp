@@ -14,12 +14,12 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/controller.hpp"
 #include "palpate/device/device.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/model/energy.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/run/controller.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "scenes.hpp"
 #include "support.hpp"

@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/closed_loop.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/simulation.hpp"
+#include "palpate/simulation/closed_loop.hpp"
+#include "palpate/simulation/virtual_time.hpp"
 #include "scenes.hpp"
 #include "support.hpp"
 

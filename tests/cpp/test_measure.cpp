@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/measure.hpp"
+#include "palpate/run/measure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -14,8 +14,8 @@
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
-#include "palpate/session_text.hpp"
-#include "palpate/simulation.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/simulation/virtual_time.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -30,9 +30,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/device/simulated.hpp"
 #include "palpate/rendering/scheme.hpp"
-#include "palpate/session.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 #include "support.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/session_verdict.hpp"
+#include "palpate/run/session_verdict.hpp"
 
 namespace palpate {
 namespace {

@@ -7,8 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/controller.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/model/limited_environment.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
@@ -17,7 +15,9 @@
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/scheme.hpp"
-#include "palpate/simulation.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/virtual_time.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "support.hpp"
 

@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from palpate._core.device import DeviceProfile
+from palpate._core.rendering import Scheme
+from palpate._core.simulation import Hand
 
 from palpate import Recording, _core, load_model, read_recording, simulate
 from palpate.cli import demo as demo_module
@@ -194,7 +197,7 @@ def _ring(_number: int, _frame: Any) -> None:
 def test_a_signal_ends_a_long_simulation_within_a_fifth_of_a_second() -> None:
     """Of three tries the fastest: the machine of a test may be busy."""
     model = model_by_hand()
-    scheme, device, hand = _core.Scheme(), _core.DeviceProfile(), _core.Hand()
+    scheme, device, hand = Scheme(), DeviceProfile(), Hand()
     late = []
     before = signal.signal(signal.SIGALRM, _ring)
     try:
@@ -202,7 +205,7 @@ def test_a_signal_ends_a_long_simulation_within_a_fifth_of_a_second() -> None:
             due = time.monotonic() + 0.3
             signal.setitimer(signal.ITIMER_REAL, 0.3)
             with pytest.raises(_RangError):
-                _core.simulate(model, scheme, device, hand, 3600.0)
+                _core.simulation.simulate(model, scheme, device, hand, 3600.0)
             late.append(time.monotonic() - due)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -212,7 +215,7 @@ def test_a_signal_ends_a_long_simulation_within_a_fifth_of_a_second() -> None:
 
 @pytest.mark.parametrize("view", ["motion_driven", "force_driven"])
 def test_a_signal_ends_a_long_closed_loop(view: str) -> None:
-    model, scheme = model_by_hand(), _core.Scheme(structure="implicit")
+    model, scheme = model_by_hand(), Scheme(structure="implicit")
     before = signal.signal(signal.SIGALRM, _ring)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
@@ -225,11 +228,11 @@ def test_a_signal_ends_a_long_closed_loop(view: str) -> None:
 
 def test_progress_is_called_and_other_threads_go_on() -> None:
     ticks: list[int] = []
-    _core.simulate(
+    _core.simulation.simulate(
         model_by_hand(),
-        _core.Scheme(structure="implicit"),
-        _core.DeviceProfile(),
-        _core.Hand(),
+        Scheme(structure="implicit"),
+        DeviceProfile(),
+        Hand(),
         3000.0,  # longer than the time between two calls on a fast machine
         progress=ticks.append,
     )
@@ -241,7 +244,14 @@ def test_progress_is_called_and_other_threads_go_on() -> None:
 @pytest.mark.parametrize("substeps", [0, -1, 1001, 2**31 - 1])
 def test_substeps_have_a_bound(substeps: int) -> None:
     with pytest.raises(ValueError, match=rf"substeps is {substeps}, must be 1 to 1000"):
-        _core.simulate(model_by_hand(), _core.Scheme(), _core.DeviceProfile(), _core.Hand(), 0.1, substeps)
+        _core.simulation.simulate(
+            model_by_hand(),
+            Scheme(),
+            DeviceProfile(),
+            Hand(),
+            0.1,
+            substeps,
+        )
 
 
 def test_a_model_with_hysteresis_is_rendered_with_a_play_radius(

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from palpate._core.model import wavelet_columns, wavelet_slope_columns
 
-from palpate import InputError, _core
+from palpate import InputError
 from palpate.identification import IdentifiedNetwork, IdentifyOptions, fit_environment
 from palpate.identification.compression import Compressor
 from palpate.identification.constraints import domain_bounds, impose, violated_positions
@@ -15,7 +16,7 @@ from palpate.identification.separable import Basis, SeparableProblem, Solution, 
 
 
 def g_and_h(network: IdentifiedNetwork, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    wavelets = _core.wavelet_columns(x, network.alpha, network.beta)
+    wavelets = wavelet_columns(x, network.alpha, network.beta)
     g = wavelets @ network.weight + network.linear[0] * x + network.bias
     if network.weight_hysteresis is None:
         return g, np.zeros_like(g)
@@ -51,9 +52,13 @@ def test_imposed_bounds_hold_between_grid_points(seed: int, slopes: tuple[float,
     bounds = domain_bounds(problem, hysteresis=True, slopes=slopes)
     kept = impose(problem, free, bounds)
     x = np.linspace(0.0, 1.0, 200_001)
-    value = np.column_stack([np.ones_like(x), x, _core.wavelet_columns(x, kept.basis.alpha, kept.basis.beta)])
+    value = np.column_stack([np.ones_like(x), x, wavelet_columns(x, kept.basis.alpha, kept.basis.beta)])
     slope = np.column_stack(
-        [np.zeros_like(x), np.ones_like(x), _core.wavelet_slope_columns(x, kept.basis.alpha, kept.basis.beta)]
+        [
+            np.zeros_like(x),
+            np.ones_like(x),
+            wavelet_slope_columns(x, kept.basis.alpha, kept.basis.beta),
+        ]
     )
     g, h = problem.readout @ kept.coefficients
     assert (value @ h).min() >= 0.0
@@ -132,7 +137,7 @@ def test_slope_bounds_and_a_coupling_limit_the_slope_everywhere() -> None:
         (IdentifyOptions(coupling_stiffness=50.0), -np.inf, 45.0),
     ]:
         network = fit_environment(x[:, None], y, None, options)
-        columns = _core.wavelet_slope_columns(fine, network.alpha, network.beta)
+        columns = wavelet_slope_columns(fine, network.alpha, network.beta)
         slope = columns @ network.weight + network.linear[0]
         assert slope.min() >= low
         assert slope.max() <= high
@@ -160,7 +165,7 @@ def test_a_monotone_force_never_falls() -> None:
     y = x + 0.4 * np.exp(-(((x - 0.5) / 0.08) ** 2)) + random.normal(0.0, 0.01, len(x))
     network = fit_environment(x[:, None], y, None, IdentifyOptions(monotone=True))
     fine = np.linspace(0.0, 1.0, 100_001)
-    columns = _core.wavelet_slope_columns(fine, network.alpha, network.beta)
+    columns = wavelet_slope_columns(fine, network.alpha, network.beta)
     assert (columns @ network.weight + network.linear[0]).min() >= 0.0
     assert any("slope bounds imposed over the domain, RMS error" in note for note in network.notes)
 

@@ -6,6 +6,17 @@ import os
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from palpate._core.device import DeviceProfile
+from palpate._core.dynamics import environment_filters
+from palpate._core.model import (
+    ForceModel,
+    wavelet_columns,
+    wavelet_jacobian,
+    wavelet_slope_columns,
+    wavelet_steps,
+)
+from palpate._core.rendering import Scheme, structure_names
+from palpate._core.simulation import Hand, force_driven, motion_driven, simulate
 from scipy.signal import lfilter
 
 from palpate import _core
@@ -36,7 +47,7 @@ def test_force_agrees_with_a_numpy_reference(dimension: int) -> None:
     rng = np.random.default_rng(dimension)
     for _ in range(CASES):
         given = network(rng, int(rng.integers(0, 12)), dimension)
-        model = _core.ForceModel(**given)
+        model = ForceModel(**given)
         x = rng.uniform(0, 1, (7, dimension))
         scaled = given["alpha"] * (x[:, None, :] - given["beta"])
         expected = hat(scaled) @ given["weight"] + x @ given["linear"] + given["bias"]
@@ -51,10 +62,10 @@ def test_columns_and_jacobian_agree_with_differences(dimension: int) -> None:
     x = rng.uniform(0, 1, (20, dimension))
     alpha = rng.uniform(1, 9, (5, dimension))
     beta = rng.uniform(0, 1, (5, dimension))
-    columns = _core.wavelet_columns(x, alpha, beta)
+    columns = wavelet_columns(x, alpha, beta)
     assert columns.flags.f_contiguous
     assert columns == pytest.approx(hat(alpha * (x[:, None, :] - beta)), abs=1e-14)
-    value, by_alpha, by_beta = _core.wavelet_jacobian(x, alpha, beta)
+    value, by_alpha, by_beta = wavelet_jacobian(x, alpha, beta)
     assert np.array_equal(value, columns)
     h = 1e-6
     for j in range(dimension):
@@ -64,11 +75,11 @@ def test_columns_and_jacobian_agree_with_differences(dimension: int) -> None:
             (by_alpha[j], (alpha + step, beta), (alpha - step, beta)),
             (by_beta[j], (alpha, beta + step), (alpha, beta - step)),
         ):
-            difference = (_core.wavelet_columns(x, *up) - _core.wavelet_columns(x, *down)) / (2 * h)
+            difference = (wavelet_columns(x, *up) - wavelet_columns(x, *down)) / (2 * h)
             assert derivative == pytest.approx(difference, abs=1e-8)
     inputs = range(dimension)
     steps = [alpha[:, j] * by_alpha[j] for j in inputs] + [by_beta[j] / alpha[:, j] for j in inputs]
-    assert _core.wavelet_steps(x, alpha, beta) == pytest.approx(np.concatenate(steps, axis=1), abs=1e-13)
+    assert wavelet_steps(x, alpha, beta) == pytest.approx(np.concatenate(steps, axis=1), abs=1e-13)
 
 
 def test_columns_are_safe_for_every_number_and_any_length() -> None:
@@ -77,18 +88,18 @@ def test_columns_are_safe_for_every_number_and_any_length() -> None:
     for n in (0, 1, 7, 255, 256, 257, 1000):
         x = rng.uniform(-1, 2, n)
         expected = hat((alpha * (x[:, None] - beta))[:, :, None])
-        assert _core.wavelet_columns(x, alpha, beta) == pytest.approx(expected, abs=1e-13)
+        assert wavelet_columns(x, alpha, beta) == pytest.approx(expected, abs=1e-13)
     far = np.array([1e300, -1e300, np.inf, -np.inf, 1e10])
-    value, by_alpha, by_beta = _core.wavelet_jacobian(far, alpha, beta)
+    value, by_alpha, by_beta = wavelet_jacobian(far, alpha, beta)
     for columns in (value, by_alpha[0], by_beta[0]):
         assert np.all(np.abs(columns) < 1e-280)
-    assert np.all(np.isnan(_core.wavelet_columns(np.array([np.nan]), alpha, beta)))
+    assert np.all(np.isnan(wavelet_columns(np.array([np.nan]), alpha, beta)))
 
 
 def test_a_batch_is_its_single_positions() -> None:
     rng = np.random.default_rng(13)
     for size in (0, 1, 5, 16, 33):
-        model = _core.ForceModel(**network(rng, size))
+        model = ForceModel(**network(rng, size))
         x = np.concatenate([rng.uniform(-0.5, 1.5, 1001), [0.0, 1.0, 1e10, -1e10]])
         for quantity in (model.force, model.slope, model.energy):
             assert quantity(x) == pytest.approx(
@@ -99,12 +110,12 @@ def test_a_batch_is_its_single_positions() -> None:
 def test_slope_columns_belong_to_the_wavelets() -> None:
     rng = np.random.default_rng(3)
     x, alpha, beta, h = rng.uniform(0, 1, 30), rng.uniform(1, 9, 4), rng.uniform(0, 1, 4), 1e-6
-    slope = (_core.wavelet_columns(x + h, alpha, beta) - _core.wavelet_columns(x - h, alpha, beta)) / (2 * h)
-    assert _core.wavelet_slope_columns(x, alpha, beta) == pytest.approx(slope, abs=1e-7)
+    slope = (wavelet_columns(x + h, alpha, beta) - wavelet_columns(x - h, alpha, beta)) / (2 * h)
+    assert wavelet_slope_columns(x, alpha, beta) == pytest.approx(slope, abs=1e-7)
 
 
 def test_a_number_in_is_a_number_out_and_shapes_are_kept() -> None:
-    model = _core.ForceModel(**network(np.random.default_rng(4), 3))
+    model = ForceModel(**network(np.random.default_rng(4), 3))
     assert type(model.force(0.3)) is float
     assert model.force(1) == model.force(1.0)
     grid = np.linspace(-0.5, 1.5, 12).reshape(3, 4)
@@ -120,8 +131,8 @@ def test_a_number_in_is_a_number_out_and_shapes_are_kept() -> None:
 def test_hysteresis_needs_a_direction_and_says_so() -> None:
     given = network(np.random.default_rng(5), 3)
     loss = {"weight_hysteresis": [0.0, 0.0, 0.0], "linear_hysteresis": [0.0], "bias_hysteresis": 0.25}
-    model = _core.ForceModel(**given, **loss)
-    single = _core.ForceModel(**given)
+    model = ForceModel(**given, **loss)
+    single = ForceModel(**given)
     x = np.linspace(0, 1, 5)
     assert model.force(x, direction=1) == pytest.approx(single.force(x) + 0.25, abs=1e-14)
     assert model.force(x, direction=np.full(5, -1, np.int8)) == pytest.approx(
@@ -139,12 +150,12 @@ def test_hysteresis_needs_a_direction_and_says_so() -> None:
 def test_play_state_follows_the_motion() -> None:
     loss = {"weight_hysteresis": [], "linear_hysteresis": [0.0], "bias_hysteresis": 0.2, "play_radius": 0.1}
     flat = {"alpha": np.empty((0, 1)), "beta": np.empty((0, 1)), "weight": [], "linear": [5.0], "bias": 0.0}
-    model = _core.ForceModel(**flat, **loss, lower=[0.0], upper=[1.0])
+    model = ForceModel(**flat, **loss, lower=[0.0], upper=[1.0])
     motion = np.array([0.2, 0.5, 0.45, 0.2])
     play = model.play(motion)
     assert play == pytest.approx([0.2, 0.4, 0.4, 0.3])
-    assert np.array_equal(_core.play(motion, 0.1), play)
-    assert _core.play(motion, 0.1, start=0.25)[0] == 0.25
+    assert np.array_equal(_core.model.play(motion, 0.1), play)
+    assert _core.model.play(motion, 0.1, start=0.25)[0] == 0.25
     assert model.force(motion, play=play) == pytest.approx(5 * motion + 0.2 * np.array([0, 1, 0.5, -1]))
 
 
@@ -162,20 +173,20 @@ def test_play_state_follows_the_motion() -> None:
 )
 def test_impossible_models_are_refused_by_field(change: dict[str, object], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        _core.ForceModel(**{**network(np.random.default_rng(6), 3), **change})
+        ForceModel(**{**network(np.random.default_rng(6), 3), **change})
 
 
 def test_simulation_returns_one_row_a_tick() -> None:
-    model = _core.ForceModel(**network(np.random.default_rng(7), 0))
-    trace = _core.simulate(model, _core.Scheme(), _core.DeviceProfile(), _core.Hand(), 0.25)
+    model = ForceModel(**network(np.random.default_rng(7), 0))
+    trace = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
     assert {len(column) for column in trace.values()} == {250}
     assert set(trace["status"]) <= {int(_core.Status.Ok), int(_core.Status.Limited)}
-    again = _core.simulate(model, _core.Scheme(), _core.DeviceProfile(), _core.Hand(), 0.25)
+    again = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
     assert all(np.array_equal(trace[name], again[name]) for name in trace)
 
 
 def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None:
-    spring = _core.ForceModel(
+    spring = ForceModel(
         alpha=np.empty((0, 1)),
         beta=np.empty((0, 1)),
         weight=[],
@@ -185,28 +196,34 @@ def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None
         upper=[1.0],
     )
     slow = 0.5 - 0.4 * np.cos(np.linspace(0, 2 * np.pi, 8000))
-    force = _core.motion_driven(spring, _core.Scheme(structure="direct"), slow, 1e-3)["force"]
+    force = motion_driven(spring, Scheme(structure="direct"), slow, 1e-3)["force"]
     assert force == pytest.approx(5 * slow, abs=1e-12)
     for structure in ("implicit", "explicit"):
-        scheme = _core.Scheme(structure=structure, damping=0.05)
-        moved = _core.force_driven(spring, scheme, force, 1e-3, start_position=float(slow[0]))
+        scheme = Scheme(structure=structure, damping=0.05)
+        moved = force_driven(spring, scheme, force, 1e-3, start_position=float(slow[0]))
         assert moved["environment_position"] == pytest.approx(slow, abs=5e-3)
 
 
 def test_defaults_and_words_are_those_of_the_core() -> None:
     assert [status.name for status in _core.Status.__members__.values()] == list(_core.status_meanings)
-    assert _core.structure_names == ("direct", "massless", "implicit", "explicit", "energy-consistent")
-    scheme = _core.Scheme()
+    assert structure_names == (
+        "direct",
+        "massless",
+        "implicit",
+        "explicit",
+        "energy-consistent",
+    )
+    scheme = Scheme()
     assert (scheme.structure, scheme.mass, scheme.damping) == ("massless", 0.001, 0.5)
-    profile = _core.DeviceProfile()
+    profile = DeviceProfile()
     assert (profile.inertia, profile.viscous_damping, profile.force_limit) == (2e-4, 0.06, 5.0)
     assert profile.encoder_step == pytest.approx(2 * np.pi / 65536)
 
 
 def test_filters_are_those_of_the_core() -> None:
-    filters = _core.environment_filters("explicit")
+    filters = environment_filters("explicit")
     signal = np.sin(0.05 * np.arange(400))
     b, a = filters.g1.numerator, filters.g1.denominator
     assert filters.g1.filter(signal) == pytest.approx(lfilter(b, a, signal), abs=1e-9)
     with pytest.raises(ValueError, match="must be 'implicit' or 'explicit'"):
-        _core.environment_filters("both")
+        environment_filters("both")

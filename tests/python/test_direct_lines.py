@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 import pytest
+from palpate._core.stability import balancing_shift, certify
 
-from palpate import DeviceProfile, Model, Scheme, _core, plan
+from palpate import DeviceProfile, Model, Scheme, plan
 from palpate.model import Fit
 from palpate.planning import profile_file
 from palpate.planning.choices import renderable_slopes
@@ -31,7 +32,7 @@ def wheel() -> Model:
         period=TURN,
         fit=Fit("network", "bic", 0.01, 3, 9),
     )
-    return model.with_network(bias=model.bias + _core.balancing_shift(model, math.inf))
+    return model.with_network(bias=model.bias + balancing_shift(model, math.inf))
 
 
 def given_in_a_turn(model: Model, force_limit: float) -> float:
@@ -43,10 +44,10 @@ def given_in_a_turn(model: Model, force_limit: float) -> float:
 def test_a_wheel_with_a_peak_above_the_force_limit_is_no_longer_certified_as_it_is() -> None:
     model = wheel()
     strong = DeviceProfile(id="strong", viscous_damping=10.0, coulomb_friction=0.02, force_limit=100.0)
-    assert _core.certify(model, Scheme(structure="direct"), strong).certified
+    assert certify(model, Scheme(structure="direct"), strong).certified
     limited = DeviceProfile(id="limited", viscous_damping=10.0, coulomb_friction=0.02, force_limit=5.0)
     assert given_in_a_turn(model, 5.0) > 0.2
-    refused = _core.certify(model, Scheme(structure="direct"), limited)
+    refused = certify(model, Scheme(structure="direct"), limited)
     assert refused.refused
     assert [line.id for line in refused.inequalities if not line.holds] == ["friction-steps"]
 
@@ -78,7 +79,7 @@ def test_with_delay_the_force_error_is_not_larger_than_with_equal_slopes(model: 
     now = limit_slopes(model, *renderable_slopes(device, model=model))
     assert before is not None
     assert now is not None
-    assert _core.certify(now, scheme, device).certified
+    assert certify(now, scheme, device).certified
     errors = [static_force_error(model, limited, scheme).rms for limited in (before, now)]
     assert errors[1] <= 1.001 * errors[0]
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from palpate._core.model import play
 
-from palpate import Recording, _core, identify, read_recording, verify
+from palpate import Recording, identify, read_recording, verify
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,
@@ -39,7 +40,7 @@ def moved(
     v = np.gradient(x, time)
     force = sample_force(x) + mass * np.gradient(v, time) + damping * v
     if hysteresis:
-        force = force + hysteresis * np.clip((x - _core.play(x, 0.005)) / 0.005, -1.0, 1.0)
+        force = force + hysteresis * np.clip((x - play(x, 0.005)) / 0.005, -1.0, 1.0)
     return Recording.from_arrays(
         np.round(x / ENCODER_STEP) * ENCODER_STEP,
         force + random.normal(0.0, NOISE, len(x)),

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from palpate._core.model import wavelet_columns
 
-from palpate import _core, identify
+from palpate import identify
 from palpate.identification import IdentifyOptions, fit_environment
 from palpate.identification.evidence import Evidence
 from palpate.identification.fresh import BLOCKS, FreshRows, gain, inside, kept_back
@@ -143,7 +144,7 @@ def test_outliers_do_not_move_the_force_under_hubers_loss() -> None:
 
     def error(loss: str) -> float:
         network = fit_environment(x[:, None], y, None, IdentifyOptions(loss=loss))
-        modelled = _core.wavelet_columns(x, network.alpha, network.beta) @ network.weight
+        modelled = wavelet_columns(x, network.alpha, network.beta) @ network.weight
         modelled = modelled + network.linear[0] * x + network.bias
         return float(np.sqrt(np.mean((modelled - truth)[order] ** 2)))
 

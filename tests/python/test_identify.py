@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from palpate._core.model import play
 
 import palpate
-from palpate import InputError, Model, Recording, _core, identify
+from palpate import InputError, Model, Recording, identify
 from palpate.recording.sample import sample_recording
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -59,7 +60,7 @@ def test_play_starts_at_rest_in_every_recording() -> None:
     random = np.random.default_rng(1)
     t = np.linspace(0.0, 4.0 * np.pi, 1600)
     x = 0.5 - 0.5 * np.cos(t)
-    sliding = np.clip((x - _core.play(x, 0.01)) / 0.01, -1.0, 1.0)
+    sliding = np.clip((x - play(x, 0.01)) / 0.01, -1.0, 1.0)
     y = x + 0.2 * sliding + random.normal(0.0, 0.01, len(t))
     recordings = [Recording.from_arrays(x, y, time=t)]
     for place in random.uniform(0.1, 0.9, 20):

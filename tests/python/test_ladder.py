@@ -5,8 +5,9 @@ import os
 
 import numpy as np
 import pytest
+from palpate._core.model import wavelet_columns
 
-from palpate import InputError, _core
+from palpate import InputError
 from palpate.identification import IdentifyOptions, fit_environment
 from palpate.identification.evidence import Evidence
 from palpate.identification.identified import IdentifiedNetwork
@@ -125,7 +126,7 @@ def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -
     assert network.weight_hysteresis is None
     assert len(network.weight) <= 5
     between = np.linspace(0.02, 0.98, 5001)
-    force = _core.wavelet_columns(between, network.alpha, network.beta) @ network.weight
+    force = wavelet_columns(between, network.alpha, network.beta) @ network.weight
     force = force + network.linear[0] * between + network.bias
     assert np.abs(force - 0.3 * between).max() < 0.05
     assert any(note.startswith("hysteresis: h >= 0 imposed") for note in network.notes)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from palpate._core.model import ForceModel
 
 from conftest import ROOT
 from palpate import InputError, Model, _core, load_model
@@ -47,7 +48,7 @@ def content(hysteresis: bool = False, wavelets: int = N, **change: Any) -> dict[
 
 def test_quantities_are_bound_directly() -> None:
     for name in ("force", "slope", "energy", "predict", "play", "extrapolated"):
-        assert getattr(Model, name) is getattr(_core.ForceModel, name)
+        assert getattr(Model, name) is getattr(ForceModel, name)
 
 
 def test_force_and_slope_are_equation_four() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from palpate._core.model import fingerprint
 
 from palpate import (
     DeviceProfile,
@@ -25,7 +26,6 @@ from palpate import (
     read_recording,
     verify,
 )
-from palpate._core import fingerprint
 from palpate.cli.main import main
 from palpate.model.certified import device_record
 from palpate.planning import example_profiles

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from palpate._core.rendering import structure_names
 
 from control_program import control, needs_program
-from palpate import DeviceProfile, InputError, Model, Plan, Scheme, _core, load_model, plan, simulate
+from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan, simulate
 from palpate.cli.main import main
 from palpate.planning import bench_for, force_at, force_error
 from test_planning import model_by_hand
@@ -75,7 +76,7 @@ def test_behind_a_coupling_or_with_a_mass_it_is_refused_in_one_sentence(wish: di
         plan(fluid_by_hand(), KNOB, **wish)
 
 
-@pytest.mark.parametrize("structure", sorted(set(_core.structure_names) - {"direct"}))
+@pytest.mark.parametrize("structure", sorted(set(structure_names) - {"direct"}))
 def test_no_other_structure_takes_it(structure: str) -> None:
     with pytest.raises(InputError, match=f"structure is {structure}, must be direct"):
         Plan(fluid_by_hand(), Scheme(structure=structure))

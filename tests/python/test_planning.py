@@ -125,7 +125,7 @@ def test_an_explicit_plan_beyond_its_slope_limit_is_refused_with_both_numbers() 
         simulate(plan, DeviceProfile(), Hand(), 0.1)
 
 
-@pytest.mark.parametrize("structure", _core.structure_names)
+@pytest.mark.parametrize("structure", _core.rendering.structure_names)
 @pytest.mark.parametrize(
     "model",
     [model_by_hand(), keyswitch_by_hand(), model_by_hand(lower=[-0.2])],
@@ -141,7 +141,7 @@ def test_a_hand_leads_the_handle_through_the_domain_and_not_beyond(model: Model,
     assert upper - 0.35 * travel < settled.max() < upper + 0.01 * travel
 
 
-@pytest.mark.parametrize("structure", _core.structure_names)
+@pytest.mark.parametrize("structure", _core.rendering.structure_names)
 def test_a_sweep_asks_for_no_force_that_the_device_cannot_hold(structure: str) -> None:
     stiff = model_by_hand(linear=[40.0])
     _, recording = rendered(stiff, structure=structure)

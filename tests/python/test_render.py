@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from palpate._core.rendering import Scheme
+from palpate._core.simulation import motion_driven
 
 from control_program import MODEL, PATIENT, every_row, wait_for_rows
 from palpate import _core, load_model, read_recording
@@ -18,14 +20,14 @@ from palpate import _core, load_model, read_recording
 COMMAND = [sys.executable, "-m", "palpate", "render", str(MODEL)]
 
 
-def render(scheme: _core.Scheme, **words: Any) -> dict[str, Any]:
+def render(scheme: Scheme, **words: Any) -> dict[str, Any]:
     """The machine of a test may be busy: no rate is too low."""
-    return dict(_core.render(load_model(MODEL), scheme, **words, lowest_rate_share=0.0))
+    return dict(_core.run.render(load_model(MODEL), scheme, **words, lowest_rate_share=0.0))
 
 
 def test_a_live_rendering_leaves_a_recording_and_its_timing(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
-    summary = render(_core.Scheme(), duration_s=0.3, record=str(out))
+    summary = render(Scheme(), duration_s=0.3, record=str(out))
     assert len(every_row(out)) == summary["recorded"] == summary["ticks"]
     assert summary["ended"] == "ran its time"
     assert summary["lost_records"] == 0
@@ -33,7 +35,7 @@ def test_a_live_rendering_leaves_a_recording_and_its_timing(tmp_path: Path) -> N
 
 
 def test_the_energy_that_a_ramp_gives_is_told_apart() -> None:
-    energy = render(_core.Scheme(structure="direct"), duration_s=2.0)["energy"]
+    energy = render(Scheme(structure="direct"), duration_s=2.0)["energy"]
     assert 0.0 <= energy["given_in_ramp_J"] <= energy["most_stored_J"]
     assert 0.0 <= energy["given_J"] <= 1.1 * energy["most_stored_J"]
     assert energy["sentence"].startswith("given ")
@@ -43,9 +45,9 @@ def test_the_energy_that_a_ramp_gives_is_told_apart() -> None:
 def test_each_force_is_what_the_model_says_of_its_position(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
     model = load_model(MODEL)
-    render(_core.Scheme(structure="direct"), duration_s=1.0, record=str(out))
+    render(Scheme(structure="direct"), duration_s=1.0, record=str(out))
     live = read_recording(out)
-    driven = _core.motion_driven(model, _core.Scheme(structure="direct"), live.position, 1e-3)["force"]
+    driven = motion_driven(model, Scheme(structure="direct"), live.position, 1e-3)["force"]
     assert live.force == pytest.approx(driven, abs=1e-15)
 
 
@@ -61,7 +63,7 @@ def test_python_goes_on_while_the_loop_runs() -> None:
 
     thread = threading.Thread(target=count)
     thread.start()
-    render(_core.Scheme(), duration_s=0.4)
+    render(Scheme(), duration_s=0.4)
     over.set()
     thread.join()
     assert counted > 20
@@ -77,14 +79,14 @@ def test_python_goes_on_while_the_loop_runs() -> None:
 )
 def test_what_is_wrong_is_refused(words: dict[str, object], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        render(_core.Scheme(), **words)
+        render(Scheme(), **words)
 
 
 def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
     out.write_text("precious", encoding="utf-8")
     with pytest.raises(ValueError, match=r"felt.csv exists already; choose another name, or .*force=True"):
-        render(_core.Scheme(), duration_s=0.3, record=str(out))
+        render(Scheme(), duration_s=0.3, record=str(out))
     words = [*COMMAND, "--duration-s", "0.8", "--record", str(out), *PATIENT]
     refused = subprocess.run(words, capture_output=True, text=True, check=False)
     assert refused.returncode == 2
@@ -96,7 +98,7 @@ def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path
 
 def test_a_recording_that_was_cut_off_is_set_aside_and_named(tmp_path: Path) -> None:
     (tmp_path / "felt.csv.part").write_text("precious", encoding="utf-8")
-    summary = render(_core.Scheme(), duration_s=0.3, record=str(tmp_path / "felt.csv"))
+    summary = render(Scheme(), duration_s=0.3, record=str(tmp_path / "felt.csv"))
     assert (tmp_path / "felt.csv.1.part").read_text(encoding="utf-8") == "precious"
     assert any("felt.csv.1.part" in note for note in summary["notes"])
 
@@ -110,12 +112,12 @@ def test_progress_is_called_while_it_runs_and_its_exception_ends_the_run() -> No
             raise KeyError("enough")
 
     with pytest.raises(KeyError, match="enough"):
-        render(_core.Scheme(), duration_s=20.0, progress=show)
+        render(Scheme(), duration_s=20.0, progress=show)
     assert [ticks for ticks, *_ in seen] == sorted(ticks for ticks, *_ in seen)
 
 
 def test_the_verdict_is_in_the_summary_and_in_the_first_line(tmp_path: Path) -> None:
-    short = render(_core.Scheme(), duration_s=0.1, record=str(tmp_path / "a.csv"))
+    short = render(Scheme(), duration_s=0.1, record=str(tmp_path / "a.csv"))
     assert short["verdict"].startswith("no: the recording has no usable row")
     assert next(iter(short)) == "verdict"
     assert short["findings"][0]["level"] == "no"
@@ -128,7 +130,7 @@ def test_the_verdict_is_in_the_summary_and_in_the_first_line(tmp_path: Path) -> 
     )
     assert answer.returncode == 1
     assert answer.stdout.splitlines()[0] == "verdict: no"
-    whole = render(_core.Scheme(structure="direct"), duration_s=1.2)
+    whole = render(Scheme(structure="direct"), duration_s=1.2)
     assert whole["verdict"] == "good" or all("deadlines" in f["sentence"] for f in whole["findings"])
 
 

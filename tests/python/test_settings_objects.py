@@ -11,27 +11,31 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from palpate._core.device import DeviceProfile
+from palpate._core.rendering import Scheme
+from palpate._core.simulation import Hand
+from palpate._core.stability import ForceBounds, Inequality, certify
 
 import palpate
 from conftest import ROOT
-from palpate import _core, load_model
+from palpate import load_model
 from palpate.planning import Plan, bench_for
 from test_planning import model_by_hand
 
 GOOD = ROOT / "tests" / "models" / "good"
 
 CHANGED: dict[str, Any] = {
-    "Scheme": _core.Scheme(structure="implicit", coupling_stiffness=1 / 3, mass=1e-7, play_radius=0.1),
-    "Hand": _core.Hand(stiffness=1 / 3, damping=0.1, lower=-1e-9, upper=2.0, frequency_hz=0.7),
-    "DeviceProfile": _core.DeviceProfile(id="it's", encoder_step=1e-7, delay_s=3e-4, position_unit="m"),
-    "ForceBounds": _core.ForceBounds(
+    "Scheme": Scheme(structure="implicit", coupling_stiffness=1 / 3, mass=1e-7, play_radius=0.1),
+    "Hand": Hand(stiffness=1 / 3, damping=0.1, lower=-1e-9, upper=2.0, frequency_hz=0.7),
+    "DeviceProfile": DeviceProfile(id="it's", encoder_step=1e-7, delay_s=3e-4, position_unit="m"),
+    "ForceBounds": ForceBounds(
         slope_min=-0.1, slope_max=1 / 3, steepest=2.0, sliding=1.0, loss_max=1e-9, hysteresis=True
     ),
-    "Inequality": _core.Inequality(
+    "Inequality": Inequality(
         id="i", name="a", formula="b > c", left=1 / 3, right=0.1, rests_on="linear", source="s", strict=True
     ),
     "Bench": bench_for(model_by_hand()),
-    "Certificate": _core.certify(model_by_hand(), _core.Scheme(structure="direct"), _core.DeviceProfile()),
+    "Certificate": certify(model_by_hand(), Scheme(structure="direct"), DeviceProfile()),
 }
 COPIES: list[Callable[[Any], Any]] = [
     lambda value: pickle.loads(pickle.dumps(value)),
@@ -71,13 +75,13 @@ def test_values_that_differ_in_one_field_are_not_equal() -> None:
         for field, content in fields.items():
             if isinstance(content, float):
                 assert type(value)(**{**fields, field: content + 1e-3}) != value, field
-    assert _core.Scheme() != _core.Hand()
-    assert _core.Scheme() != 1
+    assert Scheme() != Hand()
+    assert Scheme() != 1
 
 
 def test_numbers_of_a_repr_are_exact() -> None:
     assert "encoder_step=1e-07" in repr(CHANGED["DeviceProfile"])
-    assert eval(repr(CHANGED["Scheme"]), {"Scheme": _core.Scheme}) == CHANGED["Scheme"]
+    assert eval(repr(CHANGED["Scheme"]), {"Scheme": Scheme}) == CHANGED["Scheme"]
 
 
 @pytest.mark.parametrize("copied", COPIES, ids=["pickle", "pickle 2", "copy", "deepcopy"])

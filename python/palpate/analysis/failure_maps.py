@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .._core.failure import failure_map, guard_effects
 from .._typing import Float1D
 
-failure_map_names: tuple[str, ...] = tuple(_core.failure_map_names)
+failure_map_names: tuple[str, ...] = tuple(_core.failure.failure_map_names)
 """Every map that can be measured."""
 
 
@@ -85,7 +86,7 @@ def measure_guard_effects() -> tuple[GuardEffect, ...]:
     """Every guard by itself, with its default setting, on the default knob."""
     return tuple(
         GuardEffect(row["guard"], row["cost"], row["wrong"], row["without"], row["with"])
-        for row in _core.guard_effects()
+        for row in guard_effects()
     )
 
 
@@ -104,7 +105,7 @@ def measure_failure_map(name: str, points: int) -> FailureMap:
     ValueError
         There is no such map, or points is below 2.
     """
-    measured: Mapping[str, Any] = _core.failure_map(name, points)
+    measured: Mapping[str, Any] = failure_map(name, points)
     return FailureMap(
         measured["name"],
         measured["along"],

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from .._core import DeviceProfile, Hand, Scheme
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme
+from .._core.simulation import Hand
+from .._core.stability import ForceBounds, certify_bounds, force_bounds
 from .._typing import Float1D
 from ..identification import identify
 from ..model import Model
@@ -105,7 +107,7 @@ def _objects(knob: Model) -> Iterator[Model]:
             "beta": beta[:, None].tolist(),
             "bias": 0.0,
         }
-        bounds = _core.force_bounds(knob.with_network(**shape, weight=weight.tolist(), linear=[linear]))
+        bounds = force_bounds(knob.with_network(**shape, weight=weight.tolist(), linear=[linear]))
         scale = _STEEPEST / max(bounds.slope_max, -bounds.slope_min)
         yield knob.with_network(**shape, weight=(scale * weight).tolist(), linear=[scale * linear])
 
@@ -120,9 +122,9 @@ def _hands(model: Model) -> Iterator[Hand]:
 
 def _certificate(samples: int, falling: float, device: DeviceProfile) -> dict[str, float]:
     """What each line needs for slopes from -falling to 1."""
-    bounds = _core.ForceBounds(slope_min=-falling, slope_max=1.0, steepest=1.0, sliding=1.0)
+    bounds = ForceBounds(slope_min=-falling, slope_max=1.0, steepest=1.0, sliding=1.0)
     scheme = Scheme(structure="direct", predict=samples)
-    return {line.id: line.right for line in _core.certify_bounds(bounds, scheme, device).inequalities}
+    return {line.id: line.right for line in certify_bounds(bounds, scheme, device).inequalities}
 
 
 def _damping(samples: int, falling: float) -> float:

@@ -40,7 +40,7 @@ def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
     The recorded motion drives the device. The recorded force drives the object: with the mass and damping
     that the paper's explicit environment adds to it, and with the little that the implicit one needs.
     """
-    from .._core import Scheme
+    from .._core.rendering import Scheme
     from ..verification import force_driven, motion_driven
 
     paper = force_driven(model, recording)

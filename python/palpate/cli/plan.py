@@ -28,7 +28,8 @@ from .printing import print_line
 from .verb import Verb
 
 if TYPE_CHECKING:
-    from .._core import Certificate, DeviceProfile
+    from .._core.device import DeviceProfile
+    from .._core.stability import Certificate
     from ..planning import Plan
 
 
@@ -257,7 +258,7 @@ def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
 
     Where it was taken out of the model, the certificate's bounds are of what is left.
     """
-    from .._core import felt_slope
+    from .._core.stability import felt_slope
 
     steepest = max(0.0, certificate.bounds.slope_max)
     if plan.structure == "direct":
@@ -270,7 +271,7 @@ def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
     """The locus of the plan's explicit structure, or of the one that the device would need."""
     import numpy as np
 
-    from .._core import force_bounds
+    from .._core.stability import force_bounds
     from ..planning.choices import explicit_scheme, usual_play_radius
     from ..planning.root_locus import root_locus
     from ..plotting import draw_root_locus

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .._core import LoopSettings, usual_telemetry_hz
+from .._core.run import LoopSettings, usual_telemetry_hz
 from ..recording.files import require_absent
 from .arguments import PATH, json_option
 from .live_line import live_line
@@ -70,7 +70,7 @@ def render(
     The loop is that of palpate-control, with real-time priority where the system allows it. Ctrl-C ends it in
     an orderly way: zero force first, then the recording is closed, then the summary is printed.
     """
-    from .._core import render as render_live
+    from .._core.run import render as render_live
     from ..model import load_model
     from ..planning import bench_for
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
-from .._core import Scheme, most_prediction_taps, structure_names
+from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from .output import talk
 
 if TYPE_CHECKING:
-    from .._core import Bench
+    from .._core.simulation import Bench
     from ..model import Model
     from ..planning import Plan
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._core import DeviceProfile as CoreProfile
+from .._core.device import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..model import Model
 from ..planning import DeviceProfile

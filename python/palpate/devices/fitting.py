@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from .._core import DeviceProfile as CoreProfile
+from .._core.device import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..planning import DeviceProfile
 from .finding import Finding

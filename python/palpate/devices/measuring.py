@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .._core import measure as measure_live
+from .._core.run import measure as measure_live
 from ..errors import InputError
 from ..model import Model
 
@@ -25,7 +25,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     object : Model, optional
         What is mounted on the simulated device.
     **settings
-        As :func:`palpate._core.measure` takes them.
+        As :func:`palpate._core.run.measure` takes them.
 
     Returns
     -------

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import isotonic_regression, nnls
 
-from .. import _core
+from .._core.model import wavelet_columns, wavelet_curvature_bound, wavelet_jerk_bound, wavelet_slope_columns
 from .._typing import Float1D, Float2D
 from .compression import Compressed
 from .gram import factored
@@ -213,8 +213,8 @@ def _columns(basis: Basis, of_slope: bool, x: Float1D) -> Float2D:
     """(k, 2 + N) bias, linear and wavelet columns of one channel, or their slopes."""
     one, zero = np.ones((len(x), 1)), np.zeros((len(x), 1))
     if of_slope:
-        return np.concatenate([zero, one, _core.wavelet_slope_columns(x, basis.alpha, basis.beta)], axis=1)
-    return np.concatenate([one, x[:, None], _core.wavelet_columns(x, basis.alpha, basis.beta)], axis=1)
+        return np.concatenate([zero, one, wavelet_slope_columns(x, basis.alpha, basis.beta)], axis=1)
+    return np.concatenate([one, x[:, None], wavelet_columns(x, basis.alpha, basis.beta)], axis=1)
 
 
 def _curvature_bound(
@@ -230,7 +230,7 @@ def _curvature_bound(
     u = alpha * np.maximum(gap, 0.0)
     square = u * u
     polynomial = u * (square * (square + 10.0) + 15.0) if of_slope else square * (square + 6.0) + 3.0
-    highest = _core.wavelet_jerk_bound if of_slope else _core.wavelet_curvature_bound
+    highest = wavelet_jerk_bound if of_slope else wavelet_curvature_bound
     tail = np.minimum(polynomial * np.exp(-0.5 * square), highest)
     height = np.where(u < 2.5, highest, tail)
     return np.asarray(height @ np.abs(weights * alpha ** (3 if of_slope else 2)))

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from .. import _core
+from .._core.model import wavelet_columns, wavelet_slope_columns
 from .separable import SeparableProblem, Solution
 
 GRID = 2048
@@ -23,8 +23,8 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
     A force that is late by t makes h smaller by the slope times speed and t.
     """
     places = np.linspace(0.0, 1.0, GRID)
-    columns = _core.wavelet_columns(places, free.basis.alpha, free.basis.beta)
-    slopes = _core.wavelet_slope_columns(places, free.basis.alpha, free.basis.beta)
+    columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
+    slopes = wavelet_slope_columns(places, free.basis.alpha, free.basis.beta)
     (_, slope, *of_g), (bias, tilt, *of_h) = problem.readout @ free.coefficients
     steepness = np.abs(slope + slopes @ np.asarray(of_g))
     above = np.maximum(-(bias + tilt * places + columns @ np.asarray(of_h)), 0.0)
@@ -44,7 +44,7 @@ def crossing(problem: SeparableProblem, free: Solution, lower: float, reach: flo
     if len(problem.readout) < 2 or last <= first:
         return ""
     places = np.linspace(first, last, GRID)
-    columns = _core.wavelet_columns(places, free.basis.alpha, free.basis.beta)
+    columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
     bias, slope, *weights = problem.readout[1] @ free.coefficients
     above = -2.0 * (bias + slope * places + columns @ np.asarray(weights))
     deepest = int(np.argmax(above))

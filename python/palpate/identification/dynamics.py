@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+from .._core.model import wavelet_columns
 from .._typing import Float1D, Float2D
 from ..recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from .folded_regression import FOLDS, NAMES, FoldedRegression
@@ -203,7 +203,7 @@ class Dynamics:
         v, r, x = velocity[rows, None], residual[rows], box[rows]
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
-        over_x = np.concatenate([np.ones_like(x), x, _core.wavelet_columns(x, basis.alpha, basis.beta)], 1)
+        over_x = np.concatenate([np.ones_like(x), x, wavelet_columns(x, basis.alpha, basis.beta)], 1)
         columns = [v * np.abs(v), v * over_x]
         if friction:
             slow = SLOW * float(np.sqrt(np.mean(v * v)))
@@ -229,7 +229,11 @@ class Dynamics:
             box = (part.position - self._lower) / self._reach
             box = modulo(box) if self._periodic else box
             plain = np.concatenate(
-                [np.ones((len(box), 1)), box[:, None], _core.wavelet_columns(box, basis.alpha, basis.beta)],
+                [
+                    np.ones((len(box), 1)),
+                    box[:, None],
+                    wavelet_columns(box, basis.alpha, basis.beta),
+                ],
                 axis=1,
             )
             if side is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+from .._core.model import wavelet_columns
 from .._typing import Float1D, Float2D
 
 EVERY = 5
@@ -52,7 +52,7 @@ class FreshRows:
             [
                 np.ones((len(self.force), 1)),
                 self.positions,
-                _core.wavelet_columns(self.positions, alpha, beta),
+                wavelet_columns(self.positions, alpha, beta),
             ],
             axis=1,
         )

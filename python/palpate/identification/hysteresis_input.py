@@ -45,7 +45,7 @@ class HysteresisInput:
         """
         side, known = [], []
         for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):
-            play = _core.play(motion, radius, start=motion[0] - s * radius)
+            play = _core.model.play(motion, radius, start=motion[0] - s * radius)
             side.append(np.clip((motion - play) / radius, -1.0, 1.0))
             covered = np.maximum.accumulate(motion) - np.minimum.accumulate(motion)
             known.append(covered >= 2.0 * radius)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
+from .._core.model import wavelet_columns
 from .._typing import Float1D, Float2D
 from ..verdict import Finding
 from .growth import PathPoint
@@ -103,7 +103,7 @@ class Readings:
         d = len(lower)
         table = readout @ solution.coefficients
         linear = table[:, 1 : 1 + d] / reach
-        corner = _core.wavelet_columns(np.zeros((1, d)), solution.basis.alpha, solution.basis.beta)[0]
+        corner = wavelet_columns(np.zeros((1, d)), solution.basis.alpha, solution.basis.beta)[0]
         return Readings(
             alpha=solution.basis.alpha / reach,
             beta=lower + solution.basis.beta * reach,

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from .._core import ForceModel
+from .._core.model import ForceModel
 from .._typing import Float1D
 from ..arguments import path_of
 from ..errors import InputError

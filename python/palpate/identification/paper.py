@@ -8,7 +8,7 @@ lags behind the motion; it is here for comparison.
 
 import numpy as np
 
-from .._core import environment_filters, paper_sample_time_s
+from .._core.dynamics import environment_filters, paper_sample_time_s
 from .._typing import Float1D
 from ..errors import InputError
 from ..recording import Recording

@@ -9,7 +9,7 @@ compared with.
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
-from .. import _core
+from .._core.model import wavelet_jacobian
 from .._typing import Float1D, Float2D
 from .refinement import COARSEST, REACH
 from .separable import Basis, SeparableProblem, Solution
@@ -88,7 +88,7 @@ def _gradient(
     for block in problem.blocks:
         own = slice(row, row + block.n_channels)
         row += block.n_channels
-        columns, by_alpha, by_centre = _core.wavelet_jacobian(block.positions, basis.alpha, basis.beta)
+        columns, by_alpha, by_centre = wavelet_jacobian(block.positions, basis.alpha, basis.beta)
         design = block.design(columns)
         rest = block.target - design @ table[own].ravel()
         value += float(rest @ rest)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import ForceModel
+from .._core.model import ForceModel
 from .._typing import Float1D, Float2D
 from ..verdict import Finding, no, usable
 from .identified import IdentifiedNetwork

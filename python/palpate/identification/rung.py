@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import _core
+from .._core.model import wavelet_curvature_columns
 from .._typing import Float1D, Float2D
 from .compression import Compressed, binning_error
 from .fresh import FreshRows
@@ -70,7 +70,7 @@ class Rung:
         if not self.rows.spread.any():
             return False
         basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
-        bends = _core.wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
+        bends = wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
         curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
         return binning_error(self.rows, curvature) > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
 

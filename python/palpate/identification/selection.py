@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+from .._core.model import wavelet_columns
 from .._typing import Float1D, Float2D
 from .gram import half_solved
 from .refinement import COARSEST
@@ -53,9 +53,7 @@ class Library:
             self.grams.append(np.empty((block.n_channels, block.n_channels, len(self))))
             for first in range(0, len(self), AT_ONCE):
                 part = slice(first, first + AT_ONCE)
-                wavelets = _core.wavelet_columns(
-                    block.positions, self.basis.alpha[part], self.basis.beta[part]
-                )
+                wavelets = wavelet_columns(block.positions, self.basis.alpha[part], self.basis.beta[part])
                 weighted = wavelets.T * block.channels.T[:, None]
                 self.columns[-1][:, part] = weighted
                 self.grams[-1][:, :, part] = np.einsum("knm,lnm->kln", weighted, weighted)

@@ -16,7 +16,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from .. import _core
+from .._core.model import wavelet_columns, wavelet_steps
 from .._typing import Float1D, Float2D
 from .compression import Compressed
 from .fresh import FreshRows
@@ -239,7 +239,7 @@ class SeparableProblem:
         """Weights, slopes and biases of all channels for this basis."""
         tables, designs, grams = [], [], []
         for block in self.blocks:
-            design = block.design(_core.wavelet_columns(block.positions, basis.alpha, basis.beta))
+            design = block.design(wavelet_columns(block.positions, basis.alpha, basis.beta))
             gram = self._gram(block, design)
             found = solve_gram(gram, design.T @ block.target)
             tables.append(found.reshape(block.n_channels, -1))
@@ -287,7 +287,7 @@ class SeparableProblem:
         for block, design, gram, table, residual in zip(
             self.blocks, at.designs, at.grams, self._tables(at.coefficients), at.residuals, strict=True
         ):
-            jacobian = _core.wavelet_steps(block.positions, basis.alpha, basis.beta)
+            jacobian = wavelet_steps(block.positions, basis.alpha, basis.beta)
             slope = (table[:, 1 + self.dimension :].T @ block.channels.T)[None]
             by_step = jacobian.T.reshape(2 * self.dimension, *slope.shape[1:])
             np.multiply(by_step, slope, out=by_step)

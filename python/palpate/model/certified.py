@@ -6,7 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .._core import Certificate, DeviceProfile, ForceBounds, ForceModel, Inequality, Scheme
+from .._core.device import DeviceProfile
+from .._core.model import ForceModel
+from .._core.rendering import Scheme
+from .._core.stability import Certificate, ForceBounds, Inequality
 from ..errors import InputError
 
 _DEVICE = (

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .._core import longest_delay_s
+from .._core.device import longest_delay_s
 from ..arguments import shown
 from ..errors import InputError
 from .schema import VERSION, ModelFile, Network

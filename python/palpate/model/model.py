@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._core import ForceModel, __version__
+from .._core import __version__
+from .._core.model import ForceModel
 from .._typing import Float1D
 from ..arguments import instance_of, path_of, shown
 from ..errors import InputError
@@ -39,7 +40,7 @@ class Model(ForceModel):
     """A force identified from a recording (paper eq. 4), with its domain, units, data and history.
 
     ``force``, ``slope``, ``energy``, ``predict``, ``play`` and ``extrapolated`` are those of the compiled
-    :class:`palpate._core.ForceModel`, as are the network's arrays.
+    :class:`palpate._core.model.ForceModel`, as are the network's arrays.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from .._core import most_prediction_taps
+from .._core.rendering import most_prediction_taps
 
 VERSION = 1
 """Version of the file format that is read and written."""

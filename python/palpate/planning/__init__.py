@@ -2,7 +2,9 @@
 """From a model to a force that is rendered: how, on what device, and how far off it is."""
 
 from .. import _core
-from .._core import Bench, Certificate, Hand, Inequality, Scheme, explicit_slope_limit
+from .._core.rendering import Scheme, explicit_slope_limit
+from .._core.simulation import Bench, Hand
+from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
 from .bench import bench_for
 from .comparison import Comparison, compare_structures
@@ -37,5 +39,5 @@ __all__ = [
     "simulate",
 ]
 
-for _compiled in (Hand, Scheme, _core.DeviceProfile):
+for _compiled in (Hand, Scheme, _core.device.DeviceProfile):
     named_arguments(_compiled)

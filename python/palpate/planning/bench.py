@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from .. import _core
-from .._core import Bench
+from .._core.simulation import Bench
 from ..model import Model
 
 
@@ -14,4 +14,4 @@ def bench_for(model: Model) -> Bench:
     An angle is tried on the core's default knob. For any other unit (millimetres of a keyswitch, micrometres
     under an AFM tip) it is the same knob as a scale model.
     """
-    return _core.bench_for(model, is_angle=model.units["position"] == "rad")
+    return _core.simulation.bench_for(model, is_angle=model.units["position"] == "rad")

@@ -7,7 +7,9 @@ They are proposals. Whether they hold is for the certificate to say.
 from __future__ import annotations
 
 from .. import _core
-from .._core import DeviceProfile, ForceBounds, Scheme
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme
+from .._core.stability import ForceBounds, certify_bounds, narrowest_play, stiffest_coupling
 from ..model import Model
 from .slope_limit import sliding_bounds, sliding_slopes
 
@@ -42,9 +44,9 @@ def renderable_slopes(
     With hysteresis these are slopes while sliding, and a stick adds `stick` = h/r.
     """
     if model is None:
-        return _core.renderable_slopes(device, stick)
+        return _core.stability.renderable_slopes(device, stick)
     low, high = sliding_slopes(model)
-    return _core.renderable_slopes(
+    return _core.stability.renderable_slopes(
         device, stick, rising=max(0.0, _WANTED * high), falling=max(0.0, -_WANTED * low)
     )
 
@@ -54,7 +56,7 @@ def coupling_for(device: DeviceProfile, damping: float, falling: float = 0.0) ->
 
     `falling` is the steepest fall of an object's force. 0 if the damping alone is too much.
     """
-    return _core.stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
+    return stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
 
 
 def play_radius_for(model: Model, device: DeviceProfile) -> float:
@@ -64,7 +66,7 @@ def play_radius_for(model: Model, device: DeviceProfile) -> float:
     """
     longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
     narrowest = _ENCODER_STEPS * device.encoder_step
-    radius = _core.narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
+    radius = narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
     # Bounds are computed once more for the certificate, and rounded.
     return radius if radius == narrowest else 1.000001 * radius
 
@@ -114,6 +116,6 @@ def explicit_scheme(
                 damping=B_o,
                 play_radius=play_radius,
             )
-            if not _core.certify_bounds(bounds, scheme, device).refused:
+            if not certify_bounds(bounds, scheme, device).refused:
                 return scheme
     return scheme

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._core import Bench, DeviceProfile, Hand, Scheme
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme
+from .._core.simulation import Bench, Hand
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording

@@ -46,7 +46,7 @@ def profile_file(name: str) -> Path:
     return example if not file.exists() and example.exists() else file
 
 
-class DeviceProfile(_core.DeviceProfile):
+class DeviceProfile(_core.device.DeviceProfile):
     """What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
 
     ``b`` and ``f_c`` are what the mechanism itself brakes with: a certificate spends them. Where one of them
@@ -108,7 +108,7 @@ class DeviceProfile(_core.DeviceProfile):
             if "integer string conversion" in reason:
                 reason = f"a number has more than {sys.get_int_max_str_digits()} digits; write 17 or fewer"
             raise InputError(f"{file}: a value cannot be read: {reason}") from None
-        expected = device_record(_core.DeviceProfile())
+        expected = device_record(_core.device.DeviceProfile())
         for name in content:
             if name not in expected:
                 raise InputError(f"{file}: {name} is not a field of a device profile")

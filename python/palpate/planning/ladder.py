@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from .. import _core
-from .._core import most_prediction_taps
+from .._core.rendering import most_prediction_taps
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
@@ -24,7 +24,7 @@ _FORCE_UNIT = {"rad": "N*m", "m": "N"}
 
 def plan(
     model: Model,
-    device: _core.DeviceProfile | str | os.PathLike[str],
+    device: _core.device.DeviceProfile | str | os.PathLike[str],
     *,
     coupling: bool = False,
     coupling_stiffness: float | None = None,
@@ -143,7 +143,7 @@ def plan(
     return chosen
 
 
-def find_profile(device: _core.DeviceProfile | str | os.PathLike[str]) -> _core.DeviceProfile:
+def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) -> _core.device.DeviceProfile:
     """A device by object, by the name of an example profile, or by the path of its TOML file.
 
     Raises
@@ -151,7 +151,7 @@ def find_profile(device: _core.DeviceProfile | str | os.PathLike[str]) -> _core.
     InputError
         It is none of these; the message names the argument, or file and field.
     """
-    if isinstance(device, _core.DeviceProfile):
+    if isinstance(device, _core.device.DeviceProfile):
         return device
     if not isinstance(device, (str, os.PathLike)):
         raise InputError(

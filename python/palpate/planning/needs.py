@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from .._core import DeviceProfile
+from .._core.device import DeviceProfile
 from ..model import Model
 from ..model.certified import device_record
 from .rungs import RUNGS, Wishes

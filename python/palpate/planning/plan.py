@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from .. import _core
-from .._core import Certificate, DeviceProfile, Scheme
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme, solver_name
+from .._core.stability import Certificate, certify, device_difference
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
@@ -71,7 +72,7 @@ class Plan:
     @property
     def solver(self) -> str | None:
         """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
-        return _core.solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
+        return solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
 
     @cached_property
     def force_error(self) -> StaticForceError:
@@ -147,7 +148,7 @@ class Plan:
 
     def certified_for(self, device: DeviceProfile) -> Plan:
         """The same plan with what is proved of it on a device, whatever that is."""
-        return replace(self, certificate=_core.certify(self.rendered, self.scheme, device))
+        return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
         """Refuse what is sure to diverge on this device, and a device that the certificate is not for.
@@ -160,7 +161,7 @@ class Plan:
         """
         self._validate(device.period_s)
         if self.certificate is not None:
-            wrong = _core.device_difference(self.certificate.device, device)
+            wrong = device_difference(self.certificate.device, device)
             if wrong:
                 raise InputError(wrong)
 

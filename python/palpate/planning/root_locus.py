@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import Scheme
+from .._core.rendering import Scheme
 from .._typing import Float1D
 
 

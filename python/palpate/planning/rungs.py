@@ -7,8 +7,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from .. import _core
-from .._core import DeviceProfile, Scheme
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme
+from .._core.stability import balancing_shift, certify, force_bounds, steepest_stick
 from ..model import Model
 from .choices import (
     LONGEST_PLAY,
@@ -130,7 +131,7 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     low, high = renderable_slopes(device)
     if stiffness is None:
         static = damping == 0.0 and not model.hysteretic
-        falling = 0.0 if static else max(0.0, -_core.force_bounds(model, radius).slope_min)
+        falling = 0.0 if static else max(0.0, -force_bounds(model, radius).slope_min)
         stiffness = coupling_for(device, damping, falling)
         if static:
             stiffness = min(stiffness, SPARE * high)
@@ -172,7 +173,7 @@ def explicit(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
         return _only_direct(wishes)
     radius = wishes.play_radius or usual_play_radius(model, device)
     scheme = explicit_scheme(
-        _core.force_bounds(model, radius, device.force_limit),
+        force_bounds(model, radius, device.force_limit),
         device,
         mass=wishes.mass,
         damping=wishes.damping,
@@ -264,7 +265,7 @@ def _fits(model: Model, low: float, high: float) -> bool:
 
 def _balanced(model: Model, device: DeviceProfile) -> Model:
     """The model, shifted if it repeats: limited by the device, its force must not push on average."""
-    shift = _core.balancing_shift(model, device.force_limit)
+    shift = balancing_shift(model, device.force_limit)
     return model.with_network(bias=model.bias + shift) if shift else model
 
 
@@ -273,7 +274,7 @@ def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> 
 
     def holds(candidate: Model) -> bool:
         scheme = _direct_scheme(candidate, device, wishes)
-        return not _core.certify(candidate, scheme, device).refused
+        return not certify(candidate, scheme, device).refused
 
     def as_much_loss_as_holds(candidate: Model) -> Model:
         kept, refused = 0.0, 1.0
@@ -286,7 +287,7 @@ def _hysteresis_limited(model: Model, device: DeviceProfile, wishes: Wishes) -> 
     radius = wishes.play_radius or model.play_radius
     if radius is None:
         radius = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
-    stick = min(_core.force_bounds(model, radius).loss_per_play, _core.steepest_stick(device))
+    stick = min(force_bounds(model, radius).loss_per_play, steepest_stick(device))
     limited = _within(model, *renderable_slopes(device, stick, model), device) or model
     found = [limited if holds(limited) else as_much_loss_as_holds(limited)]
     if limited is not model and holds(_balanced(scale_loss(model, _LEAST_LOSS), device)):

@@ -10,7 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import _core
-from .._core import DeviceProfile, Hand, Scheme, Status
+from .._core import Status
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme
+from .._core.simulation import Hand, motion_driven
 from .._typing import Float1D
 from ..arguments import instance_of, real_of
 from ..errors import InputError
@@ -83,7 +86,7 @@ def simulate(
     plan.check_for(device)
     start = float(np.clip(0.0, plan.model.lower[0], plan.model.upper[0]))
     try:
-        trace = _core.simulate(
+        trace = _core.simulation.simulate(
             plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
         )
     except InputError:
@@ -153,7 +156,7 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     period = rendered.sample_period
     if period is None:
         raise InputError("a rendering of one tick has no force error; simulate a longer time")
-    errors = _core.force_error(
+    errors = _core.simulation.force_error(
         plan.model,
         plan.scheme.play_radius,
         start=rendered.columns[f"{START}{suffix}"],
@@ -249,7 +252,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     if period_s is None and plan.model.of_velocity:
         raise InputError("the force depends on the velocity: period_s must be given")
     exact = Scheme(structure="direct", play_radius=plan.scheme.play_radius)
-    force: Float1D = _core.motion_driven(plan.model, exact, position, period_s or 1.0)["force"]
+    force: Float1D = motion_driven(plan.model, exact, position, period_s or 1.0)["force"]
     return force
 
 

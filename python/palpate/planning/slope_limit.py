@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from .._core import ForceBounds
+from .._core.model import wavelet_columns, wavelet_slope_columns
+from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
 from ..identification.constraints import domain_bounds, impose
 from ..identification.identified import Readings
@@ -62,7 +62,7 @@ _WIDE = 1e9
 def sliding_bounds(model: Model, force_limit: float = math.inf) -> ForceBounds:
     """Proved bounds while sliding, continuations included: of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
-    return _core.force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
+    return force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
 
 
 def sliding_slopes(model: Model) -> tuple[float, float]:
@@ -195,8 +195,8 @@ def _chosen(
     ones, zeros = np.ones_like(x), np.zeros_like(x)
 
     def wavelets(alpha: Float1D, beta: Float1D) -> Float2D:
-        values = _core.wavelet_columns(x[:, None], alpha[:, None], beta[:, None])
-        return both(values, _core.wavelet_slope_columns(x, alpha[:, None], beta[:, None]))
+        values = wavelet_columns(x[:, None], alpha[:, None], beta[:, None])
+        return both(values, wavelet_slope_columns(x, alpha[:, None], beta[:, None]))
 
     line = both(np.column_stack([ones, x]), np.column_stack([zeros, ones]))
     always = np.concatenate([line, wavelets(*before)], axis=1)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import _core
-from .._core import ForceModel, Scheme
+from .._core.model import ForceModel
+from .._core.rendering import Scheme
+from .._core.simulation import motion_driven
 from .._typing import Float1D, Float2D
 from ..model import Model
 
@@ -72,9 +73,7 @@ def _share(error: float, size: float, force: Float2D) -> float:
 def _behind_coupling(model: Model, scheme: Scheme, x: Float1D) -> Float2D:
     """Force (k, n) of each stroke at a handle that rests at x, from the load line of a massless object."""
     at_rest = Scheme(structure="massless", coupling_stiffness=scheme.coupling_stiffness, coupling_damping=0.0)
-    return np.array(
-        [_core.motion_driven(stroke, at_rest, x, 1.0)["force"] for stroke in _single_strokes(model)]
-    )
+    return np.array([motion_driven(stroke, at_rest, x, 1.0)["force"] for stroke in _single_strokes(model)])
 
 
 def _single_strokes(model: Model) -> list[ForceModel]:

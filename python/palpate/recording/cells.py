@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _core
+from .._core.model import play
 from .._typing import Float1D
 from .recording import Recording
 
@@ -120,5 +120,5 @@ def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:
         return np.zeros(len(recording), dtype=np.int8)
     radius = PLAY_SHARE * travel.length
     position = np.clip(recording.position, travel.lower, travel.upper)
-    state = (position - _core.play(position, radius)) / radius
+    state = (position - play(position, radius)) / radius
     return (state > 0.99).astype(np.int8) - (state < -0.99).astype(np.int8)

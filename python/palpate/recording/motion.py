@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core import TransferFunction
+from .._core.dynamics import TransferFunction
 from .._typing import Float1D
 from ..errors import InputError
 from .recording import Recording

@@ -10,7 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from .. import _core
-from .._core import Scheme, Status, paper_sample_time_s
+from .._core import Status
+from .._core.dynamics import paper_sample_time_s
+from .._core.rendering import Scheme, explicit_slope_limit
 from .._typing import Float1D
 from ..errors import InputError
 from ..model import Model
@@ -81,7 +83,7 @@ def motion_driven(
     scheme = scheme or Scheme(structure="direct", play_radius=_play_radius(model, 0.0))
 
     def run(position: Float1D, _force: Float1D) -> dict[str, Any]:
-        rendered: dict[str, Any] = _core.motion_driven(model, scheme, position, period_s)
+        rendered: dict[str, Any] = _core.simulation.motion_driven(model, scheme, position, period_s)
         return rendered
 
     return _closed_loop("motion-driven", model, recording, scheme, period_s, stroke_speed, run, ())
@@ -128,7 +130,7 @@ def force_driven(
     scheme = _with(default, play_radius=_play_radius(model, default.play_radius))
     notes: tuple[str, ...] = ()
     steepest = scheme.steepest_slope(model)
-    limit = _core.explicit_slope_limit(scheme, period_s, coupled=False)
+    limit = explicit_slope_limit(scheme, period_s, coupled=False)
     if scheme.structure == "explicit" and not steepest < limit:
         scheme = _with(scheme, structure="implicit")
         notes = (
@@ -138,7 +140,7 @@ def force_driven(
 
     def run(_position: Float1D, force: Float1D) -> dict[str, Any]:
         start = float(recording.position[0])
-        driven: dict[str, Any] = _core.force_driven(model, scheme, force, period_s, start)
+        driven: dict[str, Any] = _core.simulation.force_driven(model, scheme, force, period_s, start)
         return driven
 
     return _closed_loop("force-driven", model, recording, scheme, period_s, stroke_speed, run, notes)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import _core
+from .._core.model import wavelet_jacobian
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..model import Model
@@ -111,7 +111,7 @@ def _blocks(position: Float1D, direction: Float1D | None) -> Iterator[tuple[Floa
 def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Float2D:
     """df/dtheta (n, p); weights of h stand beside those of g with the stroke as a factor."""
     x = np.ascontiguousarray(position, dtype=np.float64)[:, None]
-    value, (by_alpha,), (by_beta,) = _core.wavelet_jacobian(x, model.alpha, model.beta)
+    value, (by_alpha,), (by_beta,) = wavelet_jacobian(x, model.alpha, model.beta)
     linear = np.concatenate([np.ones_like(x), x - model.lower, value], axis=1)
     weight = np.broadcast_to(model.weight, value.shape)
     if model.weight_hysteresis is not None:

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/controller.hpp"
 #include "palpate/device/device.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/structure.hpp"
+#include "palpate/run/controller.hpp"
 #include "value_iteration.hpp"
 
 namespace palpate::energy_search {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 
 namespace palpate {
 

@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "palpate/controller.hpp"
-#include "palpate/device/faulty.hpp"
-#include "palpate/device/hands.hpp"
-#include "palpate/device/plant.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/faulty_device.hpp"
+#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/plant.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 

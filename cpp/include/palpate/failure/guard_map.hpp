@@ -7,11 +7,11 @@
 #include <limits>
 #include <string>
 
-#include "palpate/device/hands.hpp"
 #include "palpate/failure/failure_map.hpp"
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/simulation/hands.hpp"
 
 namespace palpate {
 

@@ -11,7 +11,7 @@
 #include "palpate/failure/failure_map.hpp"
 #include "palpate/failure/objects.hpp"
 #include "palpate/failure/trials.hpp"
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/stability/held_force.hpp"
 

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "palpate/device/hands.hpp"
 #include "palpate/failure/failure_map.hpp"
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/failure/objects.hpp"
 #include "palpate/failure/trials.hpp"
 #include "palpate/rendering/predicted.hpp"
+#include "palpate/simulation/hands.hpp"
 #include "palpate/stability/predicted_force.hpp"
 
 namespace palpate {

@@ -8,9 +8,9 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/closed_loop.hpp"
-#include "palpate/device/hands.hpp"
 #include "palpate/rendering/structure.hpp"
+#include "palpate/simulation/closed_loop.hpp"
+#include "palpate/simulation/hands.hpp"
 
 namespace palpate {
 

@@ -5,15 +5,15 @@
 #include <cstddef>
 #include <string>
 
-#include "palpate/device/hands.hpp"
 #include "palpate/failure/failure_map.hpp"
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/failure/objects.hpp"
 #include "palpate/failure/prediction_map.hpp"
 #include "palpate/failure/trials.hpp"
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/simulation/hands.hpp"
 #include "palpate/stability/coupled_inequalities.hpp"
 
 namespace palpate {

@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "palpate/fields/readable.hpp"
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/reading_guard.hpp"
-#include "palpate/readable.hpp"
 
 namespace palpate {
 

@@ -8,11 +8,11 @@
 #include <utility>
 #include <variant>
 
+#include "palpate/fields/readable.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/network.hpp"
 #include "palpate/model/radial_network.hpp"
 #include "palpate/model/velocity_network.hpp"
-#include "palpate/readable.hpp"
 
 namespace palpate {
 

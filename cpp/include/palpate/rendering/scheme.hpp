@@ -12,10 +12,10 @@
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/model/limited_environment.hpp"
-#include "palpate/readable.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/direct_velocity.hpp"

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/model/fingerprint.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/readable.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/direct_inequalities.hpp"

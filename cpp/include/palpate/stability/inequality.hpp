@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 
 namespace palpate {
 

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
-#include "palpate/device/hand.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/scheme.hpp"
-#include "palpate/simulation.hpp"
+#include "palpate/simulation/hand.hpp"
+#include "palpate/simulation/virtual_time.hpp"
 
 namespace palpate {
 

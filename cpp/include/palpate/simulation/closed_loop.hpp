@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <utility>
 
-#include "palpate/controller.hpp"
-#include "palpate/device/hands.hpp"
-#include "palpate/device/plant.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/rendering/structure.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/plant.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 

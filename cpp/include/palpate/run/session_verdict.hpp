@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/io/record_sinks.hpp"
-#include "palpate/loop.hpp"
-#include "palpate/readable.hpp"
-#include "palpate/session.hpp"
-#include "palpate/session_text.hpp"
+#include "palpate/fields/readable.hpp"
+#include "palpate/run/loop.hpp"
+#include "palpate/run/record_sinks.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
 #include "palpate/status.hpp"
 
 namespace palpate {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <limits>
 
-#include "palpate/device/hand.hpp"
+#include "palpate/simulation/hand.hpp"
 
 namespace palpate {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/session.hpp"
+#include "palpate/run/session.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -11,9 +11,9 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
-#include "palpate/bench.hpp"
-#include "palpate/device/simulated.hpp"
-#include "palpate/session_text.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/test_rig.hpp"
 #include "summary.hpp"
 
 namespace palpate::bindings {
@@ -83,7 +83,7 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
 
 }  // namespace
 
-void bind_session(py::module_& module) {
+void bind_run(py::module_& module) {
     const LoopSettings loop;
     const RealTimeOptions real_time;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "palpate/simulation.hpp"
+#include "palpate/simulation/virtual_time.hpp"
 
 namespace palpate {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "palpate/device/hand.hpp"
+#include "palpate/simulation/hand.hpp"
 
 namespace palpate {
 

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "palpate/controller.hpp"
-#include "palpate/device/simulated.hpp"
-#include "palpate/readable.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 

@@ -12,8 +12,8 @@
 
 #include "palpate/device/device.hpp"
 #include "palpate/device/device_profile.hpp"
-#include "palpate/device/hand.hpp"
-#include "palpate/device/plant.hpp"
+#include "palpate/simulation/hand.hpp"
+#include "palpate/simulation/plant.hpp"
 
 namespace palpate {
 

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/bench.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/recording_file.hpp"
-#include "palpate/loop.hpp"
-#include "palpate/readable.hpp"
 #include "palpate/rendering/scheme.hpp"
-#include "palpate/session.hpp"
+#include "palpate/run/loop.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/simulation/test_rig.hpp"
 
 namespace palpate {
 

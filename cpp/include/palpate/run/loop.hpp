@@ -11,11 +11,11 @@
 #include <stdexcept>
 #include <string>
 
-#include "palpate/controller.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/io/tick_record.hpp"
-#include "palpate/readable.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/timing.hpp"
+#include "palpate/run/controller.hpp"
 #include "palpate/status.hpp"
 
 namespace palpate {

@@ -13,16 +13,16 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/controller.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/guards.hpp"
-#include "palpate/io/record_sinks.hpp"
 #include "palpate/io/tick_record.hpp"
-#include "palpate/loop.hpp"
 #include "palpate/realtime/flight_recorder.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/privileges.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/run/loop.hpp"
+#include "palpate/run/record_sinks.hpp"
 
 namespace palpate {
 

@@ -7,19 +7,19 @@
 #include <string>
 #include <utility>
 
-#include "palpate/bench.hpp"
-#include "palpate/controller.hpp"
 #include "palpate/device/device.hpp"
-#include "palpate/device/simulated.hpp"
 #include "palpate/guard/guard_settings.hpp"
-#include "palpate/io/record_sinks.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/probe.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/rendering/structure.hpp"
-#include "palpate/session.hpp"
-#include "palpate/session_text.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/run/record_sinks.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/test_rig.hpp"
 
 namespace palpate {
 

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "fields.hpp"
+#include "palpate/simulation/force_error.hpp"
+#include "palpate/simulation/hand.hpp"
+#include "palpate/simulation/test_rig.hpp"
+#include "palpate/simulation/virtual_time.hpp"
+#include "signals.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
+    std::vector<std::int8_t> numbers;
+    numbers.reserve(statuses.size());
+    for (const Status status : statuses) {
+        numbers.push_back(static_cast<std::int8_t>(status));
+    }
+    return numbers;
+}
+
+py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
+                            const Hand& hand, double duration_s, int substeps, double start_position,
+                            const std::optional<py::function>& progress) {
+    detail::require(std::isfinite(start_position), "start_position is not a finite number");
+    const std::size_t ticks = simulated_ticks(duration_s, device.period_s);
+    Trace trace;
+    {
+        const py::gil_scoped_release unlocked;
+        trace = simulate(model, scheme, device, hand, ticks, substeps, start_position,
+                         Interruptible{progress ? &*progress : nullptr});
+    }
+    return py::dict(
+        "time_s"_a = moved(std::move(trace.time)), "position"_a = moved(std::move(trace.position)),
+        "velocity"_a = moved(std::move(trace.velocity)),
+        "handle_start"_a = moved(std::move(trace.handle_start)),
+        "handle_middle"_a = moved(std::move(trace.handle_middle)),
+        "handle_end"_a = moved(std::move(trace.handle_end)),
+        "environment_position"_a = moved(std::move(trace.environment_position)),
+        "force"_a = moved(std::move(trace.force)), "applied"_a = moved(std::move(trace.applied)),
+        "mean_applied"_a = moved(std::move(trace.mean_applied)),
+        "evaluations"_a = moved(std::move(trace.evaluations)), "status"_a = moved(numbered(trace.status)),
+        "extrapolated"_a = moved(std::move(trace.extrapolated)));
+}
+
+py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
+    std::vector<double> force;
+    std::vector<double> position;
+    std::vector<int> evaluations;
+    std::vector<Status> status;
+    for (const Rendered& tick : rendered) {
+        force.push_back(tick.force);
+        position.push_back(tick.environment_position);
+        evaluations.push_back(tick.evaluations);
+        status.push_back(tick.status);
+    }
+    return py::dict("force"_a = moved(std::move(force)),
+                    "environment_position"_a = moved(std::move(position)),
+                    "evaluations"_a = moved(std::move(evaluations)), "status"_a = moved(numbered(status)));
+}
+
+}  // namespace
+
+void bind_simulation(py::module_& module) {
+    module.attr("most_simulated_ticks") = most_simulated_ticks;
+
+    const Hand usual;
+    py::class_<Hand> simulated_hand(
+        module, "Hand",
+        "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.");
+    simulated_hand
+        .def(py::init<double, double, double, double, double>(), py::kw_only(),
+             "stiffness"_a = usual.stiffness, "damping"_a = usual.damping, "lower"_a = usual.lower,
+             "upper"_a = usual.upper, "frequency_hz"_a = usual.frequency_hz)
+        .def_readonly("stiffness", &Hand::stiffness, "[N/m or N*m/rad]")
+        .def_readonly("damping", &Hand::damping, "[N*s/m or N*m*s/rad]")
+        .def_readonly("lower", &Hand::lower, "[m or rad]")
+        .def_readonly("upper", &Hand::upper, "[m or rad]")
+        .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]");
+    define_by_fields(simulated_hand, {"stiffness", "damping", "lower", "upper", "frequency_hz"});
+
+    py::class_<Bench> bench(
+        module, "Bench",
+        "A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.");
+    bench
+        .def(py::init([](const DeviceProfile& device, const Hand& hand, double length, double stiffness) {
+                 return Bench{device, hand, length, stiffness};
+             }),
+             py::kw_only(), "device"_a, "hand"_a, "length"_a = 1.0, "stiffness"_a = 1.0)
+        .def_readonly("device", &Bench::device)
+        .def_readonly("hand", &Bench::hand)
+        .def_readonly("length", &Bench::length, "Positions, over those of the default knob.")
+        .def_readonly("stiffness", &Bench::stiffness, "Force per position, over that of the default knob.")
+        .def(
+            "scheme",
+            [](const Bench& self, const ForceModel& model, const std::optional<std::string>& structure,
+               std::optional<bool> compensated, std::optional<double> coupling_stiffness,
+               std::optional<double> coupling_damping, std::optional<double> mass,
+               std::optional<double> damping, std::optional<double> play_radius, std::optional<int> predict) {
+                SchemeChoices chosen{std::nullopt, compensated, coupling_stiffness, coupling_damping,
+                                     mass,         damping,     play_radius,        predict};
+                if (structure) {
+                    chosen.structure = structure_named(*structure);
+                }
+                return self.scheme(model, chosen);
+            },
+            "model"_a, py::kw_only(), "structure"_a = py::none(), "compensated"_a = py::none(),
+            "coupling_stiffness"_a = py::none(), "coupling_damping"_a = py::none(), "mass"_a = py::none(),
+            "damping"_a = py::none(), "play_radius"_a = py::none(), "predict"_a = py::none(),
+            "What is given, in the model's own units; what is None follows the model in this bench's scale.");
+    define_by_fields(bench, {"device", "hand", "length", "stiffness"});
+    module.def(
+        "bench_for", &bench_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
+        "The bench on which a model of one position is tried. An angle is tried on the default knob;\n"
+        "for any other unit it is the same knob as a scale model: lengths and forces are multiplied so\n"
+        "that travel and largest force stand to the device as in the knob's own scene.");
+
+    module.def("simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
+               "substeps"_a = 20, "start_position"_a = 0.0, "progress"_a = py::none(),
+               "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
+               "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
+               "Ctrl-C\n"
+               "ends it as in Python; ValueError for more than most_simulated_ticks.\n\n"
+               "Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and\n"
+               "handle_end (the true handle when sampled, and in the middle and at the end of the tick that "
+               "holds the\n"
+               "force), environment_position, force (commanded), applied (at the end of the tick), "
+               "mean_applied (over\n"
+               "the tick), evaluations, status, extrapolated.");
+    module.def(
+        "force_error",
+        [](const ForceModel& model, double play_radius, const Array& start, const Array& middle,
+           const Array& end, const Array& applied, const Array& mean_applied, double period_s) {
+            require_vector(start, "start");
+            require_vector(middle, "middle");
+            require_vector(end, "end");
+            require_vector(applied, "applied");
+            require_vector(mean_applied, "mean_applied");
+            require_period(period_s);
+            ForceError error;
+            {
+                const py::gil_scoped_release unlocked;
+                error = force_error(model, play_radius,
+                                    {view(start), view(middle), view(end), view(applied), view(mean_applied)},
+                                    period_s);
+            }
+            return py::dict("end"_a = error.end, "instant"_a = error.instant, "mean"_a = error.mean,
+                            "band"_a = error.band, "work"_a = error.work);
+        },
+        "model"_a, "play_radius"_a, py::kw_only(), "start"_a, "middle"_a, "end"_a, "applied"_a,
+        "mean_applied"_a, "period_s"_a,
+        "RMS errors [N or N*m] of a simulated rendering against a model: at the end of the tick, at its\n"
+        "sampling instant, of its mean over the tick, and of that below 50 Hz; and the work of the error "
+        "[J].\n"
+        "Arrays (n,) from simulate; play_radius 0 is the model's own.");
+    module.def(
+        "motion_driven",
+        [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
+            require_vector(position, "position");
+            require_period(period_s);
+            std::vector<Rendered> rendered;
+            {
+                const py::gil_scoped_release unlocked;
+                rendered = motion_driven(model, s, view(position), period_s, Interruptible{});
+            }
+            return rendered_arrays(rendered);
+        },
+        "model"_a, "scheme"_a, "position"_a, "period_s"_a,
+        "The force that would have been rendered while a recorded motion (n,) moves the device.\n"
+        "Arrays (n,) by name: force, environment_position, evaluations, status.");
+    module.def(
+        "force_driven",
+        [](const ForceModel& model, const Scheme& s, const Array& force, double period_s,
+           double start_position) {
+            require_vector(force, "force");
+            require_period(period_s);
+            std::vector<Rendered> rendered;
+            {
+                const py::gil_scoped_release unlocked;
+                rendered = force_driven(model, s, view(force), period_s, start_position, Interruptible{});
+            }
+            return rendered_arrays(rendered);
+        },
+        "model"_a, "scheme"_a, "force"_a, "period_s"_a, "start_position"_a = 0.0,
+        "The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).\n"
+        "Arrays (n,) by name: force, environment_position, evaluations, status.");
+}
+
+}  // namespace palpate::bindings

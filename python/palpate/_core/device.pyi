@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Profiles of haptic devices.
+"""
+from __future__ import annotations
+import typing
+__all__: list[str] = ['DeviceProfile', 'longest_delay_s']
+class DeviceProfile:
+    """
+    What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def coulomb_friction(self) -> float:
+        """
+        [N or N*m]
+        """
+    @property
+    def delay_fraction(self) -> float:
+        """
+        tau: rest of the delay [samples].
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        Time from a sample to the force that is computed from it [s].
+        """
+    @property
+    def encoder_step(self) -> float:
+        """
+        [m or rad]; 0 = not quantised
+        """
+    @property
+    def force_limit(self) -> float:
+        """
+        [N or N*m]
+        """
+    @property
+    def force_step(self) -> float:
+        """
+        [N or N*m]; 0 = not quantised
+        """
+    @property
+    def id(self) -> str:
+        ...
+    @property
+    def inertia(self) -> float:
+        """
+        [kg or kg*m^2]
+        """
+    @property
+    def jitter_s(self) -> float:
+        """
+        How much longer than period_s the time between two samples can get [s].
+        """
+    @property
+    def late_samples(self) -> int:
+        """
+        Smallest number of whole samples that is not shorter than the delay.
+        """
+    @property
+    def longest_period_s(self) -> float:
+        """
+        period_s + jitter_s: what a certificate has to hold for [s].
+        """
+    @property
+    def period_s(self) -> float:
+        """
+        T, time between two samples [s].
+        """
+    @property
+    def position_unit(self) -> str:
+        """
+        rad, and forces are in N*m; or m, and they are in N.
+        """
+    @property
+    def viscous_damping(self) -> float:
+        """
+        [N*s/m or N*m*s/rad]
+        """
+    @property
+    def whole_delay_samples(self) -> int:
+        """
+        n: number of whole samples in the delay.
+        """
+def longest_delay_s(period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Longest delay of a profile [s]: 16 periods.
+    """

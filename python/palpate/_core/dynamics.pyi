@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Transfer functions and the filters of the paper.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['EnvironmentFilters', 'TransferFunction', 'environment_filters', 'paper_sample_time_s']
+class TransferFunction:
+    """
+    H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) with its state.
+    """
+    def __init__(self, numerator: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], denominator: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]) -> None:
+        ...
+    def at(self, z: complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex) -> complex:
+        """
+        H(z), for instance at z = exp(1j * omega * T).
+        """
+    def filter(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The response to a signal (n,) from this state; the state itself is left as it is.
+        """
+    def poles(self) -> typing.Annotated[list[complex], "FixedSize(2)"]:
+        ...
+    def reset(self) -> None:
+        """
+        Back to rest.
+        """
+    def step(self, input: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        The next output sample.
+        """
+    @property
+    def denominator(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        ...
+    @property
+    def numerator(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        ...
+class EnvironmentFilters:
+    """
+    Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.
+    """
+    @property
+    def g1(self) -> TransferFunction:
+        ...
+    @property
+    def g2(self) -> TransferFunction:
+        ...
+    @property
+    def i1(self) -> TransferFunction:
+        ...
+    @property
+    def i2(self) -> TransferFunction:
+        ...
+def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
+    """
+    The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
+    """
+paper_sample_time_s: float = 0.001

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Structures between a model and a device.
+"""
+from __future__ import annotations
+import palpate._core.model
+import typing
+__all__: list[str] = ['Scheme', 'explicit_slope_limit', 'most_prediction_taps', 'solver_name', 'structure_names']
+class Scheme:
+    """
+    How a model is rendered: the structure and its numbers, SI units.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, predict: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def steepest_slope(self, model: palpate._core.model.ForceModel) -> float:
+        """
+        Largest slope of the model that the structure meets, never below 0; h / r is part of it while a
+        hysteresis model sticks.
+        """
+    def validate(self, model: palpate._core.model.ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        """
+        ValueError names the field, its value and what would be right for this model; with a period also
+        what is sure to diverge at it.
+        """
+    @property
+    def compensated(self) -> bool:
+        ...
+    @property
+    def coupling_damping(self) -> float:
+        ...
+    @property
+    def coupling_stiffness(self) -> float:
+        ...
+    @property
+    def damping(self) -> float:
+        ...
+    @property
+    def mass(self) -> float:
+        ...
+    @property
+    def play_radius(self) -> float:
+        ...
+    @property
+    def predict(self) -> int:
+        """
+        m: samples used to predict the position half a sample ahead; 0 = none.
+        """
+    @property
+    def structure(self) -> str:
+        ...
+def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
+    """
+    Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
+    driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.
+    """
+def solver_name(model: palpate._core.model.ForceModel, scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex) -> str | None:
+    """
+    How the load line is solved: 'table' where certified tables answer, at least in part, else 'newton';
+    None where a structure has no load line.
+    """
+most_prediction_taps: int = 16
+structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')

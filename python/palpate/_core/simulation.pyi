@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Rendering in virtual time on a simulated device.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import palpate._core.device
+import palpate._core.model
+import palpate._core.rendering
+import typing
+__all__: list[str] = ['Bench', 'Hand', 'bench_for', 'force_driven', 'force_error', 'most_simulated_ticks', 'motion_driven', 'simulate']
+class Hand:
+    """
+    A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, stiffness: typing.SupportsFloat | typing.SupportsIndex = 15.0, damping: typing.SupportsFloat | typing.SupportsIndex = 0.05, lower: typing.SupportsFloat | typing.SupportsIndex = 0.02, upper: typing.SupportsFloat | typing.SupportsIndex = 0.47, frequency_hz: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def damping(self) -> float:
+        """
+        [N*s/m or N*m*s/rad]
+        """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        [Hz]
+        """
+    @property
+    def lower(self) -> float:
+        """
+        [m or rad]
+        """
+    @property
+    def stiffness(self) -> float:
+        """
+        [N/m or N*m/rad]
+        """
+    @property
+    def upper(self) -> float:
+        """
+        [m or rad]
+        """
+class Bench:
+    """
+    A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, device: palpate._core.device.DeviceProfile, hand: Hand, length: typing.SupportsFloat | typing.SupportsIndex = 1.0, stiffness: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def scheme(self, model: palpate._core.model.ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, predict: typing.SupportsInt | typing.SupportsIndex | None = None) -> palpate._core.rendering.Scheme:
+        """
+        What is given, in the model's own units; what is None follows the model in this bench's scale.
+        """
+    @property
+    def device(self) -> palpate._core.device.DeviceProfile:
+        ...
+    @property
+    def hand(self) -> Hand:
+        ...
+    @property
+    def length(self) -> float:
+        """
+        Positions, over those of the default knob.
+        """
+    @property
+    def stiffness(self) -> float:
+        """
+        Force per position, over that of the default knob.
+        """
+def bench_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Bench:
+    """
+    The bench on which a model of one position is tried. An angle is tried on the default knob;
+    for any other unit it is the same knob as a scale model: lengths and forces are multiplied so
+    that travel and largest force stand to the device as in the knob's own scene.
+    """
+def force_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
+    """
+    The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
+    Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def force_error(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex, *, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], middle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mean_applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    RMS errors [N or N*m] of a simulated rendering against a model: at the end of the tick, at its
+    sampling instant, of its mean over the tick, and of that below 50 Hz; and the work of the error [J].
+    Arrays (n,) from simulate; play_radius 0 is the model's own.
+    """
+def motion_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
+    """
+    The force that would have been rendered while a recorded motion (n,) moves the device.
+    Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
+    """
+    The model rendered on a simulated device held by a simulated hand, in virtual time.
+    The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. Ctrl-C
+    ends it as in Python; ValueError for more than most_simulated_ticks.
+    
+    Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and
+    handle_end (the true handle when sampled, and in the middle and at the end of the tick that holds the
+    force), environment_position, force (commanded), applied (at the end of the tick), mean_applied (over
+    the tick), evaluations, status, extrapolated.
+    """
+most_simulated_ticks: int = 3600000

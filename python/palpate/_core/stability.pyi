@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Certificates and the inequalities they consist of.
+"""
+from __future__ import annotations
+import collections.abc
+import palpate._core.device
+import palpate._core.model
+import palpate._core.rendering
+import typing
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'balancing_shift', 'certify', 'certify_bounds', 'device_difference', 'felt_slope', 'force_bounds', 'narrowest_play', 'renderable_slopes', 'steepest_stick', 'stiffest_coupling']
+class ForceBounds:
+    """
+    Proved bounds of a force over every position that can be reached, continuations included.
+    
+    With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h / r more while it sticks.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, drag: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def drag(self) -> float:
+        """
+        B_v = max |f(x, v) - f(x, 0)| / |v|.
+        """
+    @property
+    def hysteresis(self) -> bool:
+        ...
+    @property
+    def loss_max(self) -> float:
+        """
+        Largest h.
+        """
+    @property
+    def loss_min(self) -> float:
+        """
+        Smallest h.
+        """
+    @property
+    def loss_per_play(self) -> float:
+        """
+        max h / r
+        """
+    @property
+    def mean_force(self) -> float:
+        """
+        How much a limited force that repeats pushes on average, beyond its loss.
+        """
+    @property
+    def sliding(self) -> float:
+        """
+        max |f'|, or max(|g'| + |h'|).
+        """
+    @property
+    def slope_max(self) -> float:
+        """
+        Of every path.
+        """
+    @property
+    def slope_min(self) -> float:
+        """
+        Of every path.
+        """
+    @property
+    def steepest(self) -> float:
+        """
+        L = max |f'|, or max(|g'| + |h'| + h / r).
+        """
+class Inequality:
+    """
+    One line of a certificate: left >= right, or left > right where it is strict.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, id: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, name: str = '', formula: str = '', rests_on: str = 'proved', source: str = '', strict: bool = False) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    @property
+    def formula(self) -> str:
+        ...
+    @property
+    def holds(self) -> bool:
+        ...
+    @property
+    def id(self) -> str:
+        """
+        Stable name; texts may change between releases.
+        """
+    @property
+    def left(self) -> float:
+        """
+        What there is.
+        """
+    @property
+    def margin(self) -> float:
+        """
+        left - right
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def rests_on(self) -> str:
+        """
+        proved, linear (the linearised system only) or none (no bound is known beyond).
+        """
+    @property
+    def right(self) -> float:
+        """
+        What is needed.
+        """
+    @property
+    def source(self) -> str:
+        ...
+    @property
+    def strict(self) -> bool:
+        ...
+class Certificate:
+    """
+    What is proved of a model, rendered by a scheme, on a device.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex, fingerprint: str, why: str = '') -> None:
+        """
+        A certificate as stored in a file. Use the result of `check`.
+        """
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def check(self, model: palpate._core.model.ForceModel) -> Certificate:
+        """
+        Computes the certificate again and returns the result. ValueError names the first field that differs.
+        """
+    @property
+    def bounds(self) -> ForceBounds:
+        """
+        Of the force that is rendered, compensation included.
+        """
+    @property
+    def certified(self) -> bool:
+        ...
+    @property
+    def device(self) -> palpate._core.device.DeviceProfile:
+        ...
+    @property
+    def fingerprint(self) -> str:
+        """
+        16 hexadecimal digits over every number and name of the certificate.
+        """
+    @property
+    def inequalities(self) -> list[Inequality]:
+        ...
+    @property
+    def longest_period_s(self) -> float:
+        """
+        Time between two samples up to which every inequality holds [s]; 0 where one does not.
+        """
+    @property
+    def model(self) -> str:
+        """
+        Fingerprint of the model.
+        """
+    @property
+    def refused(self) -> bool:
+        ...
+    @property
+    def scheme(self) -> palpate._core.rendering.Scheme:
+        ...
+    @property
+    def verdict(self) -> str:
+        ...
+    @property
+    def why(self) -> str:
+        """
+        One sentence.
+        """
+def balancing_shift(model: palpate._core.model.ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Shift of a force that repeats with which the limited force does not push on average; 0 for other
+    models. Add it to the bias of the network.
+    """
+def certify(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
+    """
+    What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason;
+    ValueError where scheme or device is impossible.
+    """
+def certify_bounds(bounds: ForceBounds, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
+    """
+    The same for any force within bounds.
+    """
+def device_difference(certified: palpate._core.device.DeviceProfile, device: palpate._core.device.DeviceProfile) -> str:
+    """
+    The first field in which a device is not the certified one, as a sentence; empty where it is.
+    """
+def felt_slope(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.
+    """
+def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
+    """
+    Returns proved bounds of a model of one position, or of position and velocity, on a device with a
+    force limit. A play_radius above 0 replaces the model's own.
+    """
+def narrowest_play(sliding: ForceBounds, device: palpate._core.device.DeviceProfile, least: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Narrowest play radius between `least` and `most` for which hysteresis is certified; infinite if none
+    is. `sliding` bounds the model with a play so wide that sticking adds no slope.
+    """
+def renderable_slopes(device: palpate._core.device.DeviceProfile, stick: typing.SupportsFloat | typing.SupportsIndex = 0.0, *, rising: typing.SupportsFloat | typing.SupportsIndex = ..., falling: typing.SupportsFloat | typing.SupportsIndex = ...) -> tuple[float, float]:
+    """
+    (lowest, highest) slope that direct rendering is certified for; infinite where nothing limits it.
+    
+    First as steep a slope on both sides as is certified, but none steeper than `rising` and `falling`;
+    then as steep a fall, and after it a rise, as is still certified. With hysteresis these are slopes
+    while sliding, and a stick adds h / r = `stick`.
+    """
+def steepest_stick(device: palpate._core.device.DeviceProfile) -> float:
+    """
+    Slope h / r that leaves half of what the device holds to sliding.
+    """
+def stiffest_coupling(*, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
+    `damping` is B_c; `falling` the steepest fall of the object's force.
+    """
