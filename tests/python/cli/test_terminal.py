@@ -22,7 +22,7 @@ from palpate.identification.progress import reporting_to
 from test_cli_identify import spring
 from test_planning import keyswitch_by_hand, model_by_hand
 
-CLI = Path(__file__).parents[2] / "python" / "palpate" / "cli"
+CLI = Path(__file__).parents[3] / "python" / "palpate" / "cli"
 
 Terminal = Callable[..., str]
 
