@@ -20,7 +20,6 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/substepped.hpp"
 #include "palpate/rendering/trapezoidal.hpp"
 #include "palpate/run/controller.hpp"

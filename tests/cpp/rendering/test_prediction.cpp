@@ -12,7 +12,6 @@
 
 #include "palpate/failure/objects.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session_text.hpp"
 #include "palpate/simulation/virtual_time.hpp"

@@ -9,7 +9,7 @@
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/failure/objects.hpp"
 #include "palpate/failure/trials.hpp"
-#include "palpate/rendering/predicted.hpp"
+#include "palpate/rendering/direct.hpp"
 #include "palpate/simulation/hands.hpp"
 #include "palpate/stability/predicted_force.hpp"
 

@@ -11,7 +11,6 @@
 #include "palpate/failure/objects.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
 
 namespace palpate {

@@ -6,7 +6,6 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
