@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+import palpate
+from conftest import ROOT
+from models_by_hand import model_by_hand
+from palpate import load_model
 from palpate._core.device import DeviceProfile
 from palpate._core.rendering import Scheme
 from palpate._core.simulation import Hand
 from palpate._core.stability import ForceBounds, Inequality, certify
-
-import palpate
-from conftest import ROOT
-from palpate import load_model
 from palpate.planning import Plan, bench_for
-from test_planning import model_by_hand
 
 GOOD = ROOT / "tests" / "models" / "good"
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palpate._core.rendering import structure_names
 
 from control_program import control, needs_program
+from models_by_hand import model_by_hand
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan, simulate
+from palpate._core.rendering import structure_names
 from palpate.cli.main import main
 from palpate.planning import bench_for, force_at, force_error
-from test_planning import model_by_hand
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.02)
 # A certificate that a busy machine does not leave: its longest period is a tenth of a second.
