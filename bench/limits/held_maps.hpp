@@ -12,7 +12,7 @@
 #include "palpate/fields/readable.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/predicted.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 #include "palpate/stability/held_force.hpp"
 #include "palpate/stability/predicted_force.hpp"
 #include "trials.hpp"

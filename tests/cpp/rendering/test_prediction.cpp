@@ -14,7 +14,7 @@
 #include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session_text.hpp"
-#include "palpate/simulation/virtual_time.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from models_by_hand import model_by_hand
 from palpate import load_model
 from palpate.cli.main import palpate as group
 from test_cli_identify import spring
-from test_planning import model_by_hand
 
 VERBS = {
     "identify": "identify a.csv -o out.json",

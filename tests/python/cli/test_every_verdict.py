@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from models_by_hand import model_by_hand
 from palpate.cli.main import main
 from palpate.verdict import LEVELS, Verdict, no
 from test_cli_identify import spring
 from test_every_verb import VERBS
-from test_planning import model_by_hand
 
 JUDGING = sorted(set(VERBS) - {"chart"})
 """chart draws the figures of the documentation and has no result of a user to judge."""

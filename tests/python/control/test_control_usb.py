@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from palpate._core.rendering import Scheme
 
 from conftest import ROOT
 from palpate import DeviceProfile, load_model, plan, read_recording
+from palpate._core.rendering import Scheme
 from palpate.planning import Plan
 from usb_emulation import RUNNER, emulated, frames, needs_emulation
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from palpate._core.model import wavelet_columns, wavelet_slope_columns
 
 from palpate import InputError
+from palpate._core.model import wavelet_columns, wavelet_slope_columns
 from palpate.identification import IdentifiedNetwork, IdentifyOptions, fit_environment
 from palpate.identification.compression import Compressor
 from palpate.identification.constraints import domain_bounds, impose, violated_positions

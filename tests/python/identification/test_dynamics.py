@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from palpate._core.model import play
 
 from palpate import Recording, identify, read_recording, verify
+from palpate._core.model import play
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palpate._core.model import wavelet_columns
 
 from palpate import identify
+from palpate._core.model import wavelet_columns
 from palpate.identification import IdentifyOptions, fit_environment
 from palpate.identification.evidence import Evidence
 from palpate.identification.fresh import BLOCKS, FreshRows, gain, inside, kept_back

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from palpate._core.model import wavelet_columns
 
+from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D
 from palpate.identification import IdentifyOptions, growth
 from palpate.identification.compression import Compressor

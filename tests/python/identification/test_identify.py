@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from palpate._core.model import play
 
 import palpate
 from palpate import InputError, Model, Recording, identify
+from palpate._core.model import play
 from palpate.recording.sample import sample_recording
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))

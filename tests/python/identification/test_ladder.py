@@ -5,9 +5,9 @@ import os
 
 import numpy as np
 import pytest
-from palpate._core.model import wavelet_columns
 
 from palpate import InputError
+from palpate._core.model import wavelet_columns
 from palpate.identification import IdentifyOptions, fit_environment
 from palpate.identification.evidence import Evidence
 from palpate.identification.identified import IdentifiedNetwork

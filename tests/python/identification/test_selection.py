@@ -5,8 +5,8 @@ import itertools
 
 import numpy as np
 import pytest
-from palpate._core.model import wavelet_columns
 
+from palpate._core.model import wavelet_columns
 from palpate.identification.compression import Compressed, Compressor
 from palpate.identification.frame import truncated_frame
 from palpate.identification.selection import (

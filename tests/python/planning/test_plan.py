@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
 from palpate.cli.main import main
 from palpate.identification.constraints import slope_limited
 from palpate.model.certified import device_record
 from palpate.planning import example_profiles, profile_file
 from palpate.planning.root_locus import root_locus
-from test_planning import keyswitch_by_hand, model_by_hand
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.005, jitter_s=1e-4)
 WEAK = DeviceProfile(id="weak knob", viscous_damping=0.003, coulomb_friction=0.005)

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palpate._core.model import fingerprint
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import (
     DeviceProfile,
     InputError,
@@ -26,11 +26,11 @@ from palpate import (
     read_recording,
     verify,
 )
+from palpate._core.model import fingerprint
 from palpate.cli.main import main
 from palpate.model.certified import device_record
 from palpate.planning import example_profiles
 from test_plan import SMOOTH, WEAK, slide
-from test_planning import keyswitch_by_hand, model_by_hand
 
 
 @pytest.fixture(scope="session")

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from conftest import ROOT
+from models_by_hand import model_by_hand
 from palpate import InputError, Model, load_model
 from palpate.recording.files import replacing
 from palpate.recording.writing import write_csv
-from test_planning import model_by_hand
 
 MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
