@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from palpate._core.model import wavelet_columns
 
 from palpate import WaveletNetworkRegressor
+from palpate._core.model import wavelet_columns
 
 Array = NDArray[np.float64]
 

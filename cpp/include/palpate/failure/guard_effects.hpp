@@ -13,7 +13,7 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/faulty_device.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/plant.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 

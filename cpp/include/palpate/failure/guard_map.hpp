@@ -11,7 +11,7 @@
 #include "palpate/failure/held_maps.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 
 namespace palpate {
 

@@ -10,7 +10,7 @@
 #include "palpate/failure/objects.hpp"
 #include "palpate/failure/trials.hpp"
 #include "palpate/rendering/predicted.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 #include "palpate/stability/predicted_force.hpp"
 
 namespace palpate {

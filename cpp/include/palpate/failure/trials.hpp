@@ -10,7 +10,7 @@
 
 #include "palpate/rendering/structure.hpp"
 #include "palpate/simulation/closed_loop.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 
 namespace palpate {
 

@@ -13,7 +13,7 @@
 #include "palpate/fields/readable.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 #include "palpate/stability/coupled_inequalities.hpp"
 
 namespace palpate {

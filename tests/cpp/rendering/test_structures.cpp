@@ -1,0 +1,564 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "palpate/model/limited_environment.hpp"
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/energy_consistent.hpp"
+#include "palpate/rendering/explicit.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/closed_loop.hpp"
+#include "palpate/solver/limited_resolvent.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+using test::ClickAndWall;
+using test::Spring;
+
+constexpr double period = 1e-3;
+constexpr VirtualCoupling coupling{100.0, 0.02};
+
+struct ForceError {
+    double at_end;      ///< of the tick that holds the force
+    double at_instant;  ///< of sampling
+};
+
+/// RMS of F_k - f(handle) over 4000 ticks of the scene of spec section 6.
+template <class S>
+ForceError force_error(S structure) {
+    SimulatedDevice device{DeviceProfile{}, Hand{}};
+    EXPECT_TRUE(device.open());
+    Controller<SimulatedDevice, S> controller{device, std::move(structure), ForceLimit{}};
+    EXPECT_EQ(controller.start(), Status::Ok);
+    const ClickAndWall object;
+    constexpr int ticks = 4000;
+    double end = 0.0;
+    double instant = 0.0;
+    for (int k = 0; k < ticks; ++k) {
+        const double sampled = device.handle_position();
+        const Tick tick = controller.tick();
+        EXPECT_EQ(tick.status, Status::Ok);
+        end += std::pow(tick.command.force - object.at(device.handle_position(), {}).force, 2);
+        instant += std::pow(tick.command.force - object.at(sampled, {}).force, 2);
+    }
+    return {std::sqrt(end / ticks), std::sqrt(instant / ticks)};
+}
+
+void expect_within_5_percent(ForceError measured, double at_end, double at_instant) {
+    EXPECT_NEAR(measured.at_end, at_end, 0.05 * at_end);
+    EXPECT_NEAR(measured.at_instant, at_instant, 0.05 * at_instant);
+}
+
+// spec section 6, the table: "direct | 0.00362 | 0.00037"
+TEST(Scene, Direct) {
+    expect_within_5_percent(force_error(Direct{ClickAndWall{}}), 0.00362, 0.00037);
+}
+
+// spec section 6, the table: "massless, compensated | 0.00362 | 0.00037"
+TEST(Scene, MasslessCompensated) {
+    const VirtualCoupling softer_damper{coupling.stiffness, 0.005};
+    const Compensated<ClickAndWall> object{ClickAndWall{}, coupling.stiffness};
+    expect_within_5_percent(force_error(Massless{object, softer_damper, period}), 0.00362, 0.00037);
+}
+
+// spec section 6, the table: "massless | 0.1202 | 0.1202"
+TEST(Scene, Massless) {
+    expect_within_5_percent(force_error(Massless{ClickAndWall{}, coupling, period}), 0.1202, 0.1202);
+}
+
+// spec section 6, the table: "implicit, m = 0.001, B_o = 0 | 0.1231 | 0.1227"
+TEST(Scene, ImplicitUndamped) {
+    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}),
+                            0.1231, 0.1227);
+}
+
+// spec section 6, the table: "implicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
+TEST(Scene, ImplicitDamped) {
+    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
+                            0.2530, 0.2532);
+}
+
+// spec section 6, the table: "explicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
+TEST(Scene, ExplicitDamped) {
+    expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
+                            0.2530, 0.2532);
+}
+
+/// Largest |y| in the last tenth of a free motion that began away from equilibrium, over the first tenth's.
+template <class S>
+double growth(S structure, int ticks) {
+    structure.reset(0.0);
+    double first = 0.0;
+    double last = 0.0;
+    for (int k = 0; k < ticks; ++k) {
+        const double y = std::abs(structure.drive(k < 5 ? 1.0 : 0.0).environment_position);
+        if (k >= 5 && k < ticks / 10) {
+            first = std::max(first, y);
+        }
+        if (k >= ticks - ticks / 10) {
+            last = std::max(last, y);
+        }
+    }
+    return std::isfinite(last) ? last / first : std::numeric_limits<double>::infinity();
+}
+
+// spec section 5: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m: 3000 at
+// m = 0.001, B_o = 0.5"
+TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
+    const auto free_motion = [](double stiffness) {
+        return growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period}, 4000);
+    };
+    EXPECT_LT(free_motion(2990.0), 0.1);
+    EXPECT_GT(free_motion(3010.0), 10.0);
+}
+
+// spec section 5: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's
+// oscillation)"
+TEST(ExplicitLimit, WithoutDampingTheOscillationNeitherDiesNorGrows) {
+    for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
+        const double ratio =
+            growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, coupling, period}, 20'000);
+        EXPECT_NEAR(ratio, 1.0, 0.01) << stiffness;
+    }
+    EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, coupling, period}, 4000), 10.0);
+}
+
+// spec section 5: "with coupling, at a held device: K + K_c < (4m - 2(B_o + B_c)T)/T^2"
+TEST(ExplicitLimit, BehindTheCouplingTheCouplingCountsToo) {
+    const auto held = [](double stiffness) {
+        Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period};
+        double last = 0.0;
+        for (int k = 0; k < 6000; ++k) {
+            last = std::abs(structure.step(k < 5 ? 0.01 : 0.0).environment_position);
+        }
+        return last;
+    };
+    const double limit = explicit_slope_limit({0.001, 0.5}, coupling, period);
+    EXPECT_NEAR(limit, 2860.0, 1e-9);
+    EXPECT_LT(held(0.99 * limit), 1e-3);
+    EXPECT_GT(held(1.01 * limit), 1.0);
+}
+
+// spec section 5: "the implicit scheme is stable for every K >= 0"
+TEST(Implicit, IsStableAtAMillion) {
+    for (const double stiffness : {0.1, 3000.0, 1e6}) {
+        for (const double damping : {0.0, 0.5}) {
+            const double ratio =
+                growth(Implicit{Spring{stiffness}, Inertia{0.001, damping}, coupling, period}, 20'000);
+            EXPECT_LE(ratio, 1.0) << stiffness << " " << damping;
+        }
+    }
+}
+
+// The paper's section 4.3: x_k + (T^2/m) f(x_k) = 2 x_{k-1} - x_{k-2} + (T^2/m) F_k
+TEST(Implicit, SolvesThePapersEquation) {
+    const ClickAndWall object;
+    Implicit structure{object, Inertia{0.001, 0.0}, coupling, period};
+    double before = 0.0;
+    double last = 0.0;
+    const double scale = period * period / 0.001;
+    for (int k = 0; k < 500; ++k) {
+        const double force = 1.0 + std::sin(0.02 * k);
+        const double x = structure.drive(force).environment_position;
+        EXPECT_NEAR(x + scale * object.at(x, {}).force, 2.0 * last - before + scale * force, 1e-12);
+        before = last;
+        last = x;
+    }
+}
+
+TEST(Massless, BalancesTheCouplingAtEveryTick) {
+    const ClickAndWall object;
+    Massless structure{object, coupling, period};
+    double device = 0.0;
+    double position = 0.0;
+    for (int k = 0; k < 500; ++k) {
+        const double x = 0.2 * (1.0 - std::cos(0.01 * k));
+        const Rendered rendered = structure.step(x);
+        const double y = rendered.environment_position;
+        const double velocity_error = ((x - device) - (y - position)) / period;
+        EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
+        EXPECT_NEAR(rendered.force, object.at(y, {}).force, 1e-12);
+        device = x;
+        position = y;
+    }
+}
+
+/// Falls with slope -s within f_0 / s of 0, pushes away from 0 with f_0 beyond, and is closed in by a wall.
+struct PushingOut {
+    using State = Stateless;
+    double push;     ///< f_0
+    double falling;  ///< s
+    double wall;     ///< where a wall of slope 1 begins
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double width = push / falling;
+        const double side = x < 0.0 ? -1.0 : 1.0;
+        const double reach = std::abs(x);
+        if (reach <= width) {
+            return {-falling * x, -falling, -0.5 * falling * x * x, false};
+        }
+        const double beyond = std::max(0.0, reach - wall);
+        return {side * (beyond - push), beyond > 0.0 ? 1.0 : 0.0,
+                push * (0.5 * width - reach) + 0.5 * beyond * beyond, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+/// Work of a hand, F d + A d^2 for every sample: against the clipped force and the damping of a device.
+struct HandWork {
+    double device_damping;  ///< A = b/T
+    double limit;           ///< of the device
+    double position = 0.0;
+    double force = 0.0;
+    double work = 0.0;
+
+    void move(double to, double rendered) noexcept {
+        const double d = to - position;
+        force = std::clamp(rendered, -limit, limit);
+        work += force * d + device_damping * d * d;
+        position = to;
+    }
+};
+
+/// Winds the coupling up quickly, lets the mass fly, and slows it down with a spring just below the limit.
+template <class S>
+double work_of_a_throw(S structure, double limit) {
+    constexpr double stiffness = 90.0;
+    constexpr double wound_up = 0.5;
+    HandWork hand{0.5 * stiffness, limit};
+    structure.reset(0.0);
+    Rendered now = structure.step(0.0);
+    const auto move = [&](double to) {
+        hand.move(to, now.force);
+        now = structure.step(to);
+    };
+    for (int k = 0; k < 60; ++k) {
+        move(hand.position + wound_up / 60.0);
+    }
+    double before = -1.0;
+    while (now.environment_position < hand.position + limit / stiffness &&
+           now.environment_position > before) {
+        before = now.environment_position;
+        move(hand.position);
+    }
+    for (int k = 0; k < 4000 && now.environment_position >= before; ++k) {
+        before = now.environment_position;
+        move(std::max(hand.position, before - 0.99 * limit / stiffness));
+    }
+    return hand.work;
+}
+
+// spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+TEST(ForceLimit, InsideTheStepKeepsAThrownMassFromGivingEnergy) {
+    const Inertia mass{0.05, 0.0};
+    const VirtualCoupling spring{90.0, 0.0};
+    constexpr double none = std::numeric_limits<double>::infinity();
+    const auto implicit = [&](double limit) {
+        return Implicit<Spring>{Spring{0.0}, mass, spring, period, {}, limit, {}};
+    };
+    const auto consistent = [&](double limit) {
+        return EnergyConsistent{Spring{0.0}, mass, spring, period, 1e-4, true, limit};
+    };
+    EXPECT_LT(work_of_a_throw(implicit(none), 5.0), -1.9) << "clipped outside the step";
+    EXPECT_LT(work_of_a_throw(consistent(none), 5.0), -1.9) << "clipped outside the step";
+    EXPECT_GT(work_of_a_throw(implicit(5.0), 5.0), 0.0);
+    EXPECT_GT(work_of_a_throw(consistent(5.0), 5.0), 0.0);
+}
+
+// spec of the certificate: "falling slopes with mass and limit fail: s = 0.31 K_c, m = 7 K_c T^2, F_max = 1.34 f_0,
+// a 68-sample cycle gives 0.44 f_0^2 / K_c"; this one gives 0.416
+TEST(ForceLimit, DoesNotKeepAFallingForceWithMassFromGivingEnergy) {
+    const PushingOut object{1.0, 0.31, 7.5};
+    const Inertia mass{7.0, 0.0};
+    constexpr double limit = 1.34;
+    // The state on the cycle when the hand changes sides: position -0.0826, moved by 1.0850 in the last sample.
+    constexpr double last = -0.08262168687;
+    constexpr double before = -1.16758952181;
+    Implicit<PushingOut> structure{object, mass, {1.0, 0.0}, 1.0, {}, limit, {}};
+    structure.reset(before);
+    const double there =
+        structure.drive(7.0 * (last - before) + object.at(last, {}).force).environment_position;
+    ASSERT_NEAR(there, last, 1e-9);
+    const double side = limit + last + 1e-6;  // the coupling is at its limit all the time
+    HandWork hand{0.5, limit, side, limit};
+    double force = limit;
+    double moved = 0.0;
+    double now = last;
+    for (const double x : {-side, side}) {
+        for (int k = 0; k < 34; ++k) {
+            hand.move(x, force);
+            const Rendered rendered = structure.step(x);
+            ASSERT_EQ(rendered.status, Status::Limited);
+            force = rendered.force;
+            moved = rendered.environment_position - std::exchange(now, rendered.environment_position);
+        }
+    }
+    EXPECT_NEAR(now, last, 1e-6) << "the cycle closes";
+    EXPECT_NEAR(moved, last - before, 1e-6) << "the cycle closes";
+    EXPECT_LT(hand.work, -0.41);
+}
+
+/// Checks each step of a structure with mass: `residual(y, G)` is the object's side of the step less G.
+template <class S, class Residual>
+int limited_steps(S structure, double limit, VirtualCoupling spring, test::Random& random,
+                  Residual residual) {
+    structure.reset(0.2);
+    double x = 0.2;
+    double y = 0.2;
+    int limited = 0;
+    for (int k = 0; k < 400; ++k) {
+        const double moved = test::uniform(random, -0.05, 0.05) + 0.02 * std::sin(0.05 * k);
+        const double u = moved - y;
+        const Rendered now = structure.step(x + moved);
+        const double spread = x + moved - now.environment_position;
+        const double coupling_force =
+            spring.stiffness * spread + spring.damping / period * (u - (now.environment_position - 2.0 * y));
+        EXPECT_NEAR(now.force, std::clamp(coupling_force, -limit, limit), 1e-8);
+        EXPECT_NEAR(residual(now.environment_position, now.force), 0.0, 1e-8);
+        EXPECT_EQ(now.status, std::abs(coupling_force) > limit ? Status::Limited : Status::Ok);
+        limited += now.status == Status::Limited ? 1 : 0;
+        x += moved;
+        y = now.environment_position;
+    }
+    return limited;
+}
+
+TEST(ForceLimit, GivesObjectAndDeviceTheSameForce) {
+    test::Random random{31};
+    const ClickAndWall object;
+    const VirtualCoupling spring{100.0, 0.02};
+    const Inertia mass{0.01, 0.05};
+    const double inertial = mass.mass / period / period;
+    constexpr double limit = 8.0;
+    double last = 0.2;
+    double before = 0.2;
+    const int limited = limited_steps(Implicit<ClickAndWall>{object, mass, spring, period, {}, limit, {}},
+                                      limit, spring, random, [&](double y, double force) {
+                                          const double own = inertial * (y - 2.0 * last + before) +
+                                                             mass.damping / period * (y - last) +
+                                                             object.at(y, {}).force;
+                                          before = std::exchange(last, y);
+                                          return own - force;
+                                      });
+    EXPECT_GT(limited, 100);
+    EXPECT_LT(limited, 380);
+    double velocity = 0.0;
+    last = 0.2;
+    const Spring linear{40.0};
+    EXPECT_GT(limited_steps(
+                  EnergyConsistent{linear, mass, spring, period, 1e-4, false, limit}, limit, spring, random,
+                  [&](double y, double force) {
+                      const double own = 2.0 * mass.mass / period * ((y - last) / period - velocity) +
+                                         mass.damping / period * (y - last) + 20.0 * (y + last);
+                      velocity = 2.0 * (y - last) / period - velocity;
+                      last = y;
+                      return own - force;
+                  }),
+              100);
+}
+
+TEST(ForceLimit, OfAMasslessObjectIsTheLimitOfItsForce) {
+    const ClickAndWall object;
+    constexpr double limit = 1.0;
+    using Limited = LimitedEnvironment<ClickAndWall>;
+    Massless structure{Limited{object, limit}, coupling, period, LimitedResolvent{LoadLineSolver{}}};
+    double device = 0.0;
+    double position = 0.0;
+    for (int k = 0; k < 500; ++k) {
+        const double x = 0.3 * (1.0 - std::cos(0.01 * k));
+        const Rendered rendered = structure.step(x);
+        const double y = rendered.environment_position;
+        const double velocity_error = ((x - device) - (y - position)) / period;
+        EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
+        EXPECT_NEAR(rendered.force, std::min(limit, object.at(y, {}).force), 1e-12);
+        EXPECT_EQ(rendered.status, object.at(y, {}).force > limit ? Status::Limited : Status::Ok) << k;
+        device = x;
+        position = y;
+    }
+}
+
+// spec section 6: "f~ is the curve (x - f(x)/K_c, f(x))", of slope K_c f' / (K_c - f')
+TEST(Compensated, IsTheCurveWithTheSpringTakenOut) {
+    const ClickAndWall object;
+    const Compensated<ClickAndWall> compensated{object, 100.0};
+    for (double x = -0.1; x < 0.6; x += 0.003) {
+        const EnvironmentSample original = object.at(x, {});
+        const EnvironmentSample shifted = compensated.at(x - original.force / 100.0, {});
+        EXPECT_NEAR(shifted.force, original.force, 1e-9);
+        EXPECT_NEAR(shifted.slope, 100.0 * original.slope / (100.0 - original.slope),
+                    1e-6 * (1.0 + std::abs(shifted.slope)));
+    }
+}
+
+template <class S>
+void expect_zero_force_without_a_trace(S structure, const std::string& name) {
+    S untouched = structure;
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (int k = 0; k < 20; ++k) {
+        (void)structure.step(0.01 * k);
+        (void)untouched.step(0.01 * k);
+    }
+    const Rendered refused = structure.step(nan);
+    EXPECT_EQ(refused.force, 0.0) << name;
+    EXPECT_EQ(refused.status, Status::NonFinite) << name;
+    EXPECT_EQ(structure.step(std::numeric_limits<double>::infinity()).force, 0.0) << name;
+    EXPECT_EQ(structure.step(0.2).force, untouched.step(0.2).force) << name;
+}
+
+TEST(Structure, AnswersNanWithZeroForceAndGoesOn) {
+    const ClickAndWall object;
+    expect_zero_force_without_a_trace(Direct{object}, "direct");
+    expect_zero_force_without_a_trace(Massless{object, coupling, period}, "massless");
+    expect_zero_force_without_a_trace(Implicit{object, Inertia{}, coupling, period}, "implicit");
+    expect_zero_force_without_a_trace(Explicit{object, Inertia{}, coupling, period}, "explicit");
+}
+
+TEST(Structure, StartsAtRestWhereTheDeviceIs) {
+    const ClickAndWall object;
+    const auto expect_at_rest = [&](auto structure, const char* name) {
+        structure.reset(0.3);
+        const Rendered first = structure.step(0.3);
+        EXPECT_NEAR(first.environment_position, 0.3, 0.02) << name;
+        EXPECT_LE(std::abs(first.force), std::abs(object.at(0.3, {}).force) + 1e-9) << name;
+    };
+    expect_at_rest(Direct{object}, "direct");
+    expect_at_rest(Massless{object, coupling, period}, "massless");
+    expect_at_rest(Implicit{object, Inertia{}, coupling, period}, "implicit");
+    expect_at_rest(Explicit{object, Inertia{}, coupling, period}, "explicit");
+}
+
+ForceModel spring_model(double stiffness) {
+    return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
+}
+
+/// f = 5 x + 0.2 v.
+ForceModel dashpot_model() {
+    return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
+}
+
+TEST(DirectVelocity, TakesTheVelocityFromTheLastTwoPositions) {
+    DirectVelocity structure{*dashpot_model().velocity(), period};
+    structure.reset(0.3);
+    EXPECT_NEAR(structure.step(0.3).force, 1.5, 1e-12) << "the object rests under the device";
+    EXPECT_NEAR(structure.step(0.3005).force, 1.5025 + 0.2 * 0.5, 1e-9);
+    EXPECT_NEAR(structure.step(0.31).force, 1.55 + 0.2, 1e-9) << "9.5 a second: no faster than the data";
+    const Rendered refused = structure.step(std::numeric_limits<double>::quiet_NaN());
+    EXPECT_EQ(refused.status, Status::NonFinite);
+    EXPECT_EQ(refused.force, 0.0);
+    EXPECT_NEAR(structure.step(0.31).force, 1.55, 1e-9) << "what was refused has changed nothing";
+    EXPECT_FALSE(structure.step(0.3095).extrapolated);
+    EXPECT_TRUE(structure.step(0.2).extrapolated);
+}
+
+TEST(Scheme, RendersAForceOfVelocityDirectlyOrNotAtAll) {
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    const Trace trace = simulate(dashpot_model(), scheme, DeviceProfile{}, Hand{}, 2000);
+    for (std::size_t k = 1; k < trace.force.size(); ++k) {
+        const double velocity = (trace.position[k] - trace.position[k - 1]) / DeviceProfile{}.period_s;
+        const double drag = 0.2 * std::clamp(velocity, -1.0, 1.0);
+        ASSERT_NEAR(trace.force[k], 5.0 * trace.position[k] + drag, 1e-9) << "tick " << k;
+    }
+    for (const std::string_view name : {"massless", "implicit", "explicit", "energy-consistent"}) {
+        scheme.structure = structure_named(name);
+        EXPECT_THROW(validate(scheme, dashpot_model()), std::invalid_argument) << name;
+    }
+}
+
+TEST(Scheme, SimulatesEveryStructureOfAModel) {
+    for (const std::string_view name : structure_names) {
+        Scheme scheme;
+        scheme.structure = structure_named(name);
+        const Trace trace = simulate(spring_model(5.0), scheme, DeviceProfile{}, Hand{}, 2000);
+        ASSERT_EQ(trace.force.size(), 2000U);
+        for (std::size_t k = 0; k < trace.force.size(); ++k) {
+            ASSERT_EQ(trace.status[k], Status::Ok) << name;
+            ASSERT_NEAR(trace.force[k], 5.0 * trace.handle_start[k], 0.8) << name << " tick " << k;
+        }
+    }
+}
+
+TEST(Scheme, RefusesWhatCannotBeRendered) {
+    Scheme scheme;
+    scheme.compensated = true;
+    EXPECT_THROW((void)simulate(spring_model(95.0), scheme, {}, {}, 10), std::invalid_argument);
+    EXPECT_NO_THROW((void)simulate(spring_model(80.0), scheme, {}, {}, 10));
+    scheme = {};
+    scheme.coupling.stiffness = 0.0;
+    EXPECT_THROW((void)simulate(spring_model(5.0), scheme, {}, {}, 10), std::invalid_argument);
+    scheme = {};
+    EXPECT_THROW((void)force_driven(spring_model(5.0), scheme, {}, period, 0.0), std::invalid_argument);
+    EXPECT_THROW((void)structure_named("implied"), std::invalid_argument);
+    const ForceModel loose{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
+    EXPECT_THROW((void)simulate(loose, {}, {}, {}, 10), std::invalid_argument);
+}
+
+TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
+    Scheme scheme;
+    scheme.structure = StructureKind::Explicit;
+    scheme.inertia = {0.001, 0.5};
+    EXPECT_NO_THROW(validate(scheme, spring_model(2859.0), period));
+    EXPECT_THROW(validate(scheme, spring_model(2861.0), period), std::invalid_argument);
+    EXPECT_NO_THROW(validate(scheme, spring_model(2861.0), 0.5 * period));
+    EXPECT_NO_THROW(validate(scheme, spring_model(2861.0)));
+    scheme.structure = StructureKind::Implicit;
+    EXPECT_NO_THROW(validate(scheme, spring_model(1e6), period));
+
+    // The door of every way to render is closed, not only that of the name.
+    scheme.structure = StructureKind::Explicit;
+    EXPECT_THROW((void)simulate(spring_model(2861.0), scheme, {}, {}, 10), std::invalid_argument);
+    EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, period), std::invalid_argument);
+
+    // While it sticks, h / r is part of the slope.
+    const ForceModel both{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
+    scheme.play_radius = 1e-4;
+    EXPECT_NO_THROW(validate(scheme, both, period));
+    scheme.play_radius = 3e-5;
+    EXPECT_THROW(validate(scheme, both, period), std::invalid_argument);
+
+    // Compensated, 45 N*m/rad behind 50 is 450.
+    scheme = {StructureKind::Explicit, {50.0, 0.0}, {2e-4, 0.15}, true, 0.0};
+    EXPECT_NEAR(steepest_slope(scheme, spring_model(45.0)), 450.0, 1e-9);
+    EXPECT_NO_THROW(validate(scheme, spring_model(40.0), period));
+    EXPECT_THROW(validate(scheme, spring_model(45.0), period), std::invalid_argument);
+}
+
+TEST(Scheme, SlopeBoundsOfAHysteresisModelKnowItsStick) {
+    const ForceModel both{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 1.0, 0.2}, test::unit_domain(), {}};
+    EXPECT_NEAR(both.slope_bounds().lower, 4.0, 1e-9);
+    EXPECT_NEAR(both.slope_bounds().upper, 6.0, 1e-9);
+    EXPECT_NEAR(both.slope_bounds(0.01).upper, 6.0 + 1.2 / 0.01, 1e-6);
+}
+
+TEST(Scheme, RendersHysteresisWithItsPlayRadius) {
+    const ForceModel both{
+        NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.2}, test::unit_domain(), {}};
+    Scheme scheme;
+    scheme.structure = StructureKind::Direct;
+    scheme.play_radius = 0.005;
+    const std::array<double, 4> motion{0.1, 0.5, 0.499, 0.1};
+    const auto rendered = motion_driven(both, scheme, motion, period);
+    EXPECT_NEAR(rendered[0].force, 0.5, 1e-12);
+    EXPECT_NEAR(rendered[1].force, 2.5 + 0.2, 1e-12);
+    EXPECT_NEAR(rendered[2].force, 2.495 + 0.2 * (1.0 - 0.001 / 0.005), 1e-12);
+    EXPECT_NEAR(rendered[3].force, 0.5 - 0.2, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scripted faults in random order, in virtual time: what the loop sends, how it ends, what it leaves behind.
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/simulation/faulty_device.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double period_s = 1e-3;
+
+/// A tick that comes late by so much; all others are punctual.
+struct LateTick {
+    std::uint64_t tick = 0;
+    Nanoseconds by = 0;
+};
+
+/// Deadlines that are met but for one, as fast as it goes.
+class VirtualClock {
+  public:
+    explicit VirtualClock(LateTick late) : late_{late} {}
+    void start() noexcept { now_ = 0; }
+    [[nodiscard]] Wake wait() noexcept {
+        now_ += 1'000'000;
+        return {now_, now_ + (tick_++ == late_.tick ? late_.by : 0), 0};
+    }
+
+  private:
+    LateTick late_;
+    std::uint64_t tick_ = 0;
+    Nanoseconds now_ = 0;
+};
+
+/// Remembers what the device was sent last, and whether it was let go.
+struct Observed {
+    std::vector<double> forces;
+    bool closed = false;
+};
+
+template <Device D>
+class Observing {
+  public:
+    Observing(D device, Observed& observed) : device_{std::move(device)}, observed_{observed} {}
+    Opened open() { return device_.open(); }
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        observed_.forces.push_back(command.force);
+        return device_.exchange(command);
+    }
+    void close() noexcept {
+        observed_.closed = true;
+        device_.close();
+    }
+
+  private:
+    D device_;
+    Observed& observed_;
+};
+
+struct Collected {
+    std::vector<TickRecord> ticks;
+    RecordingFile* file = nullptr;
+    void push(const TickRecord& tick) noexcept {
+        ticks.push_back(tick);
+        if (file != nullptr) {
+            file->take({&tick, 1});
+        }
+    }
+};
+
+struct Rendering {
+    Observed observed;
+    std::vector<TickRecord> ticks;
+    std::unique_ptr<LoopReport> report = std::make_unique<LoopReport>();
+    GuardSettings guards;
+};
+
+/// A spring of 8 N*m/rad over half a turn of the knob: forces up to 4 N*m.
+ForceModel spring() {
+    NetworkParameters network;
+    network.linear = {8.0};
+    return {network, Domain{{0.0}, {0.5}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+}
+
+Rendering render(const std::vector<Fault>& faults, const LoopSettings& settings,
+                 RecordingFile* file = nullptr, LateTick late = {}) {
+    Rendering run;
+    const ForceModel model = spring();
+    const TestRig rig = rig_for(model, true, period_s);
+    run.guards = guards_for(rig.scale, rig.device);
+    run.guards.ramp_s = 0.02;
+    with_structure(model, rig.scheme(model), period_s, rig.device.force_limit, [&](auto structure) {
+        Observing device{Faulty{SimulatedDevice{rig.device, rig.hand, 4}, faults,
+                                3.0 * run.guards.largest_speed * period_s},
+                         run.observed};
+        EXPECT_TRUE(device.open());
+        Controller controller{device, std::move(structure),
+                              guards_of(run.guards, model, rig.scheme(model), period_s)};
+        VirtualClock clock{late};
+        Collected sink;
+        sink.file = file;
+        LoopProgress progress;
+        const std::atomic<bool> asked{false};
+        run_loop(controller, settings, clock, asked, sink, progress, *run.report);
+        run.ticks = std::move(sink.ticks);
+        return 0;
+    });
+    return run;
+}
+
+Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingFile* file = nullptr) {
+    LoopSettings settings;
+    settings.duration_s = duration_s;
+    return render(faults, settings, file);
+}
+
+/// What holds whatever goes wrong.
+void expect_safe(const Rendering& run) {
+    const double step = slew_limit(run.guards, period_s).largest_step;
+    double last = 0.0;
+    for (const TickRecord& tick : run.ticks) {
+        ASSERT_TRUE(std::isfinite(tick.force));
+        ASSERT_LE(std::abs(tick.force), run.guards.force_limit);
+        if (sends_force(tick.status)) {
+            ASSERT_LE(std::abs(tick.force - last), step * (1.0 + 1e-12));
+        } else {
+            ASSERT_EQ(tick.force, 0.0) << text(tick.status).word;
+        }
+        last = tick.force;
+    }
+    ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);  // the first sample, and the last zero
+    for (std::size_t k = 0; k < run.ticks.size(); ++k) {
+        ASSERT_EQ(run.observed.forces[k + 1], run.ticks[k].force);
+    }
+    ASSERT_EQ(run.observed.forces.front(), 0.0);
+    ASSERT_EQ(run.observed.forces.back(), 0.0);
+    ASSERT_TRUE(run.observed.closed);
+}
+
+TEST(Faults, ARunWithoutThemIsOrderly) {
+    const Rendering run = render({}, 2.0);
+    expect_safe(run);
+    EXPECT_EQ(run.report->ending, Ending::TimeUp);
+    EXPECT_EQ(run.ticks.size(), 2000U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ramp)], 20U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ok)], 1980U);
+    const auto largest = std::max_element(run.ticks.begin(), run.ticks.end(),
+                                          [](const auto& a, const auto& b) { return a.force < b.force; });
+    EXPECT_GT(largest->force, 2.0);
+}
+
+// A force that stood longer than its certificate allows for has left it, whatever comes next.
+TEST(Faults, ATickLaterThanCertifiedEndsTheRunWithZeroForceAndSaysSo) {
+    LoopSettings settings;
+    settings.duration_s = 1.0;
+    settings.longest_period_s = 1.5e-3;
+    const Rendering punctual = render({}, settings, nullptr, {400, 499'000});
+    EXPECT_EQ(punctual.report->ending, Ending::TimeUp);
+    const Rendering late = render({}, settings, nullptr, {400, 501'000});
+    expect_safe(late);
+    EXPECT_EQ(late.report->ending, Ending::NotCertified);
+    EXPECT_FALSE(is_orderly(late.report->ending));
+    ASSERT_EQ(late.ticks.size(), 400U) << "the late tick makes no force";
+    EXPECT_GT(late.ticks.back().force, 0.1);
+    EXPECT_EQ(
+        ending_text(*late.report, settings),
+        "stopped because a tick came 1.501 ms after the one before: the certificate holds up to 1.5 ms");
+}
+
+struct Expected {
+    FaultKind kind;
+    Status status;
+    Ending ending;
+};
+
+TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
+    // 0.4 s: the hand is on its way, the force far from zero.
+    for (const Expected& expected :
+         std::vector<Expected>{{FaultKind::Late, Status::Timeout, Ending::TimeUp},
+                               {FaultKind::Lost, Status::Lost, Ending::TimeUp},
+                               {FaultKind::Repeated, Status::Lost, Ending::TimeUp},
+                               {FaultKind::NotANumber, Status::NonFinite, Ending::TimeUp},
+                               {FaultKind::Jump, Status::Jump, Ending::Guard},
+                               {FaultKind::Gone, Status::Fault, Ending::DeviceFault}}) {
+        const Rendering run = render({{expected.kind, 400, 1}}, 1.0);
+        const std::string name{fault_names[static_cast<std::size_t>(expected.kind)]};
+        expect_safe(run);
+        ASSERT_GT(run.ticks.size(), 400U);
+        EXPECT_GT(run.ticks[399].force, 0.1) << name;
+        EXPECT_EQ(run.ticks[400].status, expected.status) << name;
+        EXPECT_EQ(run.ticks[400].force, 0.0) << name;
+        EXPECT_EQ(run.report->ending, expected.ending) << name;
+        if (is_final(expected.status)) {
+            EXPECT_EQ(run.ticks.size(), 401U) << name;
+        } else {
+            EXPECT_EQ(run.ticks[401].status == Status::Ok || run.ticks[401].status == Status::Limited, true)
+                << name;
+        }
+    }
+}
+
+TEST(Faults, AFrozenEncoderIsFoundWhileTheHandleMoves) {
+    const Rendering run = render({{FaultKind::Frozen, 300, 100'000}}, 1.0);
+    expect_safe(run);
+    EXPECT_EQ(run.report->ending, Ending::Guard);
+    EXPECT_EQ(run.report->status, Status::Frozen);
+    EXPECT_LE(run.ticks.size(), 300U + 52U);
+}
+
+TEST(Faults, ASaturatedMotorIsSaidAndTolerated) {
+    const Rendering run = render({{FaultKind::Saturated, 300, 50}}, 1.0);
+    expect_safe(run);
+    EXPECT_EQ(run.report->ending, Ending::TimeUp);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Limited)], 50U);
+    EXPECT_NEAR(run.ticks[320].applied, 0.5 * run.ticks[319].force, 1e-12);
+}
+
+TEST(Faults, OneSampleMoreThanToleratedEndsTheRun) {
+    for (const std::uint64_t samples : {5U, 6U}) {
+        const Rendering late = render({{FaultKind::Late, 300, samples}}, 0.5);
+        const Rendering nan = render({{FaultKind::NotANumber, 300, samples}}, 0.5);
+        EXPECT_EQ(late.report->ending, samples == 5 ? Ending::TimeUp : Ending::DeviceFault);
+        EXPECT_EQ(nan.report->ending, samples == 5 ? Ending::TimeUp : Ending::Guard);
+    }
+}
+
+TEST(Faults, LostAndRepeatedSamplesAreCounted) {
+    const Rendering run =
+        render({{FaultKind::Lost, 100, 3}, {FaultKind::Repeated, 200, 2}, {FaultKind::Late, 300, 2}}, 0.5);
+    EXPECT_EQ(run.report->lost_samples, 3U);
+    EXPECT_EQ(run.report->repeated_samples, 2U);
+    EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Timeout)], 2U);
+}
+
+/// A folder of its own that is gone afterwards.
+class Scratch {
+  public:
+    Scratch()
+        : path_{std::filesystem::temp_directory_path() / ("palpate-faults-" + std::to_string(::getpid()))} {
+        std::filesystem::create_directories(path_);
+    }
+    ~Scratch() { std::filesystem::remove_all(path_); }
+    Scratch(const Scratch&) = delete;
+    Scratch& operator=(const Scratch&) = delete;
+    [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
+
+  private:
+    std::filesystem::path path_;
+};
+
+std::size_t rows_of(const std::string& name) {
+    std::ifstream stream{name};
+    std::size_t rows = 0;
+    for (std::string line; std::getline(stream, line);) {
+        rows += line.empty() || line[0] == '#' || line.rfind("time_s", 0) == 0 ? 0 : 1;
+    }
+    return rows;
+}
+
+TEST(Faults, InAnyOrderTheForceStaysSafeAndTheRecordIsComplete) {
+    test::Random random{20};
+    const Scratch scratch;
+    const int wanted = test::cases(100);
+    int done = 0;
+    for (int number = 0; done < wanted; ++number) {
+        std::vector<Fault> faults;
+        std::uint64_t at = 20;
+        while (at < 480) {
+            at += static_cast<std::uint64_t>(test::uniform(random, 1.0, 120.0));
+            const auto kind = static_cast<FaultKind>(static_cast<int>(test::uniform(random, 0.0, 8.0)));
+            const auto samples = static_cast<std::uint64_t>(test::uniform(random, 1.0, 9.0));
+            faults.push_back({kind, at, kind == FaultKind::Frozen ? 80 : samples});
+            at += faults.back().samples;
+        }
+        const std::string name = scratch.file("felt" + std::to_string(number % 50) + ".csv");
+        RecordingFile file;
+        ASSERT_EQ(file.open(name, {}, {{"model", "spring"}}, true), "");
+        const Rendering run = render(faults, 0.5, &file);
+        expect_safe(run);
+        if (HasFatalFailure()) {
+            for (const Fault& fault : faults) {
+                std::cerr << fault_names[static_cast<std::size_t>(fault.kind)] << "@" << fault.exchange << "x"
+                          << fault.samples << "\n";
+            }
+            return;
+        }
+        const std::size_t ticks = run.ticks.size();
+        for (const Fault& fault : faults) {
+            if (fault.exchange >= ticks) {
+                break;
+            }
+            ++done;
+            if (fault.kind != FaultKind::Frozen && fault.kind != FaultKind::Saturated) {
+                EXPECT_EQ(run.ticks[fault.exchange].force, 0.0)
+                    << fault_names[static_cast<std::size_t>(fault.kind)] << " at " << fault.exchange;
+            }
+            if (fault.kind == FaultKind::Gone || fault.kind == FaultKind::Jump) {
+                EXPECT_EQ(ticks, fault.exchange + 1);
+            }
+        }
+        const bool bad_end = !sends_force(run.report->status);
+        EXPECT_EQ(is_orderly(run.report->ending), ticks == 500 && !is_final(run.report->status));
+        EXPECT_TRUE(is_orderly(run.report->ending) || bad_end);
+        EXPECT_EQ(file.finish(ending_text(*run.report, {}), "virtual"), "");
+        EXPECT_EQ(rows_of(name), ticks);
+    }
+}
+
+TEST(FaultScript, IsReadFromTheCommandLine) {
+    const Fault fault = parse_fault("frozen@1.5x200", 1e-3);
+    EXPECT_EQ(fault.kind, FaultKind::Frozen);
+    EXPECT_EQ(fault.exchange, 1500U);
+    EXPECT_EQ(fault.samples, 200U);
+    EXPECT_EQ(parse_fault("late@0", 1e-3).samples, 1U);
+    for (const char* wrong :
+         {"", "late", "late@", "late@x3", "late@-1", "late@1x", "late@1xa", "soft@1", "late@nan"}) {
+        EXPECT_THROW((void)parse_fault(wrong, 1e-3), std::invalid_argument) << wrong;
+    }
+}
+
+}  // namespace
+}  // namespace palpate

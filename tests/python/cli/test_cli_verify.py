@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate verify and palpate show: numbers, figures, and what is said of a model file that is wrong."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate import Recording, load_model, read_recording, verify
+from palpate.cli.main import main
+from palpate.cli.pictures import close_loops, picture_closed_loops, picture_verification
+
+JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated"]
+JSON_FIELDS += ["verdict", "units"]
+UNITS = {"position": "rad", "force": "N*m"}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a model, and a recording that it explains to within some noise."""
+    monkeypatch.chdir(tmp_path)
+    model = model_by_hand()
+    model.save("m.json")
+    random = np.random.default_rng(0)
+    time = np.arange(2000) * 1e-3
+    position = 0.25 - 0.25 * np.cos(2 * np.pi * time)
+    force = model.force(position) + random.normal(0.0, 0.01, time.size)
+    Recording.from_arrays(position, force, time, units=UNITS).write("a.csv")
+    return tmp_path
+
+
+def test_numbers_go_to_standard_output_and_talk_to_standard_error(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", "m.json", "a.csv"]) == 0
+    shown = capsys.readouterr()
+    assert shown.err.startswith("read a.csv: 2000 rows; position is position_rad")
+    assert [line.split()[0] for line in shown.out.splitlines()][:5] == [
+        "verdict:",
+        "nrmse",
+        "rmse",
+        "r2",
+        "worst",
+    ]
+    assert "fresh" in shown.out
+
+
+def test_json_is_one_object_with_the_fields_of_the_contract(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", "m.json", "a.csv", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert list(result) == JSON_FIELDS
+    expected = verify(load_model("m.json"), read_recording("a.csv"))
+    assert result["nrmse"] == expected.nrmse
+    assert result["fresh"] is True
+    assert result["n"] == 2000
+    assert result["units"] == UNITS
+
+
+def test_a_verdict_of_no_ends_with_exit_code_1_and_names_the_cure(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", "m.json", "a.csv", "--negate", "force"]) == 1
+    assert capsys.readouterr().out.startswith("verdict: no\n")
+    assert main(["verify", "m.json", "a.csv", "--negate", "force", "--json"]) == 1
+    verdict = json.loads(capsys.readouterr().out)["verdict"]
+    assert verdict.startswith("no: the NRMSE on 2000 rows is ")
+    assert "give --negate force" in verdict
+
+
+def test_both_figures_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["verify", "m.json", "a.csv", "--plot", "a.png", "--plot-closed-loop", "b.pdf"]
+    assert main(arguments) == 0
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("b.pdf").read_bytes().startswith(b"%PDF")
+    assert "force-driven, explicit, m = 0.001, B_o = 0.5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("metadata", "name"), [({"simulated": "yes"}, "simulated data"), ({}, "measured")])
+def test_a_simulated_recording_is_never_called_measured(
+    metadata: dict[str, str], name: str, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = replace(read_recording("a.csv"), metadata=metadata)
+    model = load_model("m.json")
+    legends: list[str] = []
+    savefig = Figure.savefig
+
+    def looked_at(figure: Figure, *arguments: Any, **options: Any) -> None:
+        shown = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+        legends.extend(text.get_text() for legend in shown if legend for text in legend.get_texts())
+        savefig(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", looked_at)
+    picture_verification(Path("a.png"), model, [(recording, verify(model, recording))])
+    assert legends == [name, "model"]
+    legends.clear()
+    picture_closed_loops(Path("b.png"), recording, close_loops(model, recording))
+    assert set(legends) == {"recorded (simulated)" if metadata else "recorded", "rendered"}
+
+
+def test_a_recording_with_strokes_is_drawn(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    switch = keyswitch_by_hand()
+    switch.save("k.json")
+    direction = np.repeat([1, 0, -1], 100)
+    position = np.concatenate([np.linspace(0, 0.004, 100), np.full(100, 0.004), np.linspace(0.004, 0, 100)])
+    force = switch.force(position, direction=direction.astype(float))
+    units = {"position": "m", "force": "N"}
+    Recording.from_arrays(position, force, direction=direction, units=units).write("k.csv")
+    assert main(["verify", "k.json", "k.csv", "--plot", "k.png", "--plot-closed-loop", "l.png"]) == 0
+    shown = capsys.readouterr()
+    assert "assumed" in shown.err, "a stroke speed that nobody measured is called assumed"
+    assert Path("k.png").exists()
+    assert Path("l.png").exists()
+
+
+def test_the_files_may_not_be_written_over(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["verify", "m.json", "a.csv", "--plot", "a.png", "--plot-closed-loop", "a.png"]
+    assert main(arguments) == 2
+    assert "two results" in capsys.readouterr().err
+
+
+def test_units_that_do_not_fit_are_one_sentence(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    keyswitch_by_hand().save("k.json")
+    assert main(["verify", "k.json", "a.csv", "--json"]) == 2
+    assert "the model's position is in m" in json.loads(capsys.readouterr().out)["error"]
+
+
+def changed(content: dict[str, Any], path: str, value: Any) -> str:
+    """A model file with one field changed; `value` None takes it away."""
+    *parents, last = path.split(".")
+    place = content
+    for name in parents:
+        place = place[name]
+    if value is None:
+        del place[last]
+    else:
+        place[last] = value
+    return json.dumps(content)
+
+
+BAD_FIELDS = {
+    "missing field": ("network.bias", None, "network.bias"),
+    "alpha <= 0": ("network.alpha", [[-20.0]], "-20"),
+    "unknown version": ("version", 99, "99"),
+    "unknown key": ("colour", "red", "colour"),
+    "another format": ("format", "stone-tablet", "stone-tablet"),
+    "wrong shape": ("network.weight", [0.1, 0.2], "network.weight"),
+}
+
+
+@pytest.mark.parametrize("verb", ["show bad.json", "simulate bad.json", "verify bad.json a.csv"])
+@pytest.mark.parametrize("case", BAD_FIELDS)
+def test_a_bad_model_is_one_sentence_that_names_the_field(
+    case: str, verb: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, value, expected = BAD_FIELDS[case]
+    Path("bad.json").write_text(changed(json.loads(Path("m.json").read_text()), path, value))
+    assert main(verb.split()) == 2
+    shown = capsys.readouterr()
+    sentence = shown.err.splitlines()[-1]
+    assert sentence.startswith("error: bad.json")
+    assert expected in sentence
+    assert shown.out == ""
+
+
+@pytest.mark.parametrize("content", ["", "not json", "[1, 2", "NaN", '{"format": NaN}'])
+def test_a_model_that_is_no_json_is_one_sentence(
+    content: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("bad.json").write_text(content)
+    assert main(["show", "bad.json"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: bad.json")
+    assert error.count("\n") == 1
+
+
+def test_show_prints_the_model_for_a_person(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", "m.json"]) == 0
+    assert capsys.readouterr().out == f"{model_by_hand()}\n"

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a terminal gets: lines wrapped between words, no control characters from outside, progress, Ctrl-C."""
+
+import ast
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate import Recording, identify, load_model
+from palpate.cli.main import main
+from palpate.cli.printing import visible
+from palpate.cli.progress import Progress
+from palpate.identification.progress import reporting_to
+from test_cli_identify import spring
+
+CLI = Path(__file__).parents[3] / "python" / "palpate" / "cli"
+
+Terminal = Callable[..., str]
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Run something with a terminal of some width as standard output and error; what the terminal got."""
+
+    def run(work: Callable[[], object], columns: int = 80) -> str:
+        keyboard, screen = pty.openpty()
+        got = bytearray()
+
+        def read() -> None:
+            while True:
+                try:
+                    part = os.read(keyboard, 65536)
+                except OSError:  # the other end is closed
+                    return
+                got.extend(part)
+
+        reading = threading.Thread(target=read)
+        reading.start()
+        with os.fdopen(screen, "w") as stream, monkeypatch.context() as patched:
+            patched.setenv("COLUMNS", str(columns))
+            patched.setattr(sys, "stdout", stream)
+            patched.setattr(sys, "stderr", stream)
+            work()
+        reading.join()
+        os.close(keyboard)
+        return got.decode().replace("\r\n", "\n")
+
+    return run
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    spring(tmp_path / "a.csv")
+    model_by_hand().save("m.json")
+    keyswitch_by_hand().save("k.json")
+    return tmp_path
+
+
+@pytest.mark.parametrize("columns", [80, 40])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["identify", "a.csv", "-o", "o.json", "--hold-out-every", "5", "--baselines"],
+        ["verify", "m.json", "a.csv", "--plot-closed-loop", "a.png"],
+        ["plan", "m.json", "--device", "bench-knob"],
+        ["plan", "k.json", "--device", "bench-knob"],
+        ["plan", "--examples"],
+        ["simulate", "k.json", "--duration-s", "0.1"],
+        ["devices"],
+        ["show", "m.json"],
+        ["show", "k.json"],
+        ["show", "m.json", "--beside", "m.json"],
+        ["show", "no-such-file-in-this-folder.json"],
+        ["verify", "m.json"],
+    ],
+    ids=" ".join,
+)
+def test_no_word_is_broken_at_the_edge_of_a_terminal(
+    arguments: list[str], columns: int, here: Path, terminal: Terminal
+) -> None:
+    shown = terminal(lambda: main(arguments), columns)
+    assert "Traceback" not in shown
+    # Only a word that is longer than the terminal is wide may go over its edge.
+    assert [line for line in shown.splitlines() if len(line) > columns and len(line.split()) > 1] == []
+
+
+def test_a_message_is_one_line_where_there_is_no_terminal(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = "a rather long name of a file that is not there, " * 3 + ".json"
+    assert main(["show", name]) == 2
+    assert capsys.readouterr().err == f"error: there is no file {name}\n"
+
+
+EVIL = "\x1b[2J\x1b]0;owned\x07\u202e\x9b31m"
+"""Clears a screen, names its window, turns the writing round."""
+
+
+def forbidden(text: str) -> list[str]:
+    return [c for c in text if not c.isprintable() and c not in "\n"]
+
+
+@pytest.mark.parametrize("arguments", [["-o", "o.json"], ["-o", f"o{EVIL}.json"]], ids=["column", "file"])
+def test_control_characters_of_names_do_not_reach_the_terminal(
+    arguments: list[str], here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("evil.csv").write_text(
+        f"position{EVIL}_rad,torque{EVIL}_Nm\n" + "".join(f"{k},{2 * k}\n" for k in range(40)),
+        encoding="utf-8",
+    )
+    main(["identify", "evil.csv", "--position", f"position{EVIL}_rad", *arguments])
+    main(["identify", f"{EVIL}.csv", "-o", "x.json"])
+    main(["identify", "a.csv", "-o", "x.json", "--force", EVIL])
+    main([f"sh{EVIL}ow"])
+    main(["show", f"{EVIL}.json", "--json"])
+    shown = capsys.readouterr()
+    assert "\\x1b[2J" in shown.err
+    assert forbidden(shown.out + shown.err) == []
+
+
+def test_control_characters_of_a_model_do_not_reach_the_terminal(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = Path("m.json").read_text(encoding="utf-8")
+    Path("m.json").write_text(text.replace("by-hand", "by-\\u001b[2J\\nverdict: good-hand"), encoding="utf-8")
+    assert load_model("m.json").data.files[0].startswith("by-\x1b")
+    main(["show", "m.json"])
+    main(["show", "m.json", "--json"])
+    shown = capsys.readouterr()
+    assert "by-\\x1b[2J\\nverdict" in shown.out
+    assert forbidden(shown.out + shown.err) == []
+
+
+def test_printable_text_of_any_language_is_left_alone() -> None:
+    for text in ("Größe.csv", "力_N", "0.1 µm ± 3 %", "Ω·m²"):
+        assert visible(text) == text
+
+
+def test_only_constant_text_is_printed_without_being_escaped() -> None:
+    for file in CLI.glob("*.py"):
+        if file.name == "printing.py":
+            continue
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "click.echo":
+                assert all(isinstance(each, ast.Constant) for each in node.args), (
+                    f"{file.name}: {node.lineno}"
+                )
+
+
+def test_progress_overwrites_one_line_of_a_terminal_and_removes_it(terminal: Terminal) -> None:
+    def work() -> None:
+        shown = Progress("identifying")
+        for n in range(3):
+            time.sleep(0.11)
+            shown(f"position, {n} wavelets")
+        shown.clear()
+
+    got = terminal(work)
+    assert "\n" not in got
+    assert [f"position, {n} wavelets" in got for n in range(3)] == [True] * 3
+    assert got.endswith(f"\r{'':<79}\r")
+
+
+def test_progress_prints_nothing_soon_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = Progress("identifying")
+    shown("position, 1 wavelets")
+    assert capsys.readouterr().err == ""
+
+
+def test_identification_reports_every_network_that_it_tries(here: Path) -> None:
+    tried: list[tuple[str, int]] = []
+    with reporting_to(lambda name, n: tried.append((name, n))):
+        identify(Recording.from_arrays([0.1 * k for k in range(100)], [abs(k - 50.0) for k in range(100)]))
+    assert ("position", 0) in tried
+    assert ("position", 1) in tried
+
+
+def test_ctrl_c_ends_a_long_computation_of_a_library_at_once() -> None:
+    code = (
+        "import click, numpy as np\n"
+        "from palpate.cli.ending import interrupted_at_once\n"
+        "with interrupted_at_once():\n"
+        "    matrix = np.random.default_rng(0).normal(size=(4000, 4000))\n"
+        "    print('begins', flush=True)\n"
+        "    np.linalg.svd(matrix)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begins\n"
+        time.sleep(0.5)
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+        # The computation alone takes a minute; 0.2 s are meant, and other tests run at the same time.
+        assert time.monotonic() - began < 3.0
+    assert process.returncode == 130
+    assert told == "error: interrupted; nothing was written\n"

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""C++ and Python agree: the same networks and positions through a C++ program and through the package."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from conftest import ROOT
+from palpate._core.model import ForceModel
+
+Array = NDArray[np.float64]
+
+NETWORKS = 1000 * int(os.environ.get("PALPATE_TEST_SCALE", "1"))
+CONTINUATIONS = ("linear", "free")
+TOLERANCE = 1e-12
+"""Of the sum of the absolute terms."""
+
+DIFFICULT = [0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, -2e-310, 1e300, -1e300, np.finfo(float).max]
+
+
+@dataclass
+class Case:
+    """A network over [lower, upper], and where it is asked."""
+
+    alpha: Array
+    beta: Array
+    weight: Array
+    linear: float
+    bias: float
+    lower: float
+    upper: float
+    below: int
+    above: int
+    x: Array
+
+    def stream(self) -> bytes:
+        """As forces.cpp reads it."""
+        head = [len(self.alpha), len(self.x), self.linear, self.bias, self.lower, self.upper]
+        parts = [[*head, self.below, self.above], self.alpha, self.beta, self.weight, self.x]
+        return np.concatenate(parts).astype(np.float64).tobytes()
+
+    def model(self) -> ForceModel:
+        return ForceModel(
+            alpha=self.alpha[:, None],
+            beta=self.beta[:, None],
+            weight=self.weight,
+            linear=[self.linear],
+            bias=self.bias,
+            lower=[self.lower],
+            upper=[self.upper],
+            below=CONTINUATIONS[self.below],
+            above=CONTINUATIONS[self.above],
+        )
+
+
+def cases() -> Iterator[Case]:
+    random = np.random.default_rng(17)
+    for _ in range(NETWORKS):
+        size = int(random.integers(0, 65))
+        travel = 10.0 ** random.uniform(-6, 3)
+        lower = travel * random.uniform(-2, 1)
+        x = lower + travel * random.uniform(-0.2, 1.2, 8)
+        # everything that a double can be, in every network a few
+        bits = random.integers(-(2**63), 2**63 - 1, 4, dtype=np.int64).view(np.float64)
+        yield Case(
+            np.exp(random.uniform(0.0, 5.0, size)) / travel,
+            lower + travel * random.uniform(-0.1, 1.1, size),
+            10.0 ** random.uniform(-3, 6, size) * random.choice([-1.0, 1.0], size),
+            random.uniform(-10, 10) / travel,
+            random.uniform(-1, 1),
+            lower,
+            lower + travel,
+            *(int(k) for k in random.integers(0, 2, 2)),
+            x=np.concatenate(
+                [x, random.choice(DIFFICULT, 4), bits, lower + travel * random.uniform(0, 1, 2)]
+            ),
+        )
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """forces.cpp, compiled as anybody would: the include folder and C++20."""
+    compiler = shutil.which(os.environ.get("CXX", "c++"))
+    if compiler is None:
+        pytest.skip("needs a C++ compiler")
+    path = tmp_path_factory.mktemp("program") / "forces"
+    source = ROOT / "tests" / "python" / "forces.cpp"
+    command = [compiler, "-std=c++20", "-O2", f"-I{ROOT / 'cpp' / 'include'}", source, "-o", path, "-pthread"]
+    subprocess.run(command, check=True)
+    return path
+
+
+def sizes(case: Case) -> Array:
+    """What a rounding error is measured against: sums of absolute terms of force, slope and energy, (3,)."""
+    weight, c = np.abs(case.weight), abs(case.linear)
+    reach = max(abs(case.lower), abs(case.upper))
+    return np.array(
+        [
+            2.0 * weight.sum() + c * reach + abs(case.bias),
+            2.0 * (weight * case.alpha).sum() + c,
+            (weight / case.alpha).sum() + (c * reach + abs(case.bias)) * reach,
+        ]
+    )
+
+
+def test_force_slope_and_energy_are_the_same_in_cpp_and_python(program: Path) -> None:
+    given = list(cases())
+    stream = b"".join(case.stream() for case in given)
+    out = subprocess.run([program], input=stream, stdout=subprocess.PIPE, check=True).stdout
+    rows = iter(np.split(np.frombuffer(out).reshape(-1, 3), np.cumsum([len(case.x) for case in given])[:-1]))
+    for case in given:
+        expected, model, size = next(rows), case.model(), sizes(case)
+        quantities = (model.force, model.slope, model.energy)
+        batch = np.stack([quantity(case.x) for quantity in quantities], axis=1)
+        single = np.array([[quantity(float(x)) for quantity in quantities] for x in case.x])
+        for python in (batch, single):
+            with np.errstate(invalid="ignore", over="ignore"):
+                near = np.abs(python - expected) <= TOLERANCE * np.maximum(size, np.abs(expected))
+            same = near | (python == expected) | (np.isnan(python) & np.isnan(expected))
+            assert same.all(), (case, python[~same], expected[~same])
+
+
+def test_inside_the_domain_both_are_equation_4(program: Path) -> None:
+    for case in list(cases())[: NETWORKS // 4]:
+        x = case.x[(case.x >= case.lower) & (case.x <= case.upper)]
+        u = case.alpha * (x[:, None] - case.beta)
+        plain = ((u**2 - 1.0) * np.exp(-0.5 * u**2)) @ case.weight + case.linear * x + case.bias
+        # an error of rounding in u is one of alpha eps |x| in the argument
+        reach = max(abs(case.lower), abs(case.upper))
+        size = sizes(case)[0] + sizes(case)[1] * reach
+        assert np.abs(case.model().force(x) - plain).max(initial=0.0) <= TOLERANCE * size

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Velocity, mass, damping and hysteresis are found where they are, and nowhere else."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate import Recording, identify, read_recording, verify
+from palpate._core.model import play
+from palpate.recording import sample_force
+from palpate.recording.motion import (
+    LowPass,
+    acceleration,
+    acceleration_of,
+    pieces,
+    quiet_low_pass,
+    velocity,
+    velocity_of,
+)
+
+SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
+DRAWS = 100 if SCALE > 1 else 2
+ALLOWED_SURPRISES = 5 if SCALE > 1 else 0
+
+ENCODER_STEP = 2.0 * np.pi / 65536
+NOISE = 0.02
+
+
+def moved(
+    seed: int, *, seconds: float = 10.0, mass: float = 0.0, damping: float = 0.0, hysteresis: float = 0.0
+) -> Recording:
+    """The sample's object with more to it: a hand that sweeps at 0.2 to 2 Hz, encoder and noise as there."""
+    random = np.random.default_rng(seed)
+    time = np.arange(round(seconds * 1000)) * 1e-3
+    wander = np.sin(2.0 * np.pi * (0.31 * time[:, None] * [0.1, 0.23, 0.41] + random.uniform(0, 1, 3)))
+    phase = 2.0 * np.pi * 1e-3 * np.cumsum(0.2 * 10.0 ** ((1.0 + wander.mean(axis=1)) / 2.0))
+    x = 0.1345 + 0.3345 * np.sin(phase)
+    v = np.gradient(x, time)
+    force = sample_force(x) + mass * np.gradient(v, time) + damping * v
+    if hysteresis:
+        force = force + hysteresis * np.clip((x - play(x, 0.005)) / 0.005, -1.0, 1.0)
+    return Recording.from_arrays(
+        np.round(x / ENCODER_STEP) * ENCODER_STEP,
+        force + random.normal(0.0, NOISE, len(x)),
+        time=time,
+        units={"position": "rad", "force": "N*m"},
+    )
+
+
+def test_mass_and_damping_are_recovered_from_a_minute_of_motion() -> None:
+    for seed in range(1 if SCALE == 1 else 20):
+        model = identify(moved(seed, seconds=60.0, mass=1e-3, damping=0.06))
+        assert (model.kind, model.fit.rung) == ("position", "mass and damping")
+        assert model.mass == pytest.approx(1e-3, rel=0.05)
+        assert model.damping == pytest.approx(0.06, rel=0.05)
+        fresh = verify(model, moved(seed + 1000, mass=1e-3, damping=0.06))
+        assert fresh.rmse == pytest.approx(NOISE, rel=0.03)
+        assert fresh.n < 10_000
+
+
+@pytest.mark.parametrize(
+    ("there", "rung", "kind"),
+    [
+        ({}, "position", "position"),
+        ({"damping": 0.03}, "velocity", "position"),
+        ({"hysteresis": 0.1}, "hysteresis", "hysteresis"),
+        ({"hysteresis": 0.1, "damping": 0.03}, "velocity", "hysteresis"),
+    ],
+    ids=["neither", "velocity", "hysteresis", "both"],
+)
+def test_velocity_and_hysteresis_are_taken_where_they_are_and_nowhere_else(
+    there: dict[str, float], rung: str, kind: str
+) -> None:
+    surprises = 0
+    for draw in range(DRAWS):
+        model = identify(moved(draw, **there))
+        surprises += (model.fit.rung, model.kind) != (rung, kind)
+    assert surprises <= ALLOWED_SURPRISES
+
+
+def test_each_term_is_reported_with_what_it_gains() -> None:
+    notes = identify(moved(1, damping=0.03)).notes["identification"]
+    (taken,) = (note for note in notes if note.startswith("damping taken"))
+    assert "bic falls by" in taken
+    assert "the squared error on fresh stretches falls by" in taken
+    assert any(note.startswith("mass refused: bic ") for note in notes)
+
+
+def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None:
+    """Hunt-Crossley: f = 800 x^1.5 (1 + 1.2 v)."""
+
+    def contact(seed: int) -> Recording:
+        motion = moved(seed)
+        assert motion.time is not None
+        x = -0.002 + (motion.position + 0.2) / 0.669 * 0.012
+        time = motion.time / 8.0
+        force = 800.0 * np.maximum(x, 0.0) ** 1.5 * (1.0 + 1.2 * np.gradient(x, time))
+        noise = np.random.default_rng(seed).normal(0.0, 0.003, len(x))
+        return Recording.from_arrays(x, force + noise, time=time)
+
+    model = identify(contact(1))
+    assert (model.kind, model.inputs) == ("position_velocity", ("position", "velocity"))
+    assert (model.fit.rung, model.damping) == ("velocity", None)
+    assert verify(model, contact(2)).rmse < 0.004
+    assert any(note.startswith("velocity taken as an input") for note in model.notes["identification"])
+
+
+def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
+    """A soft joint with Coulomb and viscous friction, moved for 20 s and sampled at 100 Hz."""
+    random = np.random.default_rng(seed)
+    time = 0.01 * np.arange(2000)
+    phase = 2.0 * np.pi * 0.01 * np.cumsum(0.4 + 0.2 * np.sin(0.7 * time + random.uniform(0.0, 6.0)))
+    x = 0.5 - 0.5 * np.cos(phase)
+    v = np.gradient(x, time)
+    force = 0.2 * x + friction * ((1.0 + 0.5 * x) * np.tanh(v / 0.05) + viscous * v)
+    force = force + random.normal(0.0, 0.005, len(x))
+    return Recording.from_arrays(x, force, time, units={"position": "rad", "force": "N*m"})
+
+
+def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input() -> None:
+    """The torque of a motor that drives the joint: it has the sign of the other side."""
+    kept, held = jointed(1, -0.3).split(5)
+    model = identify(kept)
+    assert (model.fit.rung, model.inputs) == ("velocity", ("position", "velocity"))
+    result = verify(model, held)
+    assert result.nrmse < 0.1
+    assert result.n < len(held)
+    assert any("give --negate force" in reason for reason in model.verdict.reasons)
+    assert any(
+        note.startswith("velocity taken as an input: a network over position and velocity lowers")
+        for note in model.notes["identification"]
+    )
+
+
+def test_friction_that_hysteresis_explains_stays_hysteresis() -> None:
+    model = identify(jointed(1, 0.3, viscous=0.0))
+    assert model.kind == "hysteresis"
+    assert model.fit.nrmse < 0.15
+
+
+def test_noise_that_does_not_depend_on_velocity_earns_no_velocity() -> None:
+    time = 0.01 * np.arange(2000)
+    x = 0.5 - 0.5 * np.cos(2.0 * np.pi * 0.3 * time)
+    force = x + np.random.default_rng(3).normal(0.0, 0.3, len(x))
+    model = identify(Recording.from_arrays(x, force, time))
+    assert model.inputs == ("position",)
+    assert not any("as an input" in note for note in model.notes["identification"])
+
+
+def test_a_measured_relaxation_is_identified_without_velocity(data: Path) -> None:
+    """The position stands still in all rows that have a velocity."""
+    model = identify(read_recording(data / "vhb4910_viscoelastic" / "relax_stretch_6d0.csv"))
+    assert model.kind == "position"
+
+
+def test_velocity_of_split_rows_is_formed_from_all_rows() -> None:
+    whole = jointed(2, 0.3)
+    derived, known = velocity(whole)
+    kept, held = whole.split(5)
+    test_rows = np.arange(len(whole)) % 5 == 4
+    for part, rows in ((kept, ~test_rows), (held, test_rows)):
+        values, here = velocity(part)
+        np.testing.assert_array_equal(here, known[rows])
+        np.testing.assert_allclose(values, derived[rows], atol=1e-12)
+
+
+def test_velocity_of_a_range_of_rows_is_formed_from_the_rows_around_it(tmp_path: Path) -> None:
+    whole = read_recording(jointed(2, 0.3).write(tmp_path / "a.csv"), negate=("position",))
+    derived, known = velocity(whole)
+    part = read_recording(tmp_path / "a.csv", negate=("position",), rows=(800, 900))
+    values, here = velocity(part)
+    assert known[800:900].all()
+    assert here.all()
+    np.testing.assert_allclose(values, derived[800:900], atol=1e-12)
+
+
+def test_measured_joints_are_held_to_their_error(data: Path) -> None:
+    """da Vinci tools: position alone leaves 0.34 to 0.97 of the spread of the held-out rows."""
+    for name in ("tool_4_maryland_l_4__09", "tool_4_maryland_r_5__23", "tool_4_maryland_l_4__45"):
+        path = data / "davinci_grip" / f"{name}.csv"
+        for side in ("back", "front"):
+            recording = read_recording(path, position=f"{side}_angle_rad", force=f"{side}_torque_Nm")
+            kept, held = recording.split(5)
+            model = identify(kept)
+            assert model.kind == "position_velocity", name
+            assert verify(model, held).nrmse < 0.16, name
+
+
+def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float = 2e-3) -> Recording:
+    """A spring that something draws over 0.3 rad and lets back, time by time at one of the speeds."""
+    path = np.cumsum(np.repeat(speeds, [round(300 / speed) for speed in speeds])) * 1e-3
+    x = 0.3 * np.abs((path / 0.3 + 1.0) % 2.0 - 1.0)
+    time = 1e-3 * np.arange(len(x))
+    force = 3.0 * x + damping * np.gradient(x, time)
+    force = force + np.random.default_rng(seed).normal(0.0, noise, len(x))
+    return Recording.from_arrays(np.round(x / ENCODER_STEP) * ENCODER_STEP, force, time=time)
+
+
+def test_one_speed_tells_no_damping_from_hysteresis_but_two_do() -> None:
+    """v is then its sign, and a loop of constant height as likely friction."""
+    for seed in range(1 if SCALE == 1 else 20):
+        one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
+        assert (one.kind, one.damping) == ("hysteresis", None)
+        told = [note for note in one.notes["identification"] if note.startswith("velocity was not tried")]
+        assert len(told) == 1
+        assert "does not tell damping from hysteresis" in told[0]
+        two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45, 0.15, 0.15, 0.45, 0.45], damping=0.06))
+        assert two.kind == "position"
+        assert two.damping == pytest.approx(0.06, rel=0.05)
+
+
+def test_a_negative_damping_is_refused() -> None:
+    model = identify(moved(2, damping=-0.03))
+    assert model.damping is None
+    told = " ".join(model.notes["identification"])
+    assert "damping refused" in told
+    assert "it would be -0.0" in told
+
+
+def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
+    whole = moved(3, seconds=60.0, mass=2e-3, damping=0.06)
+    random = np.random.default_rng(0)
+    kept = random.uniform(size=len(whole)) > 0.03
+    kept[20_000:22_000] = False
+    kept[41_000:41_020] = False
+    assert whole.time is not None
+    some = Recording.from_arrays(whole.position[kept], whole.force[kept], time=whole.time[kept])
+    assert len(pieces(some)) >= 3
+    model = identify(some)
+    assert model.mass == pytest.approx(2e-3, rel=0.05)
+    assert model.damping == pytest.approx(0.06, rel=0.05)
+
+
+def test_several_recordings_of_one_object_are_one_regression() -> None:
+    parts = [moved(seed, seconds=20.0, mass=2e-3, damping=0.06) for seed in range(3)]
+    model = identify(parts)
+    assert model.mass == pytest.approx(2e-3, rel=0.05)
+    assert model.damping == pytest.approx(0.06, rel=0.05)
+
+
+def test_the_low_pass_delays_nothing_and_keeps_what_is_slow() -> None:
+    low_pass, period = LowPass(100.0), 1e-3
+    t = np.arange(4000) * period
+    inner = slice(low_pass.margin(period), -low_pass.margin(period))
+    for rate in (1.0, 10.0, 100.0):
+        passed = low_pass(np.sin(rate * t), period)[inner]
+        gain = 1.0 / (1.0 + (rate / 100.0) ** 2) ** 2
+        np.testing.assert_allclose(passed, gain * np.sin(rate * t)[inner], atol=0.05 * gain + 1e-3)
+    np.testing.assert_allclose(low_pass(np.full(500, 3.0), period), 3.0, rtol=1e-12)
+
+
+def test_the_derivatives_of_a_noisy_position_are_those_of_the_motion() -> None:
+    t = np.arange(20_000) * 1e-3
+    x = np.sin(4.0 * t)
+    noisy = np.round(x / 1e-4) * 1e-4
+    recording = Recording.from_arrays(noisy, noisy, time=t)
+    for derived, true in ((velocity(recording), 4.0 * np.cos(4.0 * t)), (acceleration(recording), -16.0 * x)):
+        values, known = derived
+        assert known.mean() > 0.9
+        error = values[known] - true[known]
+        assert np.sqrt(np.mean(error**2)) < 0.1 * true.std()
+
+
+def test_central_differences_have_no_phase() -> None:
+    t = np.arange(2000) * 1e-3
+    x = np.sin(30.0 * t)
+    assert abs(np.sum(velocity_of(x, 1e-3)[5:-5] * x[5:-5])) < 1e-2 * np.sum(np.abs(x)) * 30.0
+    np.testing.assert_allclose(acceleration_of(x, 1e-3)[5:-5], -900.0 * x[5:-5], rtol=1e-3, atol=1e-6)
+
+
+def test_a_position_that_is_all_noise_has_no_low_pass() -> None:
+    noise = np.random.default_rng(0).normal(size=3000)
+    recording = Recording.from_arrays(noise, noise, time=np.arange(3000.0))
+    assert quiet_low_pass(pieces(recording), order=2) is None

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stopping on rows that were kept back, rungs earned on them, and outliers."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palpate import identify
+from palpate._core.model import wavelet_columns
+from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification.evidence import Evidence
+from palpate.identification.fresh import BLOCKS, FreshRows, gain, inside, kept_back
+from palpate.identification.stopping import choice, enough, standard_error
+from palpate.recording import sample_recording
+
+
+def wall(n: int, seed: int, noise: float = 0.02) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    random = np.random.default_rng(seed)
+    x = random.uniform(0.0, 0.6, n)
+    truth = 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
+    return x, truth, truth + random.normal(0.0, noise, n)
+
+
+def test_the_one_standard_error_rule_takes_the_smallest_network_that_is_no_worse() -> None:
+    values = [500.0, 60.0, 9.0, 4.0, 5.0]
+    assert standard_error(50) == 10.0
+    assert choice("fresh", values, 50) == 2
+    assert choice("bic", values, 50) == 3
+
+
+def test_the_perceptual_rule_takes_the_first_network_that_is_not_told_apart() -> None:
+    assert choice("perceptual", [500.0, -3.0, -80.0], 50) == 1
+    assert choice("perceptual", [500.0, 30.0, 40.0], 50) == 1
+    assert enough("perceptual", -3.0)
+    assert not enough("perceptual", 3.0)
+    assert not enough("fresh", -3.0)
+
+
+def test_a_difference_is_felt_above_seven_percent_or_one_percent_of_the_largest() -> None:
+    rows = FreshRows(np.zeros((3, 1)), np.array([0.0, 1.0, 10.0]), None)
+    np.testing.assert_allclose(rows.felt(np.array([0.1, 0.1, 0.7])), [1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("criterion", ["fresh", "perceptual"])
+def test_rules_on_fresh_rows_stop_earlier_and_say_so(criterion: str) -> None:
+    x, _, y = wall(4000, 0)
+    network = fit_environment(x[:, None], y, None, IdentifyOptions(criterion=criterion))
+    plain = fit_environment(x[:, None], y)
+    assert network.stop_reason == criterion
+    assert 1 <= len(network.weight) <= len(plain.weight)
+    assert np.ptp([point.criterion for point in network.path]) > 0.0
+    fitted = [point for point in network.path if point.rung == "position"]
+    assert fitted[-1].n_wavelets <= max(point.n_wavelets for point in fitted)
+
+
+def test_fresh_stretches_of_a_motion_are_not_scattered_rows() -> None:
+    scattered, stretches = kept_back(10_000, None), kept_back(10_000, (0,))
+    assert scattered.mean() == pytest.approx(0.2)
+    assert stretches.mean() == pytest.approx(0.2)
+    assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * BLOCKS / 5
+
+
+def test_a_gain_has_an_error_of_its_own() -> None:
+    random = np.random.default_rng(0)
+    noise = random.normal(size=50_000)
+    share, error = gain(2.0 * noise, noise)
+    assert share == pytest.approx(0.75)
+    assert error < 1e-12
+    share, error = gain(random.normal(size=50_000), noise)
+    assert abs(share) < 4.0 * error
+    assert gain(np.zeros(100), np.zeros(100)) == (0.0, 0.0)
+
+
+def test_a_trimmed_gain_leaves_out_groups_at_both_ends() -> None:
+    below, above = np.full(1000, 2.0), np.ones(1000)
+    above[:60] = 100.0
+    share, error = gain(below, above)
+    assert share < -100.0
+    assert error > 0.0
+    assert gain(below, above, trim=0.1) == (pytest.approx(0.75), pytest.approx(0.0))
+
+
+def test_rows_inside_lie_within_the_range_of_the_others_in_every_input() -> None:
+    others = np.array([[0.0, 5.0], [1.0, 6.0]])
+    rows = np.array([[0.5, 5.5], [0.0, 6.0], [1.1, 5.5], [0.5, 4.9]])
+    np.testing.assert_array_equal(inside(rows, others), [True, True, False, False])
+    assert not inside(rows, others[:0]).any()
+
+
+def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
+    """One stretch that is held back goes on into a wall, where no fitted row is."""
+    n = 2000
+    x = 0.5 - 0.5 * np.cos(20.0 * np.pi * np.arange(n) / n)
+    fresh = np.flatnonzero(kept_back(n, (0,)))
+    stretches = np.split(fresh, np.flatnonzero(np.diff(fresh) > 1) + 1)
+    into_wall = stretches[len(stretches) // 2]
+    push = np.sin(np.pi * np.arange(len(into_wall)) / len(into_wall)) ** 2
+    x[into_wall] += (1.1 - x[into_wall]) * push
+    force = 0.1 * np.sin(9.0 * x) + 0.3 * x + 20.0 * np.maximum(x - 1.0, 0.0)
+    force += np.random.default_rng(0).normal(0.0, 0.002, n)
+    network = fit_environment(x[:, None], force, None, IdentifyOptions(inputs="position"), starts=[0])
+    assert network.rung == "position"
+    assert network.nrmse < 0.02
+
+
+def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def gains(_: Evidence, below: object, above: Any) -> tuple[float, float]:
+        return (1.0, 0.0) if len(above.solution.basis) <= 3 else (-1.0, 0.1)
+
+    monkeypatch.setattr(Evidence, "_fresh_gain", gains)
+    x, _, y = wall(2000, 3)
+    network = fit_environment(x[:, None], y)
+    assert (network.rung, network.stop_reason) == ("position", "held-back rows")
+    assert 1 <= len(network.weight) <= 3
+    assert sum(note.startswith("position refused: bic falls by") for note in network.notes) >= 1
+
+
+def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:
+    notes = identify(sample_recording(1, duration_s=20.0)).notes["identification"]
+    assert any(
+        note.startswith("linear taken: bic falls by ") and "fresh rows falls by" in note for note in notes
+    )
+    assert any(note.startswith("position taken: bic falls by ") for note in notes)
+
+
+@pytest.mark.parametrize("selection", ["orthogonal", "residual", "backward"])
+@pytest.mark.parametrize("refine", [True, False], ids=["refined", "frame-only"])
+def test_every_selection_finds_a_wall(selection: str, refine: bool) -> None:
+    x, _, y = wall(3000, 1)
+    network = fit_environment(x[:, None], y, None, IdentifyOptions(selection=selection, refine=refine))
+    assert network.rmse == pytest.approx(0.02, rel=0.1)
+    assert len(network.weight) <= (12 if refine else 30)
+
+
+def test_outliers_do_not_move_the_force_under_hubers_loss() -> None:
+    x, truth, y = wall(3000, 2)
+    random = np.random.default_rng(3)
+    wild = random.choice(3000, 150, replace=False)
+    y[wild] += random.uniform(-20.0, 20.0, 150)
+    order = np.argsort(x)
+
+    def error(loss: str) -> float:
+        network = fit_environment(x[:, None], y, None, IdentifyOptions(loss=loss))
+        modelled = wavelet_columns(x, network.alpha, network.beta) @ network.weight
+        modelled = modelled + network.linear[0] * x + network.bias
+        return float(np.sqrt(np.mean((modelled - truth)[order] ** 2)))
+
+    robust = error("huber")
+    assert robust < 0.01
+    assert error("squares") > 3.0 * robust
+
+
+def test_hubers_loss_costs_little_where_there_are_no_outliers() -> None:
+    x, _, y = wall(3000, 4)
+    network = fit_environment(x[:, None], y, None, IdentifyOptions(loss="huber"))
+    assert network.rmse == pytest.approx(0.02, rel=0.15)
+    assert any("were weighed down" in note for note in network.notes)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Growth ends with finer wavelets where there is no noise, or with wide ones alone, and only there."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from palpate._core.model import wavelet_columns
+from palpate._typing import Float1D
+from palpate.identification import IdentifyOptions, growth
+from palpate.identification.compression import Compressor
+from palpate.identification.frame import resolved_frame
+from palpate.identification.growth import SMOOTH, WITHOUT_NOISE, WORTH_FINER, Grown, grow
+from palpate.identification.refinement import COARSEST
+from palpate.identification.selection import Library
+from palpate.identification.separable import CORE, RESOLVED, Basis, SeparableProblem, problem_of
+
+OPTIONS = IdentifyOptions()
+
+
+def kinked(noise: float, seed: int = 0) -> SeparableProblem:
+    """Two kinks 100 samples apart."""
+    x = np.linspace(0.0, 1.0, 200)
+    y = 2.0 * np.abs(x - 0.25) - 3.0 * np.maximum(x - 0.75, 0.0)
+    y = y + np.random.default_rng(seed).normal(0.0, noise, len(x))
+    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+
+
+def grown(problem: SeparableProblem) -> Grown:
+    library = Library(problem, resolved_frame(problem, OPTIONS))
+    return grow(problem, library, Basis.empty(problem.dimension), "position", OPTIONS)
+
+
+def test_without_noise_wavelets_become_as_fine_as_a_kink_needs() -> None:
+    problem = kinked(0.0)
+    coarse = problem.finest(np.array([[0.25]]))[0, 0]
+    found = grown(problem)
+    assert problem.resolved_by == WITHOUT_NOISE
+    assert found.solution.basis.alpha.max() > 1.05 * coarse
+    assert problem.rmse(found.solution) < 1e-3
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.03])
+def test_noise_is_not_taken_for_structure(noise: float) -> None:
+    problem = kinked(noise)
+    found = grown(problem)
+    assert problem.resolved_by == OPTIONS.resolved_by
+    assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
+
+
+def over_two_inputs(
+    law: Callable[[Float1D, Float1D], Float1D], n: int, noise: float = 0.0
+) -> SeparableProblem:
+    """Rows drawn from the unit box, far apart."""
+    random = np.random.default_rng(1)
+    x = random.uniform(size=(n, 2))
+    y = law(x[:, 0], x[:, 1]) + random.normal(0.0, noise, n)
+    return problem_of(Compressor(x, y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+
+
+def smooth(x: Float1D, y: Float1D) -> Float1D:
+    return np.asarray(x**2 * np.sin(6.0 * y))
+
+
+def creased(x: Float1D, y: Float1D) -> Float1D:
+    return np.asarray(np.abs(x - 0.4) * (1.0 + y))
+
+
+def errors_between_rows(found: Grown, law: Callable[[Float1D, Float1D], Float1D]) -> Float1D:
+    x = np.random.default_rng(2).uniform(size=(2000, 2))
+    basis, (coefficients,) = found.solution.basis, found.solution.coefficients
+    wavelets = wavelet_columns(x, basis.alpha, basis.beta)
+    return np.asarray(np.column_stack([np.ones(len(x)), x, wavelets]) @ coefficients - law(x[:, 0], x[:, 1]))
+
+
+def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They err between rows that are far apart less than half as much as whatever fits these best."""
+    problem = over_two_inputs(smooth, 200)
+    found = grown(problem)
+    assert problem.rmse(found.solution) <= WORTH_FINER * RESOLVED * problem.force_range
+    assert problem.resolved_by == OPTIONS.resolved_by
+    problem.resolved_by = int(SMOOTH * 200)
+    widest = problem.finest(found.solution.basis.beta)
+    assert np.all(found.solution.basis.alpha <= np.maximum(widest, COARSEST) * (1.0 + 1e-9))
+    monkeypatch.setattr(growth, "_smooth", lambda *_: None)
+    narrow = grown(over_two_inputs(smooth, 200))
+    ours, theirs = (np.linalg.norm(errors_between_rows(each, smooth)) for each in (found, narrow))
+    assert ours < 0.5 * theirs
+
+
+def test_what_is_not_smooth_is_grown_as_if_wide_wavelets_had_not_been_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried, wide = [], growth._smooth
+    monkeypatch.setattr(growth, "_smooth", lambda *given: tried.append(wide(*given)))
+    found = grown(over_two_inputs(creased, 120))
+    assert tried == [None]
+    monkeypatch.setattr(growth, "_smooth", lambda *_: None)
+    without = grown(over_two_inputs(creased, 120))
+    assert np.array_equal(found.solution.coefficients, without.solution.coefficients)
+
+
+def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    def tried(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(growth, "_smooth", tried)
+    assert len(grown(over_two_inputs(smooth, 200, noise=0.02)).solution.basis) > 0
+
+
+def detents(noise: float, seed: int = 0) -> SeparableProblem:
+    """A knob with 20 detents of either sign, each five samples wide."""
+    random, x = np.random.default_rng(seed), np.linspace(0.0, 1.0, 300)
+    alpha, beta = np.full((20, 1), 2.0 * CORE / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
+    y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)
+    y = y + random.normal(0.0, noise, len(x))
+    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+
+
+def test_where_neighbours_agree_about_what_is_left_wavelets_become_finer() -> None:
+    problem = detents(0.1)
+    found = grown(problem)
+    assert problem.resolved_by == WITHOUT_NOISE
+    assert len(found.solution.basis) == 20
+    assert problem.rmse(found.solution) < 0.11
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_neighbours_do_not_agree_about_noise(seed: int) -> None:
+    problem = kinked(0.03, seed)
+    assert problem.likeness(grown(problem).solution) < 3.0
+    assert problem.likeness(problem.solve(Basis.empty(1))) > 10.0

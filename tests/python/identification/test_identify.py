@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""identify: the simulated sample, several recordings, and measured switches, domes and springs."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate
+from palpate import InputError, Model, Recording, identify
+from palpate._core.model import play
+from palpate.recording.sample import sample_recording
+
+SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
+
+
+@pytest.fixture(scope="module")
+def sample_model() -> Model:
+    return identify(sample_recording(1))
+
+
+def test_the_sample_needs_ten_wavelets_or_fewer_and_reaches_its_noise_on_fresh_data(
+    sample_model: Model,
+) -> None:
+    fresh = sample_recording(2)
+    error = sample_model.force(fresh.position) - fresh.force
+    assert 1 <= sample_model.n_wavelets <= 10
+    assert np.sqrt(np.mean(error**2)) <= 1.1 * 0.02
+    assert sample_model.kind == "position"
+    assert sample_model.stop_reason == "bic"
+
+
+def test_the_model_is_the_network_that_was_identified(sample_model: Model) -> None:
+    fit = sample_model.fit
+    assert fit.n_wavelets == sample_model.n_wavelets
+    assert sample_model.n_parameters == 3 * sample_model.n_wavelets + 2
+    recording = sample_recording(1)
+    error = sample_model.force(recording.position) - recording.force
+    assert fit.nrmse == pytest.approx(np.sqrt(np.mean(error**2)) / np.std(recording.force), rel=5e-3)
+    assert sample_model.domain[0][0] == recording.position.min()
+    assert sample_model.domain[1][0] == recording.position.max()
+    assert any("hysteresis refused" in note for note in sample_model.notes["identification"])
+
+
+def test_several_recordings_of_one_environment_are_identified_together() -> None:
+    x = np.linspace(0.0, 1.0, 300)
+    random = np.random.default_rng(0)
+    noisy = np.maximum(x - 0.4, 0.0) * 5.0 + random.normal(0.0, 0.01, 300)
+    left = Recording.from_arrays(x[x < 0.6], noisy[x < 0.6])
+    right = Recording.from_arrays(x[x >= 0.6], noisy[x >= 0.6])
+    whole = identify(Recording.from_arrays(x, noisy))
+    together = identify([left, right])
+    assert together.force(0.9) == pytest.approx(whole.force(0.9), abs=1e-6)
+    assert together.data.rows == 300
+
+
+def test_play_starts_at_rest_in_every_recording() -> None:
+    """A sweep, and twenty rests elsewhere: only a new start explains that a rest lies between the strokes."""
+    random = np.random.default_rng(1)
+    t = np.linspace(0.0, 4.0 * np.pi, 1600)
+    x = 0.5 - 0.5 * np.cos(t)
+    sliding = np.clip((x - play(x, 0.01)) / 0.01, -1.0, 1.0)
+    y = x + 0.2 * sliding + random.normal(0.0, 0.01, len(t))
+    recordings = [Recording.from_arrays(x, y, time=t)]
+    for place in random.uniform(0.1, 0.9, 20):
+        rest = place + random.uniform(-1e-4, 1e-4, 40)
+        force = rest + random.normal(0.0, 0.01, 40)
+        recordings.append(Recording.from_arrays(rest, force, time=np.arange(40.0)))
+    model = identify(recordings)
+    assert model.kind == "hysteresis"
+    assert model.play_radius is not None
+    spread = np.std(np.concatenate([part.force for part in recordings]))
+    assert model.fit.nrmse * spread < 0.015
+
+
+def test_a_model_with_hysteresis_asks_for_the_direction_it_needs() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
+    direction = np.repeat([1, -1], 200)
+    model = identify(Recording.from_arrays(x, x + 0.1 * direction, direction=direction))
+    assert model.kind == "hysteresis"
+    assert model.force(0.5, direction=1.0) - model.force(0.5, direction=-1.0) == pytest.approx(0.2, abs=1e-6)
+    with pytest.raises(ValueError, match="direction"):
+        model.force(0.5)
+
+
+def test_recordings_in_different_units_are_refused() -> None:
+    x = np.linspace(0.0, 1.0, 20)
+    metres = Recording.from_arrays(x, x, units={"position": "m", "force": "N"})
+    radians = Recording.from_arrays(x, x, units={"position": "rad", "force": "N*m"})
+    with pytest.raises(InputError, match="different units"):
+        identify([metres, radians])
+
+
+def test_no_recording_and_unknown_options_are_refused() -> None:
+    with pytest.raises(InputError, match="recording is an empty list"):
+        identify([])
+    with pytest.raises(InputError, match="no option 'wavelets'; it has inputs, max_wavelets"):
+        identify(sample_recording(1, duration_s=1.0), wavelets=3)
+
+
+def test_a_period_that_is_given_is_kept() -> None:
+    x = np.linspace(0.0, 2.0 * np.pi, 400)
+    model = identify(Recording.from_arrays(x, np.sin(3.0 * x)), period=2.0 * np.pi)
+    assert model.period == 2.0 * np.pi
+    assert model.force(0.7 + 2.0 * np.pi) == pytest.approx(model.force(0.7))
+
+
+def test_control_c_leaves_identify_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("palpate.identification.growth.refine", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        identify(sample_recording(1, duration_s=2.0))
+
+
+def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
+    """Every fifth row held out; one model for both strokes."""
+    kept, held = palpate.read_recording(path).split(every=5)
+    model = identify(kept, **options)
+    assert held.direction is not None
+    rows = held.direction != 0
+    error = model.force(held.position[rows], direction=held.direction[rows].astype(float)) - held.force[rows]
+    return float(np.sqrt(np.mean(error**2)) / np.std(held.force[rows])), model
+
+
+@pytest.mark.parametrize("bounded", [True, False], ids=["h-nonnegative", "h-free"])
+@pytest.mark.parametrize(
+    ("folder", "every", "median"),
+    [("keyswitches", 4, 0.024), ("rubber_domes", 4, 0.0125), ("switch_springs", 4, 0.024)],
+)
+def test_measured_strokes_are_held_to_their_error(
+    data: Path, folder: str, every: int, median: float, bounded: bool
+) -> None:
+    """Some files of each set, more in the long run; the whole table is a benchmark's business."""
+    errors = []
+    apart = every if SCALE > 1 else 3 * every if bounded else 6 * every
+    for path in sorted((data / folder).glob("*.csv"))[::apart]:
+        nrmse, model = held_out_nrmse(path, hysteresis_nonnegative=bounded)
+        errors.append(nrmse)
+        assert nrmse <= 0.06, path.name
+        assert model.kind == "hysteresis", path.name
+        if bounded:
+            low, high = model.domain
+            x = np.linspace(low[0], high[0], 20_001)
+            h = 0.5 * (model.force(x, direction=np.ones_like(x)) - model.force(x, direction=-np.ones_like(x)))
+            assert h.min() >= -1e-9 * np.ptp(model.force(x, direction=np.ones_like(x))), path.name
+    assert np.median(errors) <= median
+
+
+@pytest.mark.parametrize(
+    "folder", ["motor_cogging", "vhb4910_viscoelastic", "afm_indentation", "magnet_attraction"]
+)
+def test_nothing_diverges_on_other_measured_files(data: Path, folder: str) -> None:
+    for path in sorted((data / folder).glob("*.csv"))[:: 3 if SCALE > 1 else 9]:
+        recording = palpate.read_recording(path)
+        model = identify(recording)
+        assert np.isfinite(model.weight).all(), path.name
+        assert model.fit.nrmse <= 1.0, path.name
+        low, high = model.domain
+        x = np.linspace(low[0], high[0], 5001)
+        if model.dimension > 1:
+            force = model.predict(np.random.default_rng(0).uniform(low, high, (5001, model.dimension)))
+        else:
+            force = model.force(x, **({"direction": np.ones_like(x)} if model.kind == "hysteresis" else {}))
+        margin = np.ptp(recording.force)
+        assert recording.force.min() - margin < force.min(), path.name
+        assert force.max() < recording.force.max() + margin, path.name

@@ -1,0 +1,358 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ladder climbs as far as the data earn it, and no further."""
+
+import os
+
+import numpy as np
+import pytest
+
+from palpate import InputError
+from palpate._core.model import wavelet_columns
+from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification.evidence import Evidence
+from palpate.identification.identified import IdentifiedNetwork
+
+LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) > 1
+DRAWS = 100 if LONG else 40
+ALLOWED_SURPRISES = 5 if LONG else 2
+
+
+def sweep(n: int, seed: int, encoder_step: float = 0.0) -> np.ndarray:
+    """A hand sweeping 0.6 rad, read by an encoder if a step is given."""
+    random = np.random.default_rng(seed)
+    phase = np.cumsum(random.uniform(0.5, 1.5, n)) * 40.0 / n
+    x = 0.3 - 0.3 * np.cos(phase)
+    return np.round(x / encoder_step) * encoder_step if encoder_step else x
+
+
+@pytest.mark.parametrize(
+    ("n", "encoder_step"), [(50, 0.0), (300, 0.0), (3000, 7.7e-4)], ids=["n50", "n300", "n3000-encoder"]
+)
+def test_a_linear_spring_with_noise_needs_no_wavelet(n: int, encoder_step: float) -> None:
+    """0 wavelets in at least 38 of 40 draws (95 of 100), whatever the noise."""
+    surprises = 0
+    for draw in range(DRAWS):
+        random = np.random.default_rng(1000 + draw)
+        x = sweep(n, draw, encoder_step)
+        noise = 10.0 ** random.uniform(-4.0, 0.0)
+        network = fit_environment(x[:, None], 3.0 * x + 0.1 + random.normal(0.0, noise, n), starts=[0])
+        surprises += len(network.weight) > 0 or network.weight_hysteresis is not None
+    assert surprises <= ALLOWED_SURPRISES
+
+
+def test_noise_about_a_level_is_a_constant() -> None:
+    random = np.random.default_rng(2)
+    network = fit_environment(sweep(500, 3)[:, None], 0.7 + random.normal(0.0, 0.1, 500))
+    assert (network.rung, network.n_parameters, len(network.weight)) == ("constant", 1, 0)
+    assert network.linear[0] == 0.0
+    assert network.bias == pytest.approx(0.7, abs=0.02)
+
+
+def test_a_force_that_never_changes_is_a_constant() -> None:
+    network = fit_environment(np.linspace(0.0, 1.0, 50)[:, None], np.full(50, 2.5))
+    assert (network.rung, network.bias, network.nrmse) == ("constant", 2.5, 0.0)
+
+
+def test_exactly_linear_data_are_linear() -> None:
+    x = np.linspace(-1.0, 2.0, 50)
+    network = fit_environment(x[:, None], 4.0 * x - 1.0)
+    assert (network.rung, len(network.weight), network.n_parameters) == ("linear", 0, 2)
+    assert (network.linear[0], network.bias) == (pytest.approx(4.0), pytest.approx(-1.0))
+
+
+@pytest.mark.parametrize("encoder_step", [0.0, 9.6e-5], ids=["exact", "encoder"])
+def test_data_without_noise_stop_growth_where_a_sensor_would_see_no_difference(encoder_step: float) -> None:
+    """What was rendered and recorded is exact: there is always a smaller error, and nobody measures it."""
+    x = sweep(3000, 6, encoder_step)
+    force = 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
+    network = fit_environment(x[:, None], force, starts=[0])
+    assert network.rung == "position"
+    assert len(network.weight) <= 12
+    assert network.rmse <= 2.0**-16 * np.ptp(force)
+
+
+def test_friction_between_strokes_earns_hysteresis_without_a_wavelet() -> None:
+    random = np.random.default_rng(4)
+    x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
+    side = np.repeat([1.0, -1.0], 200)
+    network = fit_environment(x[:, None], 2.0 * x + 0.3 * side + random.normal(0.0, 0.02, 400), side)
+    assert (network.rung, len(network.weight), network.n_parameters) == ("hysteresis", 0, 4)
+    assert network.bias_hysteresis == pytest.approx(0.3, abs=0.01)
+    assert network.play_radius is None
+
+
+def test_strokes_that_agree_do_not_earn_hysteresis_and_the_notes_say_by_how_much() -> None:
+    surprises = 0
+    for draw in range(DRAWS):
+        random = np.random.default_rng(draw)
+        x = np.concatenate([np.linspace(0.0, 1.0, 150), np.linspace(1.0, 0.0, 150)])
+        y = x + 0.3 * np.exp(-(((x - 0.5) / 0.1) ** 2)) + random.normal(0.0, 0.02, 300)
+        network = fit_environment(x[:, None], y, np.repeat([1.0, -1.0], 150))
+        surprises += network.rung != "position"
+        assert any(note.startswith("hysteresis refused: bic ") for note in network.notes) or surprises
+    assert surprises <= ALLOWED_SURPRISES
+
+
+def test_rows_without_a_direction_are_left_out_and_counted() -> None:
+    random = np.random.default_rng(6)
+    x = np.concatenate([np.linspace(0.0, 1.0, 200), np.full(30, 1.0), np.linspace(1.0, 0.0, 200)])
+    side = np.repeat([1.0, 0.0, -1.0], [200, 30, 200])
+    y = 2.0 * x + 0.3 * side + random.normal(0.0, 0.02, len(x))
+    y[side == 0] = 50.0
+    network = fit_environment(x[:, None], y, side)
+    assert network.rung == "hysteresis"
+    assert network.rmse < 0.03
+    assert "30 rows without a direction were left out to judge hysteresis" in network.notes
+
+
+def test_rows_without_a_direction_come_back_when_hysteresis_is_refused() -> None:
+    random = np.random.default_rng(6)
+    x = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 1.5, 60), np.linspace(1, 0, 200)])
+    side = np.repeat([1.0, 0.0, -1.0], [200, 60, 200])
+    network = fit_environment(x[:, None], 2.0 * x + random.normal(0.0, 0.02, len(x)), side)
+    assert network.rung == "linear"
+    assert network.upper[0] == 1.5
+    assert any("hysteresis refused" in note for note in network.notes)
+
+
+def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -> None:
+    """A periodic sweep meets each stroke at its own places, and their alternation is no force of position."""
+    random = np.random.default_rng(3)
+    cycle, sample = np.divmod(np.arange(1600), 80)
+    phase = 2.0 * np.pi * (sample + 0.25) / 80 + 0.0005 * cycle
+    x = 0.5 - 0.5 * np.cos(phase)
+    y = 0.3 * x - 0.1 * np.sign(np.sin(phase)) + random.normal(0.0, 0.002, len(x))
+    network = fit_environment(x[:, None], y, starts=[0])
+    assert network.weight_hysteresis is None
+    assert len(network.weight) <= 5
+    between = np.linspace(0.02, 0.98, 5001)
+    force = wavelet_columns(between, network.alpha, network.beta) @ network.weight
+    force = force + network.linear[0] * between + network.bias
+    assert np.abs(force - 0.3 * between).max() < 0.05
+    assert any(note.startswith("hysteresis: h >= 0 imposed") for note in network.notes)
+
+
+def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> None:
+    """Where a motion begins its hysteresis input is unknown: luck with the noise there is no gain."""
+    for draw in range(20 if not LONG else 200):
+        time = np.arange(3000) / (2000.0 + 30.0 * draw)
+        x = 1.0 - np.abs((2.0 * time) % 2.0 - 1.0)
+        noise = np.random.default_rng(draw).normal(0.0, 0.01, len(x))
+        network = fit_environment(x[:, None], 3.0 * x + noise, starts=[0])
+        (told,) = (note for note in network.notes if note.startswith("hysteresis"))
+        assert told.startswith("hysteresis refused: bic rises by ")
+
+
+@pytest.mark.parametrize(("gain", "rung"), [(0.01, "constant"), (0.03, "position")])
+def test_a_gain_on_fresh_rows_below_its_standard_error_earns_nothing(
+    gain: float, rung: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Evidence, "_fresh_gain", lambda *rungs: (gain, 0.02))
+    x = np.linspace(0.0, 1.0, 400)
+    y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
+    network = fit_environment(x[:, None], y)
+    assert network.rung == rung
+    verdict = "taken" if rung == "position" else "refused"
+    assert all(note.split()[1] == f"{verdict}:" for note in network.notes)
+    assert all(note.endswith(f"falls by {100 * gain:g} +- 2 %") for note in network.notes)
+
+
+def test_play_radius_is_found_from_the_motion_when_no_direction_is_given() -> None:
+    """f = 2 x + 0.3 s with the play of 1 % of the travel, inner loops included."""
+    random = np.random.default_rng(7)
+    t = np.linspace(0.0, 30.0, 6000)
+    x = 0.5 - 0.5 * np.cos(t) * np.abs(np.cos(0.21 * t))
+    x = (x - x.min()) / np.ptp(x)
+    radius, play = 0.01, np.empty_like(x)
+    play[0] = x[0]
+    for k in range(1, len(x)):
+        play[k] = min(x[k] + radius, max(x[k] - radius, play[k - 1]))
+    y = 2.0 * x + 0.3 * np.clip((x - play) / radius, -1.0, 1.0) + random.normal(0.0, 0.01, len(x))
+    network = fit_environment(x[:, None], y, starts=[0])
+    assert network.rung == "hysteresis"
+    assert network.play_radius == pytest.approx(0.01, rel=0.01)
+    assert network.n_parameters == 4 * len(network.weight) + 5
+    assert network.rmse == pytest.approx(0.01, rel=0.1)
+
+
+def test_parameters_are_counted_as_every_fitted_number() -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
+    network = fit_environment(x[:, None], y)
+    assert len(network.weight) > 0
+    assert network.n_parameters == 3 * len(network.weight) + 2
+    side = np.repeat([1.0, -1.0], 400)
+    both = fit_environment(np.tile(x, 2)[:, None], np.tile(y, 2) + 0.5 * side, side)
+    assert both.n_parameters == 4 * len(both.weight) + 4
+
+
+def test_every_network_on_the_way_stands_in_the_path() -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
+    network = fit_environment(x[:, None], y)
+    rungs = [point.rung for point in network.path]
+    assert rungs[:2] == ["constant", "linear"]
+    sizes = [point.n_wavelets for point in network.path if point.rung == "position"]
+    assert sizes[:-1] == list(range(len(sizes) - 1))
+    assert sizes[-1] == len(network.weight)
+    assert network.path[-1].rmse == pytest.approx(network.rmse)
+    assert network.stop_reason == "bic"
+
+
+@pytest.mark.parametrize(
+    ("force_at_contact", "below"), [(0.0, "free"), (0.4, "linear")], ids=["contact", "pulled"]
+)
+def test_below_the_domain_an_object_that_was_left_stays_left(force_at_contact: float, below: str) -> None:
+    x = np.linspace(0.0, 1.0, 100)
+    y = force_at_contact + 2.0 * x + np.random.default_rng(9).normal(0.0, 0.01, 100)
+    network = fit_environment(x[:, None], y)
+    assert (network.below, network.above) == (below, "linear")
+
+
+def test_the_result_does_not_depend_on_units() -> None:
+    x = np.linspace(0.0, 1.0, 300)
+    y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 300)
+    one = fit_environment(x[:, None], y)
+    other = fit_environment(1e-6 * x[:, None] + 3.0, 1e3 * y)
+    assert len(one.weight) == len(other.weight)
+    np.testing.assert_allclose(other.alpha, 1e6 * one.alpha, rtol=1e-2)
+    assert other.nrmse == pytest.approx(one.nrmse, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("positions", "force", "told"),
+    [
+        (np.full(20, 0.3), np.arange(20.0), "every position is 0.3"),
+        (np.arange(9.0), np.arange(9.0), "9 rows; 10 or more"),
+        (np.repeat([0.0, 1.0], 10), np.arange(20.0), "2 distinct values; 3 or more"),
+        (np.append(np.arange(19.0), np.nan), np.arange(20.0), "position in row 19 is"),
+        (np.arange(20.0), np.append(np.arange(19.0), np.inf), "force in row 19 is"),
+    ],
+    ids=["no-motion", "9-rows", "2-positions", "nan", "inf"],
+)
+def test_data_that_give_no_force_law_are_refused_in_one_sentence(
+    positions: np.ndarray, force: np.ndarray, told: str
+) -> None:
+    with pytest.raises(InputError, match=told) as refusal:
+        fit_environment(positions[:, None], force)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_named_hysteresis_needs_directions_or_time() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    with pytest.raises(InputError, match="neither both directions nor time"):
+        fit_environment(x[:, None], x, None, IdentifyOptions(inputs="position,hysteresis"))
+
+
+def test_named_inputs_decide_the_rung() -> None:
+    random = np.random.default_rng(4)
+    x = np.concatenate([np.linspace(0.0, 1.0, 100), np.linspace(1.0, 0.0, 100)])
+    side = np.repeat([1.0, -1.0], 100)
+    y = x + random.normal(0.0, 0.02, 200)
+    named = fit_environment(x[:, None], y, side, IdentifyOptions(inputs="position, hysteresis"))
+    plain = fit_environment(x[:, None], y + side, side, IdentifyOptions(inputs=("position",)))
+    assert named.rung == "hysteresis"
+    assert plain.weight_hysteresis is None
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"inputs": "velocity"}, "inputs is"),
+        ({"criterion": "aic"}, "criterion is 'aic'; it must be one of bic"),
+        ({"max_wavelets": -1}, "max_wavelets is -1"),
+        ({"max_wavelets": 2.5}, "max_wavelets is 2.5"),
+        ({"frame_scale": 1.0}, "frame_scale is 1.0"),
+        ({"coupling_stiffness": -5.0}, "coupling_stiffness is -5.0"),
+        ({"slope_bounds": (3.0, 1.0)}, r"slope_bounds is \(3.0, 1.0\)"),
+        ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allow no more than 90"),
+        ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
+        ({"period": float("nan")}, "period is nan"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_a_bad_option_is_refused_by_name_and_value(options: dict[str, object], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        IdentifyOptions(**options)  # type: ignore[arg-type]
+
+
+def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() -> None:
+    """As a recording whose time has a gap every few rows."""
+    x = np.linspace(0.0, 1.0, 600)
+    force = 2.0 * x + np.random.default_rng(5).normal(0.0, 1e-3, len(x))
+    starts = [0, *range(70, len(x), 3)]
+    network = fit_environment(x[:, None], force, starts=starts)
+    assert network.rung == "linear"
+    assert any(note.startswith("hysteresis was not tried: the motions") for note in network.notes)
+    with pytest.raises(InputError, match="inputs names hysteresis, but the motions"):
+        fit_environment(
+            x[:, None], force, starts=starts, options=IdentifyOptions(inputs=("position", "hysteresis"))
+        )
+
+
+def test_a_motion_that_never_turns_back_leaves_hysteresis_untried_and_says_so() -> None:
+    """Two magnets pulled apart: where the play is known there is one stroke, and h could be anything."""
+    x = np.linspace(0.0, 1.0, 3000)
+    force = 1e-4 / (x + 0.08) ** 4 + np.random.default_rng(7).normal(0.0, 0.005, len(x))
+    network = fit_environment(x[:, None], force, starts=[0])
+    assert network.rung == "position"
+    assert any("never turn back" in note for note in network.notes)
+    with pytest.raises(InputError, match=r"inputs names hysteresis, but .*never turn back"):
+        fit_environment(
+            x[:, None], force, starts=[0], options=IdentifyOptions(inputs=("position", "hysteresis"))
+        )
+
+
+def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A press and a release of 2 x with half the loop's height on either side."""
+    n = len(height)
+    x = np.concatenate([np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)])
+    side = np.repeat([1.0, -1.0], n)
+    noise = np.random.default_rng(seed).normal(0.0, 0.004, 2 * n)
+    return x[:, None], 2.0 * x + side * np.concatenate([height, height[::-1]]) + noise, side
+
+
+def sign_findings(network: IdentifiedNetwork) -> list[str]:
+    return [finding.sentence for finding in network.findings if "gains energy" in finding.sentence]
+
+
+def test_a_loop_that_releases_stored_energy_names_the_option_that_helps() -> None:
+    positions, force, side = loop(0.5 * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 300)))
+    network = fit_environment(positions, force, side)
+    assert network.nrmse > 0.3
+    (told,) = sign_findings(network)
+    assert "--no-hysteresis-nonnegative" in told
+    assert "--negate" not in told
+    cured = fit_environment(positions, force, side, IdentifyOptions(hysteresis_nonnegative=False))
+    assert cured.nrmse < 0.01
+    assert sign_findings(cured) == []
+
+
+def test_negate_is_named_only_where_turning_the_sign_helps() -> None:
+    positions, force, side = loop(-0.2 - 0.3 * np.linspace(0.0, 1.0, 300))
+    (told,) = sign_findings(fit_environment(positions, force, side))
+    assert "--negate force" in told
+    assert "--no-hysteresis-nonnegative" not in told
+    assert fit_environment(positions, -force, side).nrmse < 0.01
+
+
+def test_the_limit_of_wavelets_is_told_while_the_error_is_structured() -> None:
+    x = np.linspace(0.0, 1.0, 1200)
+    force = np.sin(40.0 * np.pi * x) + np.random.default_rng(0).normal(0.0, 0.02, len(x))
+
+    def told(max_wavelets: int) -> list[str]:
+        network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=max_wavelets))
+        return [finding.sentence for finding in network.findings if "limit of" in finding.sentence]
+
+    (sentence,) = told(12)
+    assert "limit of 12 wavelets" in sentence
+    assert "give --max-wavelets 48, or --period" in sentence
+    assert told(48) == []
+
+
+def test_the_limit_of_wavelets_is_not_told_where_noise_is_left() -> None:
+    x = np.linspace(0.0, 1.0, 400)
+    force = 0.3 * np.exp(-0.5 * ((x - 0.5) / 0.1) ** 2) + np.random.default_rng(0).normal(0.0, 0.05, 400)
+    network = fit_environment(x[:, None], force, None, IdentifyOptions(max_wavelets=1))
+    assert network.stop_reason == "max_wavelets"
+    assert not any("limit of" in finding.sentence for finding in network.findings)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forward orthogonal least squares is least squares, one wavelet at a time."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from palpate._core.model import wavelet_columns
+from palpate.identification.compression import Compressed, Compressor
+from palpate.identification.frame import truncated_frame
+from palpate.identification.selection import (
+    STRETCHES,
+    UNLIKE,
+    Library,
+    OrthogonalSelection,
+    orthogonal_gains,
+    select_forward,
+)
+from palpate.identification.separable import Basis, SeparableProblem, problem_of
+from palpate.identification.stopping import CRITERIA, ON_FRESH_ROWS, deviance
+
+SIDES = {"one force": None, "two strokes": 1.0, "play": 0.7}
+
+
+def rows_of(kind: str) -> Compressed:
+    random = np.random.default_rng(7)
+    x = np.tile(np.linspace(0.0, 1.0, 120), 2)
+    amplitude = SIDES[kind]
+    side = None if amplitude is None else np.repeat([1.0, -amplitude], 120)
+    y = np.sin(9.0 * x) * x + random.normal(0.0, 0.05, len(x))
+    if side is not None:
+        y = y + side * (0.3 + 0.2 * np.cos(12.0 * x))
+    return Compressor(x[:, None], y, max_positions=1000).rows(side)
+
+
+def library_of(problem: SeparableProblem, rows: Compressed) -> Library:
+    frame = truncated_frame(
+        rows.positions, coarsest=1.0, finest=32.0, frame_scale=2.0, frame_step=1.0, max_candidates=10**6
+    )
+    return Library(problem, frame)
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_gains_are_what_a_new_least_squares_would_gain(kind: str) -> None:
+    rows = rows_of(kind)
+    problem = problem_of(rows, resolved_by=5)
+    library = library_of(problem, rows)
+    start = problem.solve(Basis(np.array([[6.0]]), np.array([[0.3]])))
+    gains = OrthogonalSelection(library, start).gains()
+    np.testing.assert_allclose(orthogonal_gains(library, start), gains, rtol=1e-5, atol=1e-7 * gains.max())
+    x = np.unique(rows.positions)[:, None]
+    fixed = np.concatenate(
+        [np.ones_like(x), x, wavelet_columns(x, start.basis.alpha, start.basis.beta)], axis=1
+    )
+    before = np.linalg.qr(fixed)[0]
+    for index in np.argsort(gains)[-5:]:
+        added = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
+        direct = start.rss - problem.solve(start.basis.joined(added)).rss
+        # a library is in single precision; what the earlier columns take from a column amplifies its rounding
+        column = wavelet_columns(x, added.alpha, added.beta)[:, 0]
+        new = column - before @ (before.T @ column)
+        rounding = float(np.finfo(np.float32).eps) * (column @ column) / (new @ new)
+        assert gains[index] == pytest.approx(direct, rel=16.0 * rounding)
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_updated_factors_give_the_error_of_a_new_least_squares_along_the_whole_path(kind: str) -> None:
+    rows = rows_of(kind)
+    problem = problem_of(rows, resolved_by=5)
+    library = library_of(problem, rows)
+    path = select_forward(problem, library, max_wavelets=12, criterion="bic")
+    assert len(path.rss) == len(path.criterion) == len(path.order) + 1
+    for n in range(1, len(path.order) + 1):
+        chosen = np.array(path.order[:n])
+        direct = problem.solve(Basis(library.basis.alpha[chosen], library.basis.beta[chosen]))
+        assert path.rss[n] == pytest.approx(problem.total(direct.rss), rel=1e-6)
+    assert path.best == int(np.argmin(path.criterion))
+
+
+def test_a_candidate_that_is_already_there_gains_nothing_and_is_never_taken_twice() -> None:
+    rows = rows_of("one force")
+    problem = problem_of(rows, resolved_by=5)
+    twice = Basis(np.array([[8.0], [8.0], [3.0]]), np.array([[0.4], [0.4], [0.6]]))
+    path = select_forward(problem, Library(problem, twice), max_wavelets=5, criterion="bic")
+    assert len(path.order) == 2
+    assert 2 in path.order
+
+
+def test_selection_finds_the_wavelets_that_made_the_force() -> None:
+    x = np.linspace(0.0, 1.0, 300)
+    u, v = 16.0 * (x - 0.5), 8.0 * (x - 0.25)
+    y = 1.0 + 2.0 * x + 3.0 * (u * u - 1) * np.exp(-u * u / 2) - 2.0 * (v * v - 1) * np.exp(-v * v / 2)
+    rows = Compressor(x[:, None], y, max_positions=1000).rows()
+    problem = problem_of(rows, resolved_by=5)
+    library = library_of(problem, rows)
+    path = select_forward(problem, library, max_wavelets=2, criterion="bic")
+    chosen = {(library.basis.alpha[i, 0], library.basis.beta[i, 0]) for i in path.order}
+    assert chosen == {(16.0, 0.5), (8.0, 0.25)}
+
+
+def test_stretched_members_differ_from_a_member_in_one_dilation() -> None:
+    X = np.random.default_rng(1).uniform(size=(400, 2))
+    problem = problem_of(Compressor(X, X[:, 0], max_positions=1000).rows(), resolved_by=5)
+    round_ones = Library(
+        problem, Basis(np.array([[2.0, 2.0], [4.0, 4.0]]), np.array([[0.3, 0.5], [0.7, 0.2]]))
+    )
+    stretched = round_ones.stretched(problem, [1, 0]).basis
+    assert len(stretched) == 2 * (1 + 2 * len(STRETCHES))
+    for alpha, beta in zip(stretched.alpha, stretched.beta, strict=True):
+        own = int(np.flatnonzero((round_ones.basis.beta == beta).all(axis=1))[0])
+        changed = alpha != round_ones.basis.alpha[own]
+        assert changed.sum() <= 1
+        assert set(alpha[changed] / round_ones.basis.alpha[own][changed]) <= set(STRETCHES)
+
+
+def test_wavelets_that_are_tried_beside_each_other_are_unlike() -> None:
+    rows = rows_of("one force")
+    library = library_of(problem_of(rows, resolved_by=5), rows)
+    chosen = library.unlike(np.arange(len(library)), 8)
+    assert len(chosen) == 8
+    for first, second in itertools.combinations(chosen, 2):
+        alpha, beta = library.basis.alpha[[first, second], 0], library.basis.beta[[first, second], 0]
+        apart = abs(beta[0] - beta[1]) * np.sqrt(alpha[0] * alpha[1])
+        assert max(apart, abs(np.log(alpha[0] / alpha[1]))) > UNLIKE
+
+
+@pytest.mark.parametrize("criterion", sorted(set(CRITERIA) - set(ON_FRESH_ROWS)))
+def test_every_criterion_charges_for_parameters_and_rewards_a_smaller_error(criterion: str) -> None:
+    assert deviance(criterion, 1.0, 100, 5) < deviance(criterion, 1.0, 100, 6)
+    assert deviance(criterion, 0.9, 100, 5) < deviance(criterion, 1.0, 100, 5)
+
+
+def test_bic_charges_the_logarithm_of_the_number_of_samples() -> None:
+    assert deviance("bic", 50.0, 1000, 7) == pytest.approx(1000 * np.log(0.05) + 7 * np.log(1000))

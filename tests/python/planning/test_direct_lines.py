@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Certificates of direct rendering: wheels above the force limit, and slopes with delay."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from models_by_hand import model_by_hand
+from palpate import DeviceProfile, Model, Scheme, plan
+from palpate._core.stability import balancing_shift, certify
+from palpate.model import Fit
+from palpate.planning import profile_file
+from palpate.planning.choices import renderable_slopes
+from palpate.planning.slope_limit import limit_slopes
+from palpate.planning.static_error import static_force_error
+
+TURN = 2.0 * math.pi
+BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))
+
+
+def wheel() -> Model:
+    """A wheel with one peak of about 8 N*m; its unlimited force has no mean."""
+    model = model_by_hand(
+        alpha=[[8.0], [0.6], [0.6]],
+        beta=[[2.0], [4.5], [1.2]],
+        weight=[13.0, 1.0, 1.5],
+        linear=[0.0],
+        upper=[TURN],
+        period=TURN,
+        fit=Fit("network", "bic", 0.01, 3, 9),
+    )
+    return model.with_network(bias=model.bias + balancing_shift(model, math.inf))
+
+
+def given_in_a_turn(model: Model, force_limit: float) -> float:
+    """Energy of one slow turn: the limited force summed over fine steps [J]."""
+    x = TURN * (np.arange(100_000) + 0.5) / 100_000
+    return float(abs(np.clip(model.force(x), -force_limit, force_limit).mean()) * TURN)
+
+
+def test_a_wheel_with_a_peak_above_the_force_limit_is_no_longer_certified_as_it_is() -> None:
+    model = wheel()
+    strong = DeviceProfile(id="strong", viscous_damping=10.0, coulomb_friction=0.02, force_limit=100.0)
+    assert certify(model, Scheme(structure="direct"), strong).certified
+    limited = DeviceProfile(id="limited", viscous_damping=10.0, coulomb_friction=0.02, force_limit=5.0)
+    assert given_in_a_turn(model, 5.0) > 0.2
+    refused = certify(model, Scheme(structure="direct"), limited)
+    assert refused.refused
+    assert [line.id for line in refused.inequalities if not line.holds] == ["friction-steps"]
+
+
+def test_the_plan_balances_the_limited_force() -> None:
+    chosen = plan(wheel(), BENCH_KNOB, accept_force_error=1.0)
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert chosen.certificate.bounds.mean_force == 0.0
+    assert given_in_a_turn(chosen.rendered, BENCH_KNOB.force_limit) < 1e-6
+
+
+def bump(alpha: float, weight: float) -> Model:
+    return model_by_hand(alpha=[[alpha]], weight=[weight])
+
+
+@pytest.mark.parametrize(
+    "model", [bump(20.0, 0.5), bump(20.0, -0.5), bump(40.0, -0.2)], ids=["rises", "falls", "falls-narrow"]
+)
+@pytest.mark.parametrize("delay", [0.25, 1.0, 2.0])
+def test_with_delay_the_force_error_is_not_larger_than_with_equal_slopes(model: Model, delay: float) -> None:
+    device = DeviceProfile(
+        id="late", viscous_damping=0.01, coulomb_friction=0.01, encoder_step=1e-4, delay_s=delay * 1e-3
+    )
+    held = device.viscous_damping / device.longest_period_s
+    equal = held / (0.5 + device.late_samples)  # b >= T M / 2 + n T L, the delay in whole samples
+    scheme = Scheme(structure="direct")
+    before = limit_slopes(model, -equal, equal)
+    now = limit_slopes(model, *renderable_slopes(device, model=model))
+    assert before is not None
+    assert now is not None
+    assert certify(now, scheme, device).certified
+    errors = [static_force_error(model, limited, scheme).rms for limited in (before, now)]
+    assert errors[1] <= 1.001 * errors[0]
+
+
+def test_without_delay_a_fall_is_limited_by_friction_alone() -> None:
+    device = DeviceProfile(id="knob", viscous_damping=0.01, coulomb_friction=0.01, encoder_step=1e-4)
+    low, high = renderable_slopes(device)
+    assert low == pytest.approx(-200.0, rel=1e-4)
+    assert high == pytest.approx(20.0, rel=1e-4)
+    assert renderable_slopes(DeviceProfile(id="smooth", encoder_step=0.0))[0] == -math.inf

@@ -1,0 +1,428 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Device profiles, the ladder of the plan, its certificate in the model file, and the verb."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
+from palpate.cli.main import main
+from palpate.identification.constraints import slope_limited
+from palpate.model.certified import device_record
+from palpate.planning import example_profiles, profile_file
+from palpate.planning.root_locus import root_locus
+
+KNOB = DeviceProfile(id="knob", coulomb_friction=0.005, jitter_s=1e-4)
+WEAK = DeviceProfile(id="weak knob", viscous_damping=0.003, coulomb_friction=0.005)
+SMOOTH = DeviceProfile(id="smooth knob", encoder_step=0.0)
+
+
+def slide(viscous_damping: float) -> DeviceProfile:
+    """For key switches."""
+    return DeviceProfile(
+        id="slide",
+        position_unit="m",
+        inertia=0.05,
+        viscous_damping=viscous_damping,
+        coulomb_friction=0.2,
+        encoder_step=1e-6,
+        force_limit=20.0,
+    )
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    model_by_hand().save("m.json")
+    KNOB.save("knob.toml")
+    WEAK.save("weak.toml")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", example_profiles())
+def test_every_example_loads_under_its_name_and_says_where_its_numbers_are_from(name: str) -> None:
+    file, sources = example_profiles()[name]
+    assert DeviceProfile.load(file).id == name
+    assert profile_file(name) == file
+    told = " ".join(sources)
+    assert "data sheet" in told or "EVERY NUMBER IS AN ASSUMPTION" in told
+
+
+def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
+    again = DeviceProfile.load(KNOB.save(tmp_path / "knob.toml"))
+    assert device_record(again) == device_record(KNOB)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("period_s", "-1e-3", "period_s is -0.001"),
+        ("period_s", "nan", "period_s is nan"),
+        ("inertia", "0.0", "inertia is 0"),
+        ("viscous_damping", "-0.1", "viscous_damping is -0.1"),
+        ("coulomb_friction", "inf", "coulomb_friction is inf"),
+        ("encoder_step", "-1e-6", "encoder_step is -1e-06"),
+        ("force_step", '"fine"', "force_step is 'fine', must be a number"),
+        ("delay_s", "-1e-4", "delay_s is -0.0001, must be 0 to 16 periods"),
+        ("delay_s", "0.017", "delay_s is 0.017, must be 0 to 16 periods"),
+        ("force_limit", "0", "force_limit is 0"),
+        ("position_unit", '"deg"', "position_unit is 'deg'"),
+        ("colour", "1", "colour is not a field of a device profile"),
+        ("inertia", None, "inertia is missing"),
+        ("id", None, "id is missing"),
+    ],
+)
+def test_what_no_device_can_have_is_refused_with_file_and_field(
+    tmp_path: Path, field: str, value: str | None, sentence: str
+) -> None:
+    path = KNOB.save(tmp_path / "knob.toml")
+    kept = [line for line in path.read_text("utf-8").splitlines() if not line.startswith(f"{field} =")]
+    path.write_text("\n".join([*kept, *([] if value is None else [f"{field} = {value}"])]), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        DeviceProfile.load(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert sentence in str(refused.value)
+
+
+def test_the_simplest_structure_that_holds_is_taken() -> None:
+    chosen = plan(model_by_hand(), KNOB)
+    assert (chosen.structure, chosen.refused, chosen.limited) == ("direct", (), None)
+    assert (chosen.force_error.largest, str(chosen.verdict)) == (0.0, "good")
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+
+
+@pytest.mark.parametrize(
+    ("damping", "samples"), [(1.0, 1), (0.049, 2), (0.036, 4), (0.030, 8), (0.0278, 16), (0.027, 0)]
+)
+def test_the_prediction_takes_the_fewest_samples_that_leave_a_tick_time_to_be_late(
+    damping: float, samples: int
+) -> None:
+    """A slope of 40 needs 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; 1.25 times as much."""
+    device = DeviceProfile(viscous_damping=damping, coulomb_friction=0.02)
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    chosen = plan(model, device)
+    assert chosen.scheme.predict == samples
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert chosen.certificate.longest_period_s >= 1.25 * device.period_s
+    assert plan(model, device, predict="off").scheme.predict == 0
+
+
+def test_a_prediction_never_costs_the_network_or_the_certificate() -> None:
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    for damping in (0.0201, 0.021, 0.023):
+        chosen = plan(model, DeviceProfile(viscous_damping=damping, coulomb_friction=0.02))
+        assert (chosen.limited, chosen.refused, chosen.scheme.predict) == (None, (), 0)
+        assert chosen.certificate is not None
+        assert chosen.certificate.certified
+
+
+def test_a_late_device_that_holds_a_model_only_with_a_prediction_gets_one() -> None:
+    """A sample of delay: slopes up to 40 need 0.060 without prediction, 0.052 with one of a sample."""
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3)
+    chosen = plan(model, device)
+    assert (chosen.limited, chosen.scheme.predict, str(chosen.verdict)) == (None, 1, "good")
+    without = plan(model, device, predict="off")
+    assert without.limited is not None
+
+
+def test_a_prediction_that_was_asked_for_is_taken_or_refused_but_not_dropped() -> None:
+    model = model_by_hand(weight=[0.0], linear=[40.0])
+    assert plan(model, DeviceProfile(coulomb_friction=0.02), predict=16).scheme.predict == 16
+    weak = plan(model, DeviceProfile(viscous_damping=0.03, coulomb_friction=0.02), predict=1)
+    assert weak.verdict.level == "no"
+    assert weak.scheme.predict == 1
+    assert "b >= T B(M, s_, m) needs 0.04" in weak.refused[0]
+    assert weak.needs.startswith("needs b >= 0.04")
+    for wrong in ("on", -1, 17, 2.0, True):
+        with pytest.raises(InputError, match="predict is"):
+            plan(model, KNOB, predict=wrong)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="predict is 4: must be 0"):
+        plan(model, KNOB, predict=4, coupling=True)
+
+
+def test_a_prediction_of_a_model_with_hysteresis_keeps_its_play_radius() -> None:
+    model = keyswitch_by_hand(play_radius=1e-4)
+    firm = slide(viscous_damping=20.0)
+    chosen = plan(model, firm)
+    assert chosen.scheme.predict == 1
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert plan(model, firm, predict=0).certificate != chosen.certificate
+
+
+def test_the_verb_takes_stores_and_names_the_samples_of_a_prediction(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model_by_hand(weight=[0.0], linear=[20.0]).save("soft.json")
+    for asked, samples in (("auto", 1), ("off", 0), ("4", 4)):
+        assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", asked, "-o", "p.json"]) == 0
+        shown = capsys.readouterr().out
+        assert (f"direct, predict {samples}" in shown) == (samples > 0)
+        assert Plan.of(load_model("p.json")).scheme.predict == samples
+    assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", "some"]) == 2
+    assert "give 0 to 16, auto or off" in capsys.readouterr().err
+
+
+def test_a_weak_device_gets_a_force_whose_slope_it_holds_and_is_told_the_loss() -> None:
+    model = model_by_hand()
+    chosen = plan(model, WEAK)
+    assert chosen.structure == "direct"
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert chosen.limited is not None
+    assert chosen.refused[0].startswith("direct: viscous damping against hold and delay: ")
+    assert "short by" in chosen.refused[0]
+    limit = 2.0 * WEAK.viscous_damping / WEAK.period_s
+    x = np.linspace(0.0, 0.5, 5001)
+    assert np.gradient(model.force(x), x).max() > limit
+    rendered = chosen.rendered.force(x)
+    assert np.gradient(rendered, x).max() <= limit * (1.0 + 1e-9)
+    assert np.abs(rendered - model.force(x)).max() <= chosen.force_error.largest * 1.001
+
+
+def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
+    model = model_by_hand()
+    rendered = plan(model, WEAK).rendered
+    x = np.linspace(0.0, 0.5, 2001)
+    steep = np.gradient(model.force(x), x) > 2.0 * WEAK.viscous_damping / WEAK.period_s
+    away = np.abs(x[:, None] - x[steep]).min(axis=1) > 0.06
+    assert away.any()
+    assert np.abs(rendered.force(x) - model.force(x))[away].max() < 2e-4 * np.ptp(model.force(x))
+
+
+def test_a_switch_that_is_too_steep_where_contact_begins_is_left_alone_behind_it() -> None:
+    """Both strokes begin there with one force: h, dying out beyond the edge, would be too steep."""
+    model = keyswitch_by_hand(beta=[[0.0]], weight=[0.3], bias=0.33, bias_hysteresis=0.02)
+    weak = slide(viscous_damping=0.35)
+    chosen = plan(model, weak)
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    x = np.linspace(0.0, 0.004, 1001)
+    stick = chosen.certificate.bounds.loss_per_play
+    alone = np.ones(x.size, dtype=bool)
+    departure = np.zeros(x.size)
+    for side in (1.0, -1.0):
+        force = model.force(x, direction=side)
+        nearest = slope_limited(x, force, -np.inf, 2.0 * weak.viscous_damping / weak.period_s - stick)
+        alone &= np.abs(nearest - force) < 1e-6
+        departure = np.maximum(departure, np.abs(chosen.rendered.force(x, direction=side) - force))
+    alone = np.convolve(~alone, np.ones(61), mode="same") < 0.5  # kinks are rounded
+    assert 0.5 < alone.mean() < 0.9
+    assert departure[alone].max() < 1e-3 * np.ptp(model.force(x, direction=1.0))
+
+
+def test_press_and_release_are_rendered_with_a_play_that_is_proved() -> None:
+    chosen = plan(keyswitch_by_hand(), slide(viscous_damping=6.0))
+    assert chosen.structure == "direct"
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert 4e-6 <= chosen.scheme.play_radius <= 4e-4
+    assert chosen.certificate.inequalities[0].id == "loss-nonnegative"
+
+
+def test_a_coupling_is_taken_only_when_asked_for_and_its_spring_is_taken_out() -> None:
+    chosen = plan(model_by_hand(), SMOOTH, coupling_stiffness=100.0)
+    assert (chosen.structure, chosen.scheme.compensated) == ("massless", True)
+    assert chosen.refused[0] == "direct: a coupling was asked for"
+
+
+def test_an_object_with_mass_is_implicit_where_the_encoder_has_no_steps_and_else_stable_only() -> None:
+    assert plan(model_by_hand(), SMOOTH, mass=1e-3).structure == "implicit"
+    chosen = plan(model_by_hand(), KNOB, mass=1e-3)
+    assert chosen.structure == "explicit"
+    assert chosen.certificate is not None
+    assert chosen.certificate.verdict == "stable-locally"
+    reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
+    assert list(reasons) == ["direct", "direct, slope limited", "massless", "implicit", "energy-consistent"]
+    assert "no bound is known" in reasons["implicit"]
+
+
+def test_a_falling_object_with_mass_is_stepped_energy_consistently_because_of_the_force_limit() -> None:
+    falling = model_by_hand(weight=[0.3])
+    chosen = plan(falling, SMOOTH, mass=1e-3)
+    assert chosen.structure == "energy-consistent"
+    reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
+    assert "use the energy-consistent structure" in reasons["implicit"]
+    damped = plan(falling, SMOOTH, mass=1e-3, damping=0.01)
+    assert damped.structure == "implicit", "2 B_o / T = 20 is above its steepest fall"
+
+
+def test_the_coupling_is_softer_on_a_late_device_and_still_certified() -> None:
+    stiffness = []
+    for delay_s in (0.0, 0.5e-3, 1e-3, 2e-3):
+        chosen = plan(model_by_hand(), DeviceProfile(id="late", encoder_step=0.0, delay_s=delay_s), mass=1e-3)
+        assert chosen.structure == "implicit"
+        stiffness.append(chosen.scheme.coupling_stiffness)
+    assert stiffness == sorted(stiffness, reverse=True)
+    assert stiffness[3] < 0.3 * stiffness[0]
+
+
+def test_a_plan_is_stored_and_holds_for_its_device_alone(tmp_path: Path) -> None:
+    path = plan(model_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
+    again = Plan.of(load_model(path))
+    again.check_for(KNOB)
+    slower = DeviceProfile(id="knob", coulomb_friction=0.005, jitter_s=1e-4, period_s=2e-3)
+    for other, field in ((slower, "period_s"), (WEAK, "weak knob")):
+        with pytest.raises(InputError, match=field):
+            again.check_for(other)
+
+
+def test_an_edited_model_is_refused_when_it_is_read(tmp_path: Path) -> None:
+    path = plan(model_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["network"]["weight"][0] *= 1.0 + 1e-15
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=r"certificate\.model is .*changed after it was certified"):
+        load_model(path)
+    assert load_model(path, with_plan=False).plan is None
+
+
+def test_what_is_planned_survives_hands_on_the_device_it_was_planned_for() -> None:
+    """As proved, so simulated: the plan for a weak device keeps its error, the model itself shakes there."""
+    from palpate import Hand, simulate
+    from palpate.planning import force_error
+
+    model = model_by_hand(linear=[60.0], weight=[0.0])
+    weak = DeviceProfile(id="weak", viscous_damping=0.01, coulomb_friction=0.02)
+    hand = Hand(stiffness=15.0, damping=0.0, lower=0.02, upper=0.1)
+    chosen = plan(model, weak)
+    calm = simulate(chosen, weak, hand, 2.0)
+    shaking = simulate(Plan(model, Scheme(structure="direct")), weak, hand, 2.0)
+    jerks = [float(np.abs(np.diff(each.position, 2))[-1000:].max()) for each in (calm, shaking)]
+    assert jerks[0] < 3.0 * weak.encoder_step
+    assert jerks[1] > 100.0 * weak.encoder_step
+    as_limited = replace(chosen, model=chosen.rendered, limited=None)
+    assert force_error(as_limited, calm).end < 0.01
+
+
+def test_the_poles_are_those_of_the_step_and_leave_the_circle_where_the_certificate_says() -> None:
+    T = 1e-3
+    scheme = Scheme(
+        structure="explicit", coupling_stiffness=60.0, coupling_damping=0.01, mass=1e-3, damping=0.5
+    )
+    limit = (4.0 * 1e-3 - 2.0 * 0.51 * T) / T**2 - 60.0
+    locus = root_locus(scheme, np.array([0.5 * limit, limit, 1.001 * limit]), T)
+    reach = np.abs(locus.chosen).max(axis=1)
+    assert reach[0] < 1.0
+    assert reach[1] == pytest.approx(1.0, abs=1e-9)
+    assert reach[2] > 1.0
+    # z^2 + a z + b: b is the product, and 1 - T (B_o + B_c) / m.
+    assert np.prod(locus.chosen[0]).real == pytest.approx(1.0 - T * 0.51 / 1e-3)
+    # Where two poles meet there is a sample: the drawn path has its corner.
+    assert np.abs(np.diff(locus.poles[0], axis=-1)).min() < 1e-6
+    # The step itself, undriven: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
+    a, b = -np.sum(locus.chosen[0]).real, np.prod(locus.chosen[0]).real
+    assert a == pytest.approx(T**2 / 1e-3 * (0.5 * limit + 60.0) - 1.0 - b)
+
+
+def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "-o", "m.json", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    stored = json.loads((here / "m.json").read_text(encoding="utf-8"))
+    assert told["structure"] == "direct"
+    assert told["verdict"] == "good"
+    assert told["force_error_share"] == 0.0
+    assert told["written"] == "m.json"
+    assert (told["plan"], told["certificate"]) == (stored["plan"], stored["certificate"])
+    assert told["felt_slope"] == told["steepest_slope"]
+    for stored_line, line in zip(told["certificate"]["inequalities"], told["inequalities"], strict=True):
+        assert stored_line == {name: line[name] for name in ("id", "left", "right")}
+        assert line["margin"] == line["left"] - line["right"]
+        assert line["holds"] == (line["left"] >= line["right"])
+    assert Plan.of(load_model("m.json")).certificate is not None
+
+
+def test_a_model_with_a_plan_is_simulated_as_planned_on_its_device(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "m.json", "--device", "weak.toml", "-o", "planned.json"]) == 0
+    for words, structure in (([], "direct"), (["--structure", "implicit"], "implicit")):
+        capsys.readouterr()
+        assert main(["simulate", "planned.json", "--duration-s", "0.2", "--json", *words]) == 0
+        told = capsys.readouterr()
+        assert json.loads(told.out)["structure"] == structure
+        assert ("weak knob" in told.err) == (structure == "direct")
+
+
+def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    stiffness = told["plan"]["coupling"]["stiffness"]
+    assert 1.0 / told["felt_slope"] == pytest.approx(1.0 / told["steepest_slope"] + 1.0 / stiffness)
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
+    assert f"slopes up to {told['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("model", "arguments"),
+    [
+        (model_by_hand(), ["--device", "knob.toml"]),
+        (model_by_hand(), ["--device", "weak.toml"]),
+        (model_by_hand(), ["--device", "knob.toml", "--mass", "1e-3"]),
+        (model_by_hand(linear=[0.1], weight=[0.01]), ["--device", "knob.toml", "--coupling-damping", "0.01"]),
+        (keyswitch_by_hand(), ["--device", "touch"]),
+    ],
+)
+def test_the_plan_can_be_read_on_80_columns(
+    here: Path, capsys: pytest.CaptureFixture[str], model: Model, arguments: list[str]
+) -> None:
+    model.save("m.json")
+    assert main(["plan", "m.json", *arguments, "--accept-force-error", "2"]) == 0
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    for word in ("structure", "verdict", "holds for", "inequalities", "margin"):
+        assert word in text
+
+
+def test_a_device_that_holds_nothing_is_refused_and_nothing_is_written(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    DeviceProfile(id="ice", viscous_damping=0.0).save("ice.toml")
+    assert main(["plan", "m.json", "--device", "ice.toml", "-o", "planned.json"]) == 1
+    refusal = " ".join(capsys.readouterr().out.split())
+    assert refusal.startswith("verdict: no no structure holds on this device: the object needs b >= ")
+    assert "short by" in refusal
+    assert not Path("planned.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--device", "nothing.toml"], "there is no file nothing.toml"),
+        (["--device", "touch"], "moves in m, the model in rad"),
+        (["--device", "m.json"], "m.json is not TOML"),
+        ([], "Missing option '--device'"),
+        (["--device", "knob.toml", "-o", "knob.toml"], "is an input as well"),
+        (["--device", "knob.toml", "--plot", "locus.txt"], "is no figure file"),
+        (["--device", "knob.toml", "--coupling-stiffness", "-1"], "coupling_stiffness is -1"),
+    ],
+)
+def test_what_is_wrong_is_refused_in_one_sentence(
+    here: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
+) -> None:
+    assert main(["plan", "m.json", *arguments]) == 2
+    told = capsys.readouterr().err
+    assert sentence in told
+    assert len([line for line in told.splitlines() if line.startswith("error: ")]) == 1
+
+
+def test_the_examples_are_listed_with_their_sources(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--examples"]) == 0
+    text = capsys.readouterr().out
+    for name, (file, _) in example_profiles().items():
+        assert f"{name}  {file}\n" in text
+    assert "data sheet" in text
+
+
+def test_the_locus_is_drawn(here: Path) -> None:
+    assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--plot", "locus.png"]) == 0
+    assert Path("locus.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,307 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Force error of a plan: its share, its verdict, the device property that is named, and the model file."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate import (
+    DeviceProfile,
+    InputError,
+    Model,
+    Plan,
+    Recording,
+    Scheme,
+    identify,
+    load_model,
+    plan,
+    read_recording,
+    verify,
+)
+from palpate._core.model import fingerprint
+from palpate.cli.main import main
+from palpate.model.certified import device_record
+from palpate.planning import example_profiles
+from test_plan import SMOOTH, WEAK, slide
+
+
+@pytest.fixture(scope="session")
+def press(data: Path) -> Recording:
+    return read_recording(data / "keyswitches" / "clicky__cherry_mx_blue.csv")
+
+
+@pytest.fixture(scope="session")
+def switch(press: Recording) -> Model:
+    return identify(press)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    model_by_hand().save("m.json")
+    WEAK.save("weak.toml")
+    return tmp_path
+
+
+def changed(device: DeviceProfile, **fields: Any) -> DeviceProfile:
+    return DeviceProfile(**device_record(device) | fields)
+
+
+def network(path: str) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))["network"]
+    return content
+
+
+def test_a_plan_that_loses_the_force_is_refused_and_the_model_file_stays_as_it_was(
+    here: Path, capsys: pytest.CaptureFixture[str], switch: Model
+) -> None:
+    switch.save("k.json")
+    before = Path("k.json").read_bytes()
+    assert main(["plan", "k.json", "--device", "phantom-premium-1.0", "-o", "k.json", "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"].startswith("no: the felt force is up to 1.2")
+    assert told["force_error_share"] > 0.9
+    assert told["written"] is None
+    assert Path("k.json").read_bytes() == before
+
+
+def test_an_accepted_plan_leaves_the_identified_network_for_every_later_verb(
+    here: Path, capsys: pytest.CaptureFixture[str], switch: Model, press: Recording
+) -> None:
+    switch.save("k.json")
+    words = ["--device", "phantom-premium-1.0", "--accept-force-error", "0.98", "--json"]
+    identified = network("k.json")
+    assert main(["plan", "k.json", *words, "-o", "k.json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert first["verdict"].startswith("usable: ")
+    assert first["verdict"].endswith("which was accepted")
+    assert network("k.json") == identified
+    again = load_model("k.json")
+    assert verify(again, press).nrmse == verify(switch, press).nrmse
+    assert main(["plan", "k.json", *words, "-o", "twice.json"]) == 0
+    second = json.loads(capsys.readouterr().out)
+    assert {**second, "seconds": 0, "written": ""} == {**first, "seconds": 0, "written": ""}
+    assert Path("twice.json").read_bytes() == Path("k.json").read_bytes()
+    assert main(["show", "k.json"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "26 wavelets" in shown
+    for words in ("direct, with a limited network", "phantom-premium-1.0", "which was accepted"):
+        assert words in shown
+
+
+def test_simulate_compares_with_the_identified_force_and_renders_the_limited_one(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--device", "weak.toml", "--accept-force-error", "1", "-o", "m.json"]
+    assert main(["plan", "m.json", *words]) == 0
+    chosen = Plan.of(load_model("m.json"))
+    capsys.readouterr()
+    assert main(["simulate", "m.json", "--json"]) == 0
+    error = json.loads(capsys.readouterr().out)["force_error_end"]
+    assert 0.5 * chosen.force_error.rms < error < 2.0 * chosen.force_error.largest
+
+
+def test_the_certificate_is_for_the_rendered_network() -> None:
+    stored = plan(model_by_hand(), WEAK, accept_force_error=1.0).stored()
+    assert stored.certificate is not None
+    assert stored.certificate["model"] == fingerprint(stored.planned) != fingerprint(stored)
+
+
+def test_a_changed_network_of_the_plan_is_refused_when_the_file_is_read(tmp_path: Path) -> None:
+    path = plan(model_by_hand(), WEAK, accept_force_error=1.0).stored().save(tmp_path / "planned.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["plan"]["network"]["bias"] += 1e-12
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=r"certificate\.model is .*changed after it was certified"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("device", [name for name in example_profiles() if name != "bench-knob"])
+def test_the_named_device_property_is_enough_and_1_percent_less_is_not(switch: Model, device: str) -> None:
+    weak = DeviceProfile.load(example_profiles()[device][0])
+    sentence = plan(switch, weak).needs
+    damping = re.search(r"b >= (\S+) N\*s/m \(has (\S+)\)", sentence)
+    friction = re.search(r"f_c >= (\S+) N \(has", sentence)
+    rate = re.search(r"a rate of (\S+) Hz", sentence)
+    step = re.search(r"an encoder step of (\S+) m", sentence)
+    assert damping
+    assert friction
+    assert rate
+    assert step
+    period_s = 1.0 / float(rate[1])
+    share = period_s / weak.period_s
+    faster = {"period_s": period_s, "jitter_s": share * weak.jitter_s, "delay_s": share * weak.delay_s}
+    strong = {"viscous_damping": float(damping[1]), "coulomb_friction": float(friction[1])}
+    for fields in (strong, {**faster, "encoder_step": float(step[1])}):
+        chosen = plan(switch, changed(weak, **fields))
+        assert (chosen.structure, chosen.limited, str(chosen.verdict)) == ("direct", None, "good")
+    for name in strong:
+        less = plan(switch, changed(weak, **{**strong, name: 0.99 * strong[name]}))
+        assert less.limited is not None
+
+
+def test_friction_and_encoder_are_named_where_they_are_the_limit() -> None:
+    coarse = DeviceProfile(id="coarse", coulomb_friction=1e-4, encoder_step=1e-3)
+    chosen = plan(model_by_hand(), coarse)
+    assert chosen.verdict.level == "no"
+    assert "needs f_c >= 0.00" in chosen.needs
+    assert " b >= " not in chosen.needs
+    step = re.search(r"an encoder step of (\S+) rad", chosen.needs)
+    assert step
+    finer = plan(model_by_hand(), changed(coarse, encoder_step=float(step[1])))
+    assert str(finer.verdict) == "good"
+
+
+@pytest.mark.parametrize("structure", ["massless", "implicit", "explicit", "energy-consistent"])
+@pytest.mark.parametrize("stiffness", [5.0, 50.0, 500.0])
+def test_the_softness_of_a_coupling_is_a_force_error(structure: str, stiffness: float) -> None:
+    model = model_by_hand()
+    scheme = Scheme(structure=structure, coupling_stiffness=stiffness, mass=1e-3, damping=0.1)
+    x = np.linspace(0.0, 0.6, 200_001)  # of the object; its handle is further by the spring's deflection
+    handle = x + model.force(x) / stiffness
+    inside = handle <= 0.5
+    error = np.abs(model.force(x) - model.force(handle))[inside].max()
+    force = model.force(np.linspace(0.0, 0.5, 2001))
+    found = Plan(model, scheme).force_error
+    assert found.largest == pytest.approx(error, rel=1e-3)
+    assert found.share == pytest.approx(error / np.ptp(force), rel=1e-3)
+
+
+def test_the_softness_counts_on_both_strokes_of_a_hysteresis_model() -> None:
+    model = keyswitch_by_hand()
+    found = Plan(model, Scheme(coupling_stiffness=500.0, play_radius=1e-4)).force_error
+    worst = 0.0
+    for side in (1.0, -1.0):
+        x = np.linspace(-0.001, 0.004, 100_001)
+        handle = x + model.force(x, direction=side) / 500.0
+        inside = (handle >= 0.0) & (handle <= 0.004)
+        gap = model.force(x, direction=side) - model.force(handle, direction=side)
+        worst = max(worst, float(np.abs(gap)[inside].max()))
+    assert found.largest == pytest.approx(worst, rel=0.01)
+
+
+def test_a_compensated_coupling_has_no_force_error_and_a_soft_one_is_refused() -> None:
+    taken_out = plan(model_by_hand(), SMOOTH, coupling_stiffness=100.0)
+    assert taken_out.scheme.compensated
+    assert taken_out.force_error.share == 0.0
+    soft = plan(keyswitch_by_hand(), slide(6.0), coupling_stiffness=100.0)
+    assert soft.force_error.share > 0.1
+    assert soft.verdict.level == "no"
+
+
+def test_an_error_of_a_few_percent_is_usable_and_below_the_noticeable_good() -> None:
+    model = model_by_hand()
+    steepest = model.slope_range()[1]
+    levels = {}
+    for share in (0.97, 0.999, 1.01):
+        device = DeviceProfile(id="knob", viscous_damping=0.5e-3 * share * steepest, coulomb_friction=0.005)
+        chosen = plan(model, device)
+        levels[share] = (chosen.verdict.level, chosen.force_error.share)
+    assert levels[1.01] == ("good", 0.0)
+    for level, error in levels.values():
+        assert level == ("good" if error <= 0.01 else "usable")
+
+
+def test_a_ruined_plan_is_not_stored_unless_its_error_is_accepted() -> None:
+    chosen = plan(keyswitch_by_hand(), "touch")
+    assert chosen.verdict.level == "no"
+    with pytest.raises(InputError, match=r"a plan is not stored whose verdict is no: the felt force"):
+        chosen.stored()
+    accepted = re.search(r"--accept-force-error (\S+)", str(chosen.verdict))
+    assert accepted
+    again = plan(keyswitch_by_hand(), "touch", accept_force_error=float(accepted[1]))
+    assert again.verdict.level == "usable"
+    assert Plan.of(again.stored()).verdict == again.verdict
+
+
+def test_a_plan_that_is_stable_only_is_usable() -> None:
+    chosen = plan(model_by_hand(), DeviceProfile(id="knob", coulomb_friction=0.005), mass=1e-3)
+    assert chosen.structure == "explicit"
+    assert chosen.verdict.level == "usable"
+    assert "passivity is not certified" in str(chosen.verdict)
+
+
+def test_a_plan_that_is_stable_only_for_want_of_friction_names_the_friction() -> None:
+    chosen = plan(model_by_hand(), DeviceProfile(id="smooth bearing"))
+    assert chosen.structure == "explicit"
+    friction = re.search(
+        r"for a certificate the object needs f_c >= (\S+) N\*m \(has 0\)", str(chosen.verdict)
+    )
+    assert friction
+    again = plan(model_by_hand(), DeviceProfile(id="bearing", coulomb_friction=float(friction[1])))
+    assert (again.structure, str(again.verdict)) == ("direct", "good")
+
+
+def test_the_verdict_comes_first_and_the_file_that_is_written_or_not_is_named(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keyswitch_by_hand().save("k.json")
+    for words, code, level, written in (
+        (["m.json", "--device", "bench-knob"], 0, "good", "nothing; -o OUT.json writes model and plan"),
+        (["m.json", "--device", "bench-knob", "-o", "p.json"], 0, "good", "p.json"),
+        (["k.json", "--device", "touch", "-o", "q.json"], 1, "no", "nothing, because the verdict is no"),
+    ):
+        assert main(["plan", *words]) == code
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == f"verdict: {level}"
+        assert (
+            re.sub(" +", " ", next(line for line in lines if line.startswith("written")))
+            == f"written {written}"
+        )
+    assert Path("p.json").exists()
+    assert not Path("q.json").exists()
+
+
+def test_the_examples_are_one_json_object(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--examples", "--json"], ["--json", "--examples"]):
+        assert main(["plan", *words]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert list(told) == list(example_profiles())
+        assert Path(told["touch"]["file"]).name == "touch.toml"
+        assert told["touch"]["sources"]
+
+
+def test_a_device_is_taken_by_object_name_and_path(tmp_path: Path) -> None:
+    model = keyswitch_by_hand()
+    file = example_profiles()["touch"][0]
+    named = plan(model, "touch", accept_force_error=1.0)
+    assert named.certificate is not None
+    for device in (DeviceProfile.load(file), file, str(file)):
+        other = plan(model, device, accept_force_error=1.0)
+        assert other.certificate is not None
+        assert device_record(other.certificate.device) == device_record(named.certificate.device)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"device": 3}, "device is a int: must be a DeviceProfile, the path of its TOML file, or one of"),
+        ({"device": "tuoch"}, "device is 'tuoch': there is no such file, and no such example; one of the"),
+        ({"device": Path("none.toml")}, "there is no file none.toml"),
+        ({"model": "press.json"}, "it must be a Model: make one with palpate.identify or palpate.load_model"),
+        ({"model": None}, "model is None; it must be a Model: make one with palpate.identify"),
+        ({"mass": "heavy"}, "mass is 'heavy': must be a number"),
+        ({"accept_force_error": None}, "accept_force_error is None: must be a number"),
+        ({"accept_force_error": -0.1}, "accept_force_error is -0.1: must be a finite number >= 0"),
+        ({"play_radius": float("nan")}, "play_radius is nan: must be a finite number >= 0"),
+    ],
+)
+def test_a_wrong_argument_of_plan_is_named(arguments: dict[str, Any], sentence: str) -> None:
+    given = {"model": keyswitch_by_hand(), "device": "touch", **arguments}
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        plan(**given)
+
+
+def test_a_plan_by_hand_that_is_soft_can_be_stored_when_its_error_is_accepted() -> None:
+    soft = Plan(model_by_hand(), Scheme(coupling_stiffness=2.0))
+    with pytest.raises(InputError, match="a plan is not stored"):
+        soft.stored()
+    assert replace(soft, accept_force_error=1.0).stored().plan is not None

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A force of position and velocity: planned, stored, rendered directly, and refused everywhere else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from control_program import control, needs_program
+from models_by_hand import model_by_hand
+from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan, simulate
+from palpate._core.rendering import structure_names
+from palpate.cli.main import main
+from palpate.planning import force_at, force_error, rig_for
+
+KNOB = DeviceProfile(id="knob", coulomb_friction=0.02)
+# A certificate that a busy machine does not leave: its longest period is a tenth of a second.
+PATIENT_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.05)
+
+
+def fluid_by_hand(**changes: Any) -> Model:
+    """f = 5 x + 0.01 v and one wavelet over both, to 0.5 rad and 4 rad/s."""
+    return model_by_hand(
+        **{
+            "kind": "position_velocity",
+            "inputs": ("position", "velocity"),
+            "alpha": [[20.0, 0.5]],
+            "beta": [[0.3, 1.0]],
+            "weight": [0.03],
+            "linear": [5.0, 0.01],
+            "lower": [0.0, -4.0],
+            "upper": [0.5, 4.0],
+            **changes,
+        }
+    )
+
+
+def test_it_is_rendered_directly_and_certified_with_the_bounds_of_both_slopes() -> None:
+    model = fluid_by_hand()
+    chosen = plan(model, KNOB)
+    certificate = chosen.certificate
+    assert certificate is not None
+    assert (chosen.structure, certificate.verdict, chosen.refused) == ("direct", "certified", ())
+    x, v = np.meshgrid(np.linspace(0.0, 0.5, 301), np.linspace(-4.0, 4.0, 301), indexing="ij")
+    force = model.predict(np.column_stack([x.ravel(), v.ravel()])).reshape(x.shape)
+    drag = np.abs(np.diff(force, axis=1)).max() / (8.0 / 300)
+    assert drag <= certificate.bounds.drag <= 1.02 * drag
+    resting = np.diff(force[:, 150]) / (0.5 / 300)
+    assert certificate.bounds.slope_min <= resting.min()
+    assert resting.max() <= certificate.bounds.slope_max <= 1.02 * resting.max()
+    damping = certificate.inequalities[0]
+    assert damping.right == pytest.approx(5e-4 * certificate.bounds.slope_max + certificate.bounds.drag)
+
+
+def test_a_device_that_the_velocity_is_too_much_for_is_refused_with_what_is_missing() -> None:
+    weak = DeviceProfile(id="weak knob", viscous_damping=0.02, coulomb_friction=0.02)
+    chosen = plan(fluid_by_hand(), weak)
+    assert chosen.certificate is not None
+    assert chosen.certificate.refused
+    reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
+    assert "b >= T M / 2 + B_v T / period needs" in reasons["direct"]
+    assert "short by" in reasons["direct"]
+    for name in ("direct, slope limited", "massless", "implicit", "energy-consistent", "explicit"):
+        assert "of a force of position and velocity no bound is known" in reasons[name]
+
+
+@pytest.mark.parametrize(
+    "wish", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"damping": 0.1}]
+)
+def test_behind_a_coupling_or_with_a_mass_it_is_refused_in_one_sentence(wish: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="no bound is known"):
+        plan(fluid_by_hand(), KNOB, **wish)
+
+
+@pytest.mark.parametrize("structure", sorted(set(structure_names) - {"direct"}))
+def test_no_other_structure_takes_it(structure: str) -> None:
+    with pytest.raises(InputError, match=f"structure is {structure}, must be direct"):
+        Plan(fluid_by_hand(), Scheme(structure=structure))
+
+
+def test_other_second_inputs_are_no_velocity() -> None:
+    with pytest.raises(InputError, match="the network has 2 inputs, must have 1"):
+        plan(fluid_by_hand(kind="general", inputs=("position", "load_N")), KNOB)
+
+
+def test_the_plan_comes_back_from_its_file_and_an_edited_bound_does_not(tmp_path: Path) -> None:
+    path = plan(fluid_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
+    again = Plan.of(load_model(path))
+    again.check_for(KNOB)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["certificate"]["bounds"]["drag"] *= 0.99
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=r"certificate\.bounds\.drag is .*must be at least"):
+        load_model(path)
+    # Read as a force of anything else but the velocity, it is another force.
+    content["certificate"]["bounds"]["drag"] /= 0.99
+    content["kind"] = "general"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=r"certificate\.model"):
+        load_model(path)
+
+
+def test_what_is_rendered_is_the_model_at_the_last_difference_of_positions() -> None:
+    model = fluid_by_hand()
+    rig = rig_for(model)
+    chosen = plan(model, KNOB)
+    rendered = simulate(chosen, KNOB, rig.hand, 2.0)
+    x = rendered.position[1:]
+    v = np.diff(rendered.position) / KNOB.period_s
+    inside = (x >= 0.0) & (x <= 0.5) & (np.abs(v) <= 4.0)
+    expected = model.predict(np.column_stack([x, v])[inside])
+    assert inside.mean() > 0.9
+    assert np.abs(rendered.force[1:][inside] - expected).max() < 1e-9
+    # Half an encoder step of position, one of velocity.
+    step = KNOB.encoder_step
+    assert force_error(chosen, rendered).instant < 6.0 * step + 0.06 * step / KNOB.period_s
+
+
+def test_its_force_along_a_motion_needs_the_period() -> None:
+    with pytest.raises(InputError, match="period_s must be given"):
+        force_at(Plan(fluid_by_hand(), Scheme(structure="direct")), np.linspace(0.0, 0.1, 5))
+
+
+def test_simulate_renders_it_without_a_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    fluid_by_hand().save("fluid.json")
+    assert main(["simulate", "fluid.json", "--duration-s", "0.5", "--plot", "seen.png", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["structure"] == "direct"
+    assert main(["simulate", "fluid.json", "--structure", "massless"]) == 2
+    assert "no bound is known" in capsys.readouterr().err
+
+
+@needs_program
+def test_the_control_program_renders_it_certified_and_uncertified(tmp_path: Path) -> None:
+    path = plan(fluid_by_hand(), PATIENT_KNOB).stored().save(tmp_path / "planned.json")
+    for words, said in (([], "certified: certified"), (["--uncertified"], "certified: no")):
+        record = tmp_path / f"felt{len(words)}.csv"
+        answer = control(
+            path, "--duration-s", 0.3, "--record", record, "--lowest-rate-share", 0, *words, "--json"
+        )
+        assert answer.returncode == 0, answer.stderr
+        assert said in record.read_text(encoding="utf-8")
