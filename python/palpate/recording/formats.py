@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a file of columns by its kind, and the kinds that are read as a whole."""
+"""Opens a file of columns by its kind; Parquet, and the kinds that are read as a whole."""
 
 from __future__ import annotations
 
 import json
+import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from importlib import import_module
@@ -12,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, listed, shortened, visible
 from .csv_file import CsvFile
+from .dialect import decimal_mark, find_header, first_row_as_header, named, refuse_marks
 from .files import readable
-from .header import decimal_mark, find_header, first_row_as_header, named, refuse_marks
-from .matlab_file import refuse_damaged
-from .names import listed, shortened, visible
-from .parquet_file import ParquetFile
-from .table import MISSING, Cells, TableFile, parse_with, to_numbers
+from .table import MISSING, Cells, LongTable, Table, parse_with, to_numbers
+
+_BUFFER_BYTES = 1 << 20
+"""Bytes read ahead of each column of Parquet."""
 
 MOST_HEADER_ROWS = 200
 """Rows of a sheet in which its header must stand."""
@@ -28,7 +29,28 @@ STEADY_ROWS = 1000
 """Rows in which a column with one or two values counts as steady."""
 
 
-def open_table(path: Path) -> TableFile:
+_HEADER = 128
+"""Bytes before the first element."""
+
+_MATRIX, _COMPRESSED = 14, 15
+"""Types of elements that hold an array, and a compressed one, which has a checksum."""
+
+_ITEM_BYTES = {
+    **dict.fromkeys((1, 2, 14, 15, 16), 1),
+    **dict.fromkeys((3, 4, 17), 2),
+    **dict.fromkeys((5, 6, 7, 18), 4),
+    **dict.fromkeys((9, 12, 13), 8),
+}
+"""Bytes of an item of each type of element."""
+
+_NUMERIC = range(6, 16)
+"""Classes of arrays of numbers: they hold flags, dimensions, name, values, and imaginary parts if complex."""
+
+_COMPLEX = 1 << 11
+"""Bit of the flags of an array."""
+
+
+def open_table(path: Path) -> Table:
     """Open a file of columns; the end of its name tells its kind.
 
     Raises
@@ -36,7 +58,7 @@ def open_table(path: Path) -> TableFile:
     InputError
         The file is not of its kind, or the library that reads it is not installed.
     """
-    kinds: dict[str, Callable[[Path], TableFile]] = {
+    kinds: dict[str, Callable[[Path], Table]] = {
         ".parquet": ParquetFile,
         ".xlsx": _excel,
         ".xlsm": _excel,
@@ -47,7 +69,7 @@ def open_table(path: Path) -> TableFile:
     return kinds.get(path.suffix.lower(), CsvFile)(path)
 
 
-class MemoryTable:
+class MemoryTable(Table):
     """Columns that were read as a whole.
 
     Parameters
@@ -63,8 +85,6 @@ class MemoryTable:
     decimal : str
         Decimal mark of numbers that are stored as text.
     """
-
-    torn = 0
 
     def __init__(
         self,
@@ -89,7 +109,6 @@ class MemoryTable:
             )
 
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
-        """See :class:`palpate.recording.table.TableFile`."""
         columns = {}
         for name, cells in self._columns.items():
             if name in text:
@@ -101,30 +120,11 @@ class MemoryTable:
             columns[name] = cells
         return columns
 
-    def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
-        """See :class:`palpate.recording.table.TableFile`."""
-        raise InputError(
-            f"{self._path} cannot be read part by part; leave out --out-of-core, --jobs and --scheduler, or "
-            "convert the file to CSV or Parquet"
-        )
-
-    def blocks(
-        self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
-    ) -> Iterator[tuple[int, dict[str, Cells]]]:
-        """See :class:`palpate.recording.table.TableFile`."""
-        raise NotImplementedError
-
-    def rows_before(self, part: tuple[int, int]) -> int:
-        """See :class:`palpate.recording.table.TableFile`."""
-        raise NotImplementedError
-
     def place(self, row: int) -> str:
-        """See :class:`palpate.recording.table.TableFile`."""
         word, number = self._first
         return f"{word} {number + row}"
 
     def cell(self, row: int, name: str) -> str:
-        """See :class:`palpate.recording.table.TableFile`."""
         return _as_text(self._columns[name][row])
 
 
@@ -142,7 +142,110 @@ def _needed(name: str, path: Path, kind: str, extra: str) -> Any:
         ) from None
 
 
-def _excel(path: Path) -> TableFile:
+class ParquetFile(LongTable):
+    """A Parquet recording."""
+
+    def __init__(self, path: Path) -> None:
+        parquet = _needed("pyarrow.parquet", path, "Parquet", "parquet")
+        self._path = path
+        with readable(path, "Parquet"):
+            # read in small pieces: a file may be larger than memory, and so may one of its row groups
+            self._file = parquet.ParquetFile(path, buffer_size=_BUFFER_BYTES, pre_buffer=False)
+            schema = self._file.schema_arrow
+            self._stored = tuple(str(name) for name in schema.names)
+            self.names = tuple(map(visible, self._stored))
+            self.text_names = {
+                name
+                for name, field in zip(self.names, schema, strict=True)
+                if str(getattr(field.type, "value_type", field.type)) in ("string", "large_string")
+            }
+            self.metadata = {
+                visible(key.decode()): visible(value.decode())
+                for key, value in (schema.metadata or {}).items()
+                # What the writing libraries note for themselves says nothing about the measurement.
+                if key not in (b"pandas", b"ARROW:schema")
+            }
+        if len(set(self.names)) < len(self.names):
+            raise InputError(f"{path}: a column name stands twice in {listed(self.names)}")
+        if len(self.names) == 1:
+            raise InputError(
+                f"{path}: there is one column ({shortened(self.names[0])}); a recording needs a position and "
+                "a force"
+            )
+
+    def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
+        with readable(self._path, "Parquet"):
+            return _arrow_cells(self._file.read(), self.names, numbers, text)
+
+    def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
+        runs, start, held = [], 0, 0
+        for group in range(self._file.num_row_groups):
+            held += self._file.metadata.row_group(group).num_rows
+            if held >= rows or group == self._file.num_row_groups - 1:
+                runs.append((start, group + 1))
+                start, held = group + 1, 0
+        return self._file.metadata.num_rows, runs
+
+    def blocks(
+        self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
+    ) -> Iterator[tuple[int, dict[str, Cells]]]:
+        groups = range(*part)
+        first = 0
+        pairs = zip(self._stored, self.names, strict=True)
+        wanted = [(stored, name) for stored, name in pairs if name in numbers or name in text]
+        columns, names = [stored for stored, _ in wanted], [name for _, name in wanted]
+        with readable(self._path, "Parquet"):
+            batches = self._file.iter_batches(batch_size=rows, row_groups=list(groups), columns=columns)
+        while True:
+            with readable(self._path, "Parquet"):
+                batch = next(batches, None)
+                if batch is None:
+                    return
+                cells = _arrow_cells(batch, names, numbers, text)
+            yield first, cells
+            first += batch.num_rows
+
+    def rows_before(self, part: tuple[int, int]) -> int:
+        return sum(self._file.metadata.row_group(group).num_rows for group in range(part[0]))
+
+    def place(self, row: int) -> str:
+        return f"row {row}"
+
+    def cell(self, row: int, name: str) -> str:
+        for group in range(self._file.num_row_groups):
+            rows = self._file.metadata.row_group(group).num_rows
+            if row < rows:
+                stored = self._stored[self.names.index(name)]
+                with readable(self._path, "Parquet"):
+                    return _word(self._file.read_row_group(group, columns=[stored]).column(0)[row].as_py())
+            row -= rows
+        raise IndexError(row)
+
+
+def _arrow_cells(
+    table: Any, names: Sequence[str], numbers: Collection[str], text: Collection[str]
+) -> dict[str, Cells]:
+    """The columns of a table or batch of Arrow."""
+    columns: dict[str, Cells] = {}
+    for index, name in enumerate(names):
+        values = table.column(index).to_pandas().to_numpy()
+        numeric = values.dtype.kind in "iufb"
+        if name in text or (name not in numbers and not numeric):
+            columns[name] = np.array([_word(value) for value in values], dtype=object)
+        else:
+            columns[name] = values.astype(np.float64) if numeric else to_numbers(_as_objects(values))
+    return columns
+
+
+def _word(value: Any) -> str:
+    return "" if value is None or value != value else str(value)
+
+
+def _as_objects(values: Cells) -> Cells:
+    return np.array([_word(value) for value in values], dtype=object)
+
+
+def _excel(path: Path) -> Table:
     """The first sheet of a workbook that holds cells."""
     openpyxl = _needed("openpyxl", path, "an Excel file", "excel")
     with readable(path, "Excel (.xlsx)"):
@@ -189,7 +292,7 @@ def _cells(values: Sequence[Any], decimal: str) -> Cells:
     return text
 
 
-def _numpy(path: Path) -> TableFile:
+def _numpy(path: Path) -> Table:
     """Arrays of an .npz file, by their names."""
     with readable(path, "NumPy (.npz)"), path.open("rb") as stream:
         arrays = np.load(stream, allow_pickle=False)
@@ -197,12 +300,12 @@ def _numpy(path: Path) -> TableFile:
     return _of_arrays(path, found)
 
 
-def _matlab(path: Path) -> TableFile:
+def _matlab(path: Path) -> Table:
     """Vectors of a .mat file, by their names; the fields of a structure stand beside them."""
     from scipy.io import loadmat
 
     with readable(path, "MATLAB (.mat)"):
-        refuse_damaged(path.read_bytes())
+        _refuse_damaged(path.read_bytes())
         try:
             found = loadmat(path, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:
@@ -221,7 +324,53 @@ def _matlab(path: Path) -> TableFile:
     return _of_arrays(path, arrays)
 
 
-def _of_arrays(path: Path, found: Mapping[str, Any]) -> TableFile:
+def _refuse_damaged(content: bytes) -> None:
+    """Refuse a MATLAB file of version 5 whose elements do not fit into each other; others pass.
+
+    `scipy.io.loadmat` crashes on some of them.
+
+    Raises
+    ------
+    ValueError
+        Names the byte at which the first such element begins.
+    """
+    if len(content) < _HEADER or 0 in content[:4] or content[125] + content[124] != 1:
+        return
+    _elements(content, _HEADER, len(content), "<" if content[126:128] == b"IM" else ">")
+
+
+def _elements(content: bytes, at: int, end: int, order: str) -> list[tuple[int, int]]:
+    """Check the elements from one byte to another; returns the type and first byte of the data of each."""
+    found = []
+    while at < end:
+        start = at
+        if at + 8 > end:
+            raise _damaged(start)
+        kind, size = struct.unpack_from(f"{order}II", content, at)
+        data = at + 8
+        if kind >> 16:  # a small element: type, size and data share 8 bytes
+            kind, size, data = kind & 0xFFFF, kind >> 16, at + 4
+            at += 8
+        else:
+            at = data + (size if kind == _COMPRESSED else -(-size // 8) * 8)
+        room = (start + 8 if data == start + 4 else end) - data
+        if kind not in _ITEM_BYTES or size % _ITEM_BYTES[kind] or size > room:
+            raise _damaged(start)
+        if kind == _MATRIX and size:
+            inside = _elements(content, data, data + size, order)
+            first = inside[0][1]
+            flags = int.from_bytes(content[first : first + 4], "little" if order == "<" else "big")
+            if flags & 0xFF in _NUMERIC and len(inside) != (5 if flags & _COMPLEX else 4):
+                raise _damaged(start)
+        found.append((kind, data))
+    return found
+
+
+def _damaged(at: int) -> ValueError:
+    return ValueError(f"the element at byte {at} is damaged")
+
+
+def _of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
     """The vectors of the most frequent length as columns; single values are metadata."""
     arrays = {visible(str(name)): np.squeeze(np.asarray(value)) for name, value in found.items()}
     vectors = {name: each for name, each in arrays.items() if each.ndim == 1 and each.dtype.kind in "iufbUO"}
@@ -242,7 +391,7 @@ def _vector(array: Any) -> Cells:
     return np.array([str(value) for value in array], dtype=object)
 
 
-def _mcap(path: Path) -> TableFile:
+def _mcap(path: Path) -> Table:
     """JSON messages of an MCAP file: each topic is a table of its numbers, beside the time of its log."""
     reader = _needed("mcap.reader", path, "MCAP", "mcap")
     topics: dict[str, list[dict[str, Any]]] = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several recordings of one object side by side: wrong units, other zeros, other objects."""
+"""Recordings that do not belong together: two objects in one file, repeated rows, other units or zeros."""
 
 from __future__ import annotations
 
@@ -9,16 +9,37 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._typing import Float1D
+from .._typing import Float1D, Float2D
 from ..verdict import Finding, no, usable
-from .cells import Travel, sides
+from .cells import ROWS_TO_COMPARE, CellRows, Travel, amount, sides
 from .recording import Recording
 from .units import GRAVITY
 
-CELLS = 64
+BLOCKS = 32
+"""Blocks of rows between which a file is split."""
+
+EXPLAINED = 0.4
+"""Share of the scatter about the mean curves that the split into two parts explains."""
+
+APART = 0.02
+"""Distance of the two parts, as a share of the force's spread."""
+
+PATTERN = 16
+"""Rows by which a repetition of the beginning is found."""
+
+LEAST_COPY = 0.1
+"""Share of the rows that a copy holds."""
+
+MOST_COPIES = 4
+"""Places that begin like the file and are compared to the end."""
+
+SAME_PLACE = 0.1
+"""Distance of the mean positions of two parts in a cell, in cells, up to which they are compared."""
+
+CURVE_POINTS = 64
 """Points of a curve at most."""
 
-ROWS_A_CELL = 4
+POINT_ROWS = 4
 """Rows that a point of a curve is the mean of, on average."""
 
 UNIT_RATIOS = {
@@ -57,6 +78,79 @@ MOST_RECORDINGS = 20
 
 Curve = tuple[Float1D, Float1D]
 """Mean positions in rising order, and mean forces."""
+
+
+def merged_findings(recording: Recording, cells: CellRows | None) -> list[Finding]:
+    """Findings on a force that has two branches, one before and one after a row, and on repeated rows."""
+    if recording.input_names:
+        return []
+    if (again := _appended_to_itself(recording)) is not None:
+        return [
+            usable(
+                f"the rows from {again} on repeat those from 0 on exactly: the file was probably appended to "
+                f"itself; give --rows 0:{again}"
+            )
+        ]
+    return [] if cells is None else _two_parts(recording, cells)
+
+
+def _two_parts(recording: Recording, cells: CellRows) -> list[Finding]:
+    """Compares the parts before and after each block edge, cell by cell."""
+    total = float(np.sum(cells.residual**2))
+    spread = float(np.std(recording.force))
+    if not total > 0.0 or not spread > 0.0:
+        return []
+    width = 2 * cells.cells
+    block = cells.row * BLOCKS // len(recording)
+    code = block * width + cells.cell
+
+    def sums(values: Float1D | None) -> Float2D:
+        table = np.bincount(code, values, BLOCKS * width).reshape(BLOCKS, width)
+        return table.cumsum(axis=0, dtype=np.float64)
+
+    count, force, place = sums(None), sums(cells.residual), sums(cells.place)
+    before, after = count[:-1], count[-1] - count[:-1]
+    one, other = np.maximum(before, 1.0), np.maximum(after, 1.0)
+    apart = force[:-1] / one - (force[-1] - force[:-1]) / other
+    moved = place[:-1] / one - (place[-1] - place[:-1]) / other
+    both = (before >= ROWS_TO_COMPARE) & (after >= ROWS_TO_COMPARE) & (np.abs(moved) <= SAME_PLACE)
+    between = np.where(both, before * after / (one + other) * apart**2, 0.0)
+    explained = between.sum(axis=1) / total
+    best = int(np.argmax(explained))
+    shared = both[best]
+    if not shared.any():
+        return []
+    rows = (before[best] + after[best])[shared]
+    distance = float(np.sqrt(np.average(apart[best][shared] ** 2, weights=rows)))
+    if explained[best] < EXPLAINED or distance < APART * spread:
+        return []
+    split = (best + 1) * len(recording) // BLOCKS
+    return [
+        usable(
+            f"before and after about row {split} the force at the same position and stroke differs by "
+            f"{amount(distance, recording.units['force'])}, {distance / spread:.0%} of its spread: the file "
+            "probably holds two objects or two zeros, or the object changed (drift, settling); identify "
+            f"each part by itself with --rows 0:{split} and --rows {split}:{len(recording)}"
+        )
+    ]
+
+
+def _appended_to_itself(recording: Recording) -> int | None:
+    """First row of a copy of the beginning that goes on to the end of the file."""
+    x, f = recording.position, recording.force
+    n = len(x)
+    least = int(LEAST_COPY * n)
+    if least < PATTERN:
+        return None
+    starts = np.arange(n // 3, n - least + 1)
+    for k in (*range(PATTERN), *np.linspace(PATTERN, least - 1, PATTERN).astype(int).tolist()):
+        starts = starts[(x[starts + k] == x[k]) & (f[starts + k] == f[k])]
+    for start in starts[:MOST_COPIES].tolist():
+        copied = slice(0, n - start)
+        same = np.array_equal(x[start:], x[copied]) and np.array_equal(f[start:], f[copied])
+        if same and len(np.unique(f[copied])) > PATTERN:
+            return int(start)
+    return None
 
 
 @dataclass(frozen=True)
@@ -141,7 +235,7 @@ def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
     lower, length = float(x.min()), float(np.ptp(x))
     if not length > 0.0:
         return x[:1], f[:1]
-    cells = int(np.clip(len(x) // ROWS_A_CELL, 2, CELLS))
+    cells = int(np.clip(len(x) // POINT_ROWS, 2, CURVE_POINTS))
     cell = np.minimum((cells * ((x - lower) / length)).astype(np.intp), cells - 1)
     count = np.bincount(cell, minlength=cells)
     known = count > 0
@@ -159,7 +253,7 @@ def _pair(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
 
 def _apart(one: _Strokes, other: _Strokes) -> float:
     """The difference of two recordings; 0 where they differ as press and release of one object do."""
-    difference = _difference(*_pair(one, other))
+    difference = _curve_difference(*_pair(one, other))
     if one.way * other.way < 0 and np.isfinite(difference):
         press, release = (one, other) if one.way > 0 else (other, one)
         (x, f), (at, force) = press.curves[0], release.curves[0]
@@ -171,7 +265,7 @@ def _apart(one: _Strokes, other: _Strokes) -> float:
     return difference
 
 
-def _difference(one: Curve, other: Curve) -> float:
+def _curve_difference(one: Curve, other: Curve) -> float:
     """RMS difference over the spread of the first force; infinite where the positions do not overlap."""
     (x, f), (at, force) = one, other
     shared = (at >= x[0]) & (at <= x[-1])
@@ -189,7 +283,7 @@ def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
     tried = []
     for ratio, units in UNIT_RATIOS.items():
         for by in (ratio, 1.0 / ratio):
-            tried.append((_difference(one, (by * x, f)), "position", by, units))
-            tried.append((_difference(one, (x, by * f)), "force", by, units))
+            tried.append((_curve_difference(one, (by * x, f)), "position", by, units))
+            tried.append((_curve_difference(one, (x, by * f)), "force", by, units))
     best = min(tried, key=lambda each: each[0])
     return best[1:] if best[0] <= SAME else None
