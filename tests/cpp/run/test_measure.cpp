@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/rendering/measuring.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 namespace {
