@@ -5,7 +5,6 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 
 namespace palpate {
@@ -83,6 +82,21 @@ class Explicit {
     double position_ = 0.0;  ///< y_{k-1}
     double velocity_ = 0.0;  ///< v_{k-1}
     double force_ = 0.0;     ///< F_{k-1}
+};
+
+struct ExplicitStructure {
+    static constexpr StructureTraits traits{.name = "explicit", .coupling = true, .mass = true};
+
+    /// Slopes of the model from this one on are sure to diverge.
+    [[nodiscard]] static double slope_limit(const StructureNumbers& numbers) noexcept {
+        return explicit_slope_limit(numbers.inertia, numbers.coupling, numbers.period_s);
+    }
+
+    template <Environment E, class SolverOf, class Visit>
+    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,
+                      Visit& visit) {
+        return visit(Explicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s});
+    }
 };
 
 }  // namespace palpate

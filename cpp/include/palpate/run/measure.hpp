@@ -10,7 +10,7 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/rendering/probe.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/run/controller.hpp"
