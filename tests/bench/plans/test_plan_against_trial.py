@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "plan-against-trial.md"
 NUMBERS = PAGE.parent / "figures" / "plan-against-trial.json"
 
@@ -19,7 +19,7 @@ def test_the_command_runs_without_measured_data_and_says_what_it_left_out(tmp_pa
     environment = {key: value for key, value in os.environ.items() if key != "PALPATE_DATA"}
     command = [
         sys.executable,
-        str(ROOT / "bench" / PAGE.stem.replace("-", "_")) + ".py",
+        str(ROOT / "bench" / "plans" / "plan_against_trial.py"),
         "--to",
         str(tmp_path),
     ]

@@ -1,17 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The six problems with known truth: draws, and the median and range that are published of them."""
 
-import importlib
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parents[2] / "bench"))
-problem = importlib.import_module("problems").problem
-measured = importlib.import_module("identification").measured
-METHODS = importlib.import_module("peers.methods").METHODS
+from bench.identification.compare_methods import measured
+from bench.identification.methods import METHODS
+from bench.identification.problems import problem
 
 
 @pytest.mark.parametrize("name", ["P1", "P2", "P3", "P4", "P5"])
