@@ -156,6 +156,45 @@ class Model(ForceModel):
         self.created_by = created_by or f"palpate {__version__}"
         check_model(self.to_dict())
 
+    @classmethod
+    def from_network(
+        cls,
+        *,
+        alpha: npt.ArrayLike,
+        beta: npt.ArrayLike,
+        weight: npt.ArrayLike,
+        lower: npt.ArrayLike,
+        upper: npt.ArrayLike,
+        **arguments: Any,
+    ) -> Model:
+        """A model of given numbers that was not identified.
+
+        Parameters
+        ----------
+        alpha, beta, weight, lower, upper : array_like
+            As for Model.
+        **arguments
+            Any other argument of Model. Defaults: no linear part, no bias, SI units that are not stated, and
+            the kind and input names that follow from the shapes.
+
+        Raises
+        ------
+        ValueError
+            A shape or value is wrong; the message names the field.
+        """
+        d, n = np.size(lower), np.size(weight)
+        hysteretic = arguments.get("weight_hysteresis") is not None
+        given: dict[str, Any] = {
+            "kind": "hysteresis" if hysteretic else "position" if d == 1 else "general",
+            "inputs": ("position",) if d == 1 else tuple(f"input_{k + 1}" for k in range(d)),
+            "units": {"position": "", "force": ""},
+            "linear": np.zeros(d),
+            "bias": 0.0,
+            "fit": Fit("given", "given", 0.0, n, (2 * d + 1 + hysteretic) * n + (1 + hysteretic) * (d + 1)),
+            "data": Source((), "", 0, {}),
+        }
+        return cls(alpha=alpha, beta=beta, weight=weight, lower=lower, upper=upper, **given | arguments)
+
     @property
     def n_parameters(self) -> int:
         """Every fitted real number, dilations and translations included."""

@@ -51,7 +51,8 @@ class DeviceProfile(_core.device.DeviceProfile):
     ``b`` and ``f_c`` are what the mechanism itself brakes with: a certificate spends them. Where one of them
     is not known, a lower bound is right; where delay, steps or jitter are not known, an upper one.
 
-    Its fields, as keyword arguments: `fields_text` below.
+    The keyword arguments are the fields of the core's DeviceProfile, listed there with their units; every one
+    has a default, that of a simulated knob.
 
     Raises
     ------

@@ -9,7 +9,6 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/rendering/structure.hpp"
-#include "palpate/rendering/structure.hpp"
 
 // Checks that every time step with a mass behind a coupling has to pass.
 namespace palpate::test {

@@ -127,6 +127,21 @@ class JsonField {
     void require_object() const { require(value_.is_object(), "an object"); }
     [[nodiscard]] const Json& value() const { return value_; }
 
+    /// Free content may hold anything but numbers that are not finite, which no JSON file can hold.
+    void require_finite() const {
+        if (value_.is_object()) {
+            for (const auto& item : value_.items()) {
+                (*this)[item.key().c_str()].require_finite();
+            }
+        } else if (value_.is_array()) {
+            for (const JsonField& item : items()) {
+                item.require_finite();
+            }
+        } else if (value_.is_number()) {
+            (void)number();
+        }
+    }
+
     /// A value of the type of a field, with its rule. A struct is an object of exactly its stored fields.
     template <class T>
     [[nodiscard]] T as(Rule rule = Rule::Any, std::span<const std::string_view> choices = {}) const {

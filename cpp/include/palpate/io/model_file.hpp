@@ -204,6 +204,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         detail::read_certificate(file["certificate"], read.plan, read.planned(), read.position_unit);
     if (content.contains("notes")) {
         file["notes"].require_object();
+        file["notes"].require_finite();
     }
     return read;
 }

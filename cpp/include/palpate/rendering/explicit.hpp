@@ -20,6 +20,14 @@ namespace palpate {
     return (4.0 * inertia.mass - 2.0 * damping * period) / (period * period) - coupling.stiffness;
 }
 
+/// Object with B_o = ratio m / T for which the slope limit is `limit`: the inverse of `explicit_slope_limit`.
+[[nodiscard]] constexpr Inertia explicit_object(double limit, const VirtualCoupling& coupling, double ratio,
+                                                double period) noexcept {
+    const double mass = ((limit + coupling.stiffness) * period * period + 2.0 * coupling.damping * period) /
+                        (4.0 - 2.0 * ratio);
+    return {mass, ratio * mass / period};
+}
+
 /// m v' = F_c - f(x) - B_o v with the paper's delayed integrator (figure 14): everything on the right is one
 /// sample old, so nothing has to be solved, and the step is stable only for slopes below
 /// `explicit_slope_limit`:

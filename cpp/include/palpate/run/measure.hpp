@@ -38,8 +38,8 @@ template <Device D, Structure S, class Watch>
 }
 
 /// Returns the default probe of a range for a device, at a model's scale.
-[[nodiscard]] inline ProbeSettings probe_for(const ModelScale& scale, const DeviceProfile& device, double lower,
-                                             double upper) {
+[[nodiscard]] inline ProbeSettings probe_for(const ModelScale& scale, const DeviceProfile& device,
+                                             double lower, double upper) {
     ProbeSettings probe;
     probe.lower = lower;
     probe.upper = upper;
