@@ -47,7 +47,6 @@ PYBIND11_MODULE(_core, module) {
     bind_simulation(simulation);
     auto run = submodule("run", "Rendering and measuring in real time.");
     bind_run(run);
-    bind_measure(run);
     auto failure = submodule("failure", "Limits at which each method fails.");
     bind_failure(failure);
 }
