@@ -15,6 +15,5 @@ void bind_rendering(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
 void bind_simulation(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
-void bind_failure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

@@ -47,6 +47,4 @@ PYBIND11_MODULE(_core, module) {
     bind_simulation(simulation);
     auto run = submodule("run", "Rendering and measuring in real time.");
     bind_run(run);
-    auto failure = submodule("failure", "Limits at which each method fails.");
-    bind_failure(failure);
 }

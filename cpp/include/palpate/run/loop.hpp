@@ -177,8 +177,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
-    report.given_in_ramp = -controller.guards().at_start.least();
-    report.given = -controller.guards().observer.least();
+    report.given_in_ramp = 0.0 - controller.guards().at_start.least();  // not -0
+    report.given = 0.0 - controller.guards().observer.least();
     report.most_stored = controller.guards().tank.stored().most();
     report.buzzes = controller.guards().buzz.buzzes();
 }
