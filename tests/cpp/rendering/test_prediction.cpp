@@ -10,7 +10,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/failure/objects.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
