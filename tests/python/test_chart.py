@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from palpate.cli.speed_over_size import BOUNDS
 
 from palpate.cli.main import main
-from palpate.cli.speed_over_size import BOUNDS
 
 PNG = b"\x89PNG"
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from palpate.analysis import failure_map_names, measure_failure_map
+from palpate.cli.pages import with_tables
 
 from palpate import analysis
-from palpate.analysis import failure_map_names, measure_failure_map
 from palpate.cli.main import main
-from palpate.cli.pages import with_tables
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "where-each-method-fails.md"
