@@ -90,7 +90,9 @@ def test_parquet_without_pyarrow_says_what_to_install(
 
     reader = importlib.import_module("palpate.recording.formats")
     monkeypatch.setattr(reader, "import_module", missing)
-    assert (
+    assert refusal(path) == (
+        "a.parquet is Parquet, which needs pyarrow: install it with pip install 'palpate[parquet]'"
+    )
         refusal(path)
         == "a.parquet is Parquet, which needs pyarrow: install it with pip install 'palpate[parquet]'"
     )
