@@ -54,9 +54,9 @@ template <class T, class... Path>
 void add_scheme_choices(Setters<T>& setters, Path... path) {
     setters["structure"] = [=](T& settings, const pybind11::handle& value) {
         if constexpr (sizeof...(Path) == 0) {
-            settings.structure = structure_named(value.cast<std::string>());
+            settings.structure = named<StructureKind>(value.cast<std::string>(), "structure");
         } else {
-            (settings.*....*path).structure = structure_named(value.cast<std::string>());
+            (settings.*....*path).structure = named<StructureKind>(value.cast<std::string>(), "structure");
         }
     };
     setters["compensated"] = setter<T>(path..., &SchemeChoices::compensated);

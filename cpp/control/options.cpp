@@ -54,14 +54,6 @@ CLI::Validator not_negative() {
     return number_between(0.0, infinite);
 }
 
-std::string structure_list() {
-    std::string list;
-    for (const std::string_view name : structure_names) {
-        list += (list.empty() ? "" : ", ") + std::string(name);
-    }
-    return list;
-}
-
 CLI::Validator structure_word() {
     CLI::Validator validator;
     validator.operation([](std::string& text) -> std::string {

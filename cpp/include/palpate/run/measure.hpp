@@ -10,13 +10,7 @@
 #include "palpate/fields/readable.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/model/force_model.hpp"
-<<<<<<< HEAD
 #include "palpate/rendering/measuring.hpp"
-=======
-#include "palpate/rendering/free_motion.hpp"
-#include "palpate/rendering/probe.hpp"
-#include "palpate/rendering/pulses.hpp"
->>>>>>> run
 #include "palpate/rendering/scale.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/run/live_device.hpp"
@@ -35,11 +29,6 @@ struct MeasureOptions : RunOptions {
     bool transducer = true;       ///< of the simulated device
     double friction_share = 0.0;  ///< Coulomb friction of the simulated device, relative to its force limit
 
-<<<<<<< HEAD
-/// Returns the default probe of a range for a device, at a model's scale.
-[[nodiscard]] inline ProbeSettings probe_for(const ModelScale& scale, const DeviceProfile& device,
-                                             double lower, double upper) {
-=======
     [[nodiscard]] bool moves() const noexcept { return probe || push; }
 };
 
@@ -47,7 +36,6 @@ namespace detail {
 
 /// Returns the settings of the probe: the given ones, else the default ones at the scale of the device.
 [[nodiscard]] inline ProbeSettings chosen_probe(const MeasureOptions& options, const LiveDevice& device) {
->>>>>>> run
     ProbeSettings probe;
     probe.lower = options.lower.value_or(probe.lower);
     probe.upper = options.upper.value_or(probe.upper);
