@@ -182,7 +182,7 @@ def _massless(task: Task) -> Candidate | Refusal:
     model, device = task.model, task.device
     damping = task.coupling_damping or 0.0
     stiffness = task.coupling_stiffness
-    low, high = renderable_slopes(device)
+    low, high = (-math.inf, math.inf) if model.hysteretic else renderable_slopes(device)
     if stiffness is None:
         static = damping == 0.0 and not model.hysteretic
         falling = 0.0 if static else max(0.0, -force_bounds(model, task.usual_play).slope_min)

@@ -56,9 +56,10 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
             outcome = CANDIDATES[name](replace(task, device=changed))
             if isinstance(outcome, Refusal) or outcome.certificate.refused:
                 continue
-            proved = outcome.certificate.certified or not certified
+            if certified and not outcome.certificate.certified:
+                return False
             error = static_force_error(task.model, outcome.rendered, outcome.scheme)
-            return proved and error.share <= accept_force_error
+            return error.share <= accept_force_error
         return False
 
     def least(*properties: _Property) -> str:
