@@ -17,6 +17,5 @@ void bind_stability(pybind11::module_& module);
 void bind_simulation(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
-void bind_failure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

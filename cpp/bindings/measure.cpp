@@ -40,20 +40,21 @@ struct ProbeWish {
     bool wanted = false;
     std::optional<double> lower, upper, speed, stiffness, force_limit;
 
-    [[nodiscard]] std::optional<ProbeSettings> granted(const Bench& bench, double lowest,
+    [[nodiscard]] std::optional<ProbeSettings> granted(const TestRig& rig, double lowest,
                                                        double highest) const {
         if (!wanted) {
             return std::nullopt;
         }
-        ProbeSettings probe = probe_for(bench, lower.value_or(lowest), upper.value_or(highest));
+        ProbeSettings probe =
+            probe_for(rig.scale, rig.device, lower.value_or(lowest), upper.value_or(highest));
         probe.speed = speed.value_or(probe.speed);
         probe.stiffness = stiffness.value_or(probe.stiffness);
         probe.force_limit = force_limit.value_or(probe.force_limit);
         validate(probe);
-        detail::require(bench.device.makes(probe.force_limit),
-                        "force_limit is " + readable(probe.force_limit) + ", the device makes " +
-                            readable(bench.device.force_limit));
-        probe.force_limit = std::min(probe.force_limit, bench.device.force_limit);
+        detail::require(rig.device.makes(probe.force_limit), "force_limit is " + readable(probe.force_limit) +
+                                                                 ", the device makes " +
+                                                                 readable(rig.device.force_limit));
+        probe.force_limit = std::min(probe.force_limit, rig.device.force_limit);
         return probe;
     }
 };
@@ -93,13 +94,13 @@ struct Measurement {
     double friction_share = 0.0;   ///< Coulomb friction of the simulated device, over its force limit
 };
 
-/// A measurement on a device that is described by `bench`. The device is not open yet; `told` is added to the
+/// A measurement on a device that is described by `rig`. The device is not open yet; `told` is added to the
 /// summary when it has been closed.
 template <Device D, class Told>
-py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSettings>& probe,
+py::dict measured_on(D& device, const TestRig& rig, const std::optional<ProbeSettings>& probe,
                      const Metadata& metadata, Measurement& wanted, Told told) {
     const double period_s = 1.0 / wanted.session.loop.rate_hz;
-    GuardSettings guards = bench.guards();
+    GuardSettings guards = guards_for(rig.scale, rig.device);
     guards.ramp_s = probe || wanted.push ? guards.ramp_s : 0.0;  // what makes no force has none to begin with
     guards.force_limit = probe ? probe->force_limit : guards.force_limit;
     RecordSinks sinks;
@@ -129,53 +130,53 @@ py::dict measured_on(D& device, const Bench& bench, const std::optional<ProbeSet
                                                         metadata, wanted.record, wanted.force, expected);
     watcher.rethrow();
     py::dict summary = summary_of(report, wanted.session.loop, sinks, wanted.record, notes, expected);
-    summary["device"] = bench.device.id;
-    summary["encoder_step"] = bench.device.encoder_step;
-    summary["force_limit"] = bench.device.force_limit;
+    summary["device"] = rig.device.id;
+    summary["encoder_step"] = rig.device.encoder_step;
+    summary["force_limit"] = rig.device.force_limit;
     summary["transducer"] = wanted.transducer;
     summary["position_range"] = std::pair{sinks.positions.lower, sinks.positions.upper};
     summary["force_range"] = std::pair{sinks.forces.lower, sinks.forces.upper};
     if (wanted.keep) {
-        summary["profile"] = bench.device;
+        summary["profile"] = rig.device;
         summary["kept"] = columns(sinks.kept);
     }
     told(summary);
     return summary;
 }
 
-/// The bench on which a model is mounted; without one the default knob.
-Bench bench_with(const std::optional<ForceModel>& object, const RecordUnits& units, double period_s) {
+/// Returns the test rig for a mounted model; without one the default knob.
+TestRig rig_with(const std::optional<ForceModel>& object, const RecordUnits& units, double period_s) {
     if (object) {
-        return bench_for(*object, units.position == "rad", period_s);
+        return rig_for(*object, units.position == "rad", period_s);
     }
-    Bench bench;
-    bench.device.period_s = period_s;
-    return bench;
+    TestRig rig;
+    rig.device.period_s = period_s;
+    return rig;
 }
 
 py::dict measure_on_simulated(const std::optional<ForceModel>& object, Measurement& wanted) {
     validate(wanted.session.loop);
     const double period_s = 1.0 / wanted.session.loop.rate_hz;
-    Bench bench = bench_with(object, wanted.units, period_s);
+    TestRig rig = rig_with(object, wanted.units, period_s);
     const ProbeSettings standard;
     const std::optional<ProbeSettings> probe =
-        wanted.probe.granted(bench, object ? object->domain().lower[0] : standard.lower,
+        wanted.probe.granted(rig, object ? object->domain().lower[0] : standard.lower,
                              object ? object->domain().upper[0] : standard.upper);
     if (probe || wanted.push) {
-        bench.hand.stiffness = bench.hand.damping = 0.0;  // nobody holds a handle that moves by itself
+        rig.hand.stiffness = rig.hand.damping = 0.0;  // nobody holds a handle that moves by itself
     }
-    bench.device.coulomb_friction = wanted.friction_share * bench.device.force_limit;
-    validate(bench.device);
-    SimulatedRig device{bench.device, bench.hand, simulated_substeps(period_s)};
+    rig.device.coulomb_friction = wanted.friction_share * rig.device.force_limit;
+    validate(rig.device);
+    SimulatedRig device{rig.device, rig.hand, simulated_substeps(period_s)};
     wanted.transducer = object && wanted.transducer;
     if (object) {
-        device.mount({object_of(*object, bench, 0.0), wanted.transducer});
+        device.mount({object_of(*object, rig, 0.0), wanted.transducer});
     }
-    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
+    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, rig.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
     metadata.insert(metadata.begin() + 1,
                     {"simulated", "yes: device, hand and object; nothing here was measured"});
-    return measured_on(device, bench, probe, metadata, wanted, [](py::dict&) {});
+    return measured_on(device, rig, probe, metadata, wanted, [](py::dict&) {});
 }
 
 #ifdef PALPATE_HAS_USB
@@ -189,30 +190,30 @@ wire::Info identity_of(const std::string& serial, DeviceProfile& profile) {
 }
 
 py::dict measure_on_usb(const std::string& serial, Measurement& wanted) {
-    Bench bench;
-    const wire::Info info = identity_of(serial, bench.device);
+    TestRig rig;
+    const wire::Info info = identity_of(serial, rig.device);
     wanted.session.loop.rate_hz = info.rate_hz;
     validate(wanted.session.loop);
     wanted.transducer = (info.capabilities & wire::has_transducer) != 0;
     detail::require(
         wanted.transducer || wanted.probe.wanted || wanted.record.empty(),
-        bench.device.id +
+        rig.device.id +
             " has no force transducer, and its motor shows nothing of a force while somebody else "
             "moves the handle: probe instead");
     detail::require(!wanted.probe.wanted || wanted.probe.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     const ProbeSettings standard;
     wanted.probe.force_limit =
-        wanted.probe.force_limit.value_or(std::min(standard.force_limit, bench.device.force_limit));
-    const std::optional<ProbeSettings> probe = wanted.probe.granted(bench, standard.lower, standard.upper);
+        wanted.probe.force_limit.value_or(std::min(standard.force_limit, rig.device.force_limit));
+    const std::optional<ProbeSettings> probe = wanted.probe.granted(rig, standard.lower, standard.upper);
     UsbOptions options{.serial = serial, .makes_force = probe || wanted.push};
     if (wanted.wait_s) {
         options.wait = std::chrono::microseconds{std::llround(1e6 * *wanted.wait_s)};
     }
     UsbDevice device{options};
-    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, bench.device.id, probe,
+    Metadata metadata = measured_metadata(std::string("palpate ") + PALPATE_VERSION, rig.device.id, probe,
                                           wanted.transducer, wanted.session.loop.rate_hz);
-    return measured_on(device, bench, probe, metadata, wanted, [&](py::dict& summary) {
+    return measured_on(device, rig, probe, metadata, wanted, [&](py::dict& summary) {
         const UsbHealth health = device.health();
         summary["device"] = device.name().text();
         if (health.stream.delay.count() > 0) {  // a device may accept no command while it is disabled

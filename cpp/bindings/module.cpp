@@ -49,6 +49,4 @@ PYBIND11_MODULE(_core, module) {
     auto run = submodule("run", "Rendering and measuring in real time.");
     bind_run(run);
     bind_measure(run);
-    auto failure = submodule("failure", "Limits at which each method fails.");
-    bind_failure(failure);
 }

@@ -43,13 +43,13 @@ py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const s
     settings.real_time = {priority, cpu};
     validate(settings.loop);
     const double period_s = 1.0 / rate_hz;
-    const Bench bench = bench_for(model, position_unit == "rad", period_s);
-    const GuardSettings guards = bench.guards();
+    const TestRig rig = rig_for(model, position_unit == "rad", period_s);
+    const GuardSettings guards = guards_for(rig.scale, rig.device);
     const RecordUnits units{position_unit, force_unit == "N*m" ? "Nm" : force_unit};
     const Metadata metadata = flight_metadata(std::string("palpate ") + PALPATE_VERSION,
-                                              simulated_metadata(bench), model_name, scheme, guards, rate_hz);
+                                              simulated_metadata(rig), model_name, scheme, guards, rate_hz);
     validate(scheme, model, period_s);
-    SimulatedDevice device{bench.device, bench.hand, simulated_substeps(period_s)};
+    SimulatedDevice device{rig.device, rig.hand, simulated_substeps(period_s)};
     RecordSinks sinks;
     if (telemetry_port) {
         const std::string reason = sinks.telemetry.open(*telemetry_port, telemetry_hz, units);

@@ -63,15 +63,15 @@ std::string not_certified(const ModelFile& file, const Options& options, const D
     return "";
 }
 
-Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units, const Bench& bench) {
+Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units, const TestRig& rig) {
     if (!options.uncertified) {
-        if (const std::string reason = not_certified(file, options, bench.device); !reason.empty()) {
+        if (const std::string reason = not_certified(file, options, rig.device); !reason.empty()) {
             refuse(options.model + " " + reason +
                    "; make a certificate with 'palpate plan', or type --uncertified to render without");
         }
     }
-    const Scheme scheme = scheme_of(options, file, bench);
-    GuardSettings guards = guards_of(options, bench);
+    const Scheme scheme = scheme_of(options, file, rig);
+    GuardSettings guards = guards_of(options, rig);
     LoopSettings loop = options.loop;
     if (!options.uncertified) {
         keep_to(*file.certificate, guards, loop);

@@ -24,9 +24,9 @@ void keep_to(const Certificate& certificate, GuardSettings& guards, LoopSettings
 [[nodiscard]] std::string not_certified(const ModelFile& file, const Options& options,
                                         const DeviceProfile& device);
 
-/// What is done on a real device, which `bench` describes: what the model's certificate is for, or, where the risk was
+/// What is done on a real device, which `rig` describes: what the model's certificate is for, or, where the risk was
 /// typed in full, what the options say. Throws where neither allows it.
 [[nodiscard]] Job job_on_real_device(const Options& options, ModelFile file, RecordUnits units,
-                                     const Bench& bench);
+                                     const TestRig& rig);
 
 }  // namespace palpate::control

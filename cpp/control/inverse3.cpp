@@ -57,15 +57,14 @@ int run_on_inverse3(const Options& options, ModelFile file, RecordUnits units) {
     if (const Opened opened = device.open(); !opened) {
         refuse("--device " + options.device + ": " + opened.reason);
     }
-    Bench bench = bench_for(file.model, false, 1.0 / options.loop.rate_hz);
-    bench.device = profile_of(device.info(), options, file, bench.device);
-    const Job job = job_on_real_device(options, std::move(file), std::move(units), bench);
+    TestRig rig = rig_for(file.model, false, 1.0 / options.loop.rate_hz);
+    rig.device = profile_of(device.info(), options, file, rig.device);
+    const Job job = job_on_real_device(options, std::move(file), std::move(units), rig);
     const Inverse3Info info = device.info();
-    const Metadata about{
-        {"device", bench.device.id + " through the Haply Inverse Service, " + options.device},
-        {"service", filters_of(info)},
-        {"certified", options.uncertified ? "no: --uncertified was given" : "yes"}};
-    const std::string called = bench.device.id + " (the service's " + filters_of(info) + ")" +
+    const Metadata about{{"device", rig.device.id + " through the Haply Inverse Service, " + options.device},
+                         {"service", filters_of(info)},
+                         {"certified", options.uncertified ? "no: --uncertified was given" : "yes"}};
+    const std::string called = rig.device.id + " (the service's " + filters_of(info) + ")" +
                                (options.uncertified ? ", uncertified," : "");
     return render_on(device, called, options, job, about, [&] {
         return Story{{{"service", filters_of(info)}},

@@ -72,18 +72,18 @@ const ForceModel& rendered(const Options& options, const ModelFile& file) {
     return follows_plan(options, file) ? file.planned() : file.model;
 }
 
-Scheme scheme_of(const Options& options, const ModelFile& file, const Bench& bench) {
+Scheme scheme_of(const Options& options, const ModelFile& file, const TestRig& rig) {
     SchemeChoices choices = options.scheme;
     if (options.structure) {
         choices.structure = structure_named(*options.structure);
     }
-    const Scheme scheme = follows_plan(options, file) ? *file.plan : bench.scheme(file.model, choices);
-    validate(scheme, rendered(options, file), bench.device.period_s);
+    const Scheme scheme = follows_plan(options, file) ? *file.plan : rig.scheme(file.model, choices);
+    validate(scheme, rendered(options, file), rig.device.period_s);
     return scheme;
 }
 
-GuardSettings guards_of(const Options& options, const Bench& bench) {
-    GuardSettings guards = bench.guards();
+GuardSettings guards_of(const Options& options, const TestRig& rig) {
+    GuardSettings guards = guards_for(rig.scale, rig.device);
     guards.force_limit = options.force_limit.value_or(guards.force_limit);
     guards.largest_speed = options.largest_speed.value_or(guards.largest_speed);
     guards.slew_s = options.slew_s.value_or(guards.slew_s);
@@ -91,11 +91,11 @@ GuardSettings guards_of(const Options& options, const Bench& bench) {
     guards.frozen_s = options.frozen_s;
     guards.energy_tank = !options.no_energy_tank;
     validate(guards);
-    if (!bench.device.makes(guards.force_limit)) {
+    if (!rig.device.makes(guards.force_limit)) {
         refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +
-               readable(bench.device.force_limit));
+               readable(rig.device.force_limit));
     }
-    guards.force_limit = std::min(guards.force_limit, bench.device.force_limit);
+    guards.force_limit = std::min(guards.force_limit, rig.device.force_limit);
     return guards;
 }
 
@@ -173,12 +173,12 @@ int run_on_simulated(const Options& given, ModelFile file, RecordUnits units) {
     Options options = given;
     options.loop.rate_hz = rate_of(given, file, certified);
     const double period_s = 1.0 / options.loop.rate_hz;
-    Bench bench = bench_for(file.model, file.position_unit == "rad", period_s);
+    TestRig rig = rig_for(file.model, file.position_unit == "rad", period_s);
     if (certified) {
-        bench.device = file.certificate->device;
+        rig.device = file.certificate->device;
     }
-    const Scheme scheme = scheme_of(options, file, bench);
-    GuardSettings guards = guards_of(options, bench);
+    const Scheme scheme = scheme_of(options, file, rig);
+    GuardSettings guards = guards_of(options, rig);
     if (certified) {
         keep_to(*file.certificate, guards, options.loop);
     } else if (file.certificate) {
@@ -189,15 +189,15 @@ int run_on_simulated(const Options& given, ModelFile file, RecordUnits units) {
     for (const std::string& fault : options.faults) {
         faults.push_back(parse_fault(fault, period_s));
     }
-    Faulty device{SimulatedDevice{bench.device, bench.hand, simulated_substeps(period_s)}, faults,
+    Faulty device{SimulatedDevice{rig.device, rig.hand, simulated_substeps(period_s)}, faults,
                   3.0 * guards.largest_speed * period_s};
     if (const Opened opened = device.open(); !opened) {
         refuse(opened.reason);
     }
-    Metadata about = simulated_metadata(bench);
+    Metadata about = simulated_metadata(rig);
     about.emplace_back("certified",
                        certified ? std::string(name_of(job.file.certificate->verdict)) : "no: " + reason);
-    return render_on(device, bench.device.id + " (simulated: nothing moves)", options, job, about,
+    return render_on(device, rig.device.id + " (simulated: nothing moves)", options, job, about,
                      [] { return Story{}; });
 }
 

@@ -33,9 +33,9 @@ struct Job {
 /// The model that is rendered: that of the plan where the plan is followed, else the identified one.
 [[nodiscard]] const ForceModel& rendered(const Options& options, const ModelFile& file);
 /// The rendering that the options ask for, else the model's plan, else the default one.
-[[nodiscard]] Scheme scheme_of(const Options& options, const ModelFile& file, const Bench& bench);
-/// Throws where the device of the bench cannot make the force that is asked for.
-[[nodiscard]] GuardSettings guards_of(const Options& options, const Bench& bench);
+[[nodiscard]] Scheme scheme_of(const Options& options, const ModelFile& file, const TestRig& rig);
+/// Throws where the device of the rig cannot make the force that is asked for.
+[[nodiscard]] GuardSettings guards_of(const Options& options, const TestRig& rig);
 
 /// Throws where the loop cannot be run as it is set.
 [[nodiscard]] Job job_of(const Options& options, ModelFile file, RecordUnits units, const Scheme& scheme,

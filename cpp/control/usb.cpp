@@ -96,9 +96,9 @@ int run_on_usb(const Options& options, ModelFile file, RecordUnits units) {
         refuse("--device " + options.device + ": " + opened.reason);
     }
     require_fitting(options, file, device);
-    Bench bench = bench_for(file.model, true, 1.0 / device.info().rate_hz);
-    bench.device = device.profile(bench.device);
-    const Job job = job_on_real_device(options, std::move(file), std::move(units), bench);
+    TestRig rig = rig_for(file.model, true, 1.0 / device.info().rate_hz);
+    rig.device = device.profile(rig.device);
+    const Job job = job_on_real_device(options, std::move(file), std::move(units), rig);
     const Metadata about{{"device", device.name().text()},
                          {"certified", options.uncertified ? "no: --uncertified was given" : "yes"}};
     return render_on(device, device.name().text() + (options.uncertified ? ", uncertified," : ""), options,

@@ -72,16 +72,16 @@ def render(
     """
     from .._core.run import render as render_live
     from ..model import load_model
-    from ..planning import bench_for
+    from ..planning import rig_for
 
     if record is not None:
         require_writable(record, inputs=(model_file,))
         if not force:
             require_absent(record)
     model = load_model(model_file)
-    bench = bench_for(model)
-    plan = chosen_plan(model, bench, scheme)
-    talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated: nothing moves")
+    rig = rig_for(model)
+    plan = chosen_plan(model, rig, scheme)
+    talk(f"read {model_file}: {model!r}; rendering on a {rig.device.id}, which is simulated: nothing moves")
     with live_line(rate_hz, (model.units["position"], model.units["force"])) as line:
         summary = render_live(
             plan.rendered,

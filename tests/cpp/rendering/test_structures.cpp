@@ -17,7 +17,7 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/simulated_device.hpp"
-#include "palpate/simulation/virtual_time.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "support.hpp"
 

@@ -9,6 +9,7 @@
 
 #include "palpate/rendering/free_motion.hpp"
 #include "palpate/rendering/pulses.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 namespace {

@@ -104,16 +104,16 @@ Rendering render(const std::vector<Fault>& faults, const LoopSettings& settings,
                  RecordingFile* file = nullptr, LateTick late = {}) {
     Rendering run;
     const ForceModel model = spring();
-    const Bench bench = bench_for(model, true, period_s);
-    run.guards = bench.guards();
+    const TestRig rig = rig_for(model, true, period_s);
+    run.guards = guards_for(rig.scale, rig.device);
     run.guards.ramp_s = 0.02;
-    with_structure(model, bench.scheme(model), period_s, bench.device.force_limit, [&](auto structure) {
-        Observing device{Faulty{SimulatedDevice{bench.device, bench.hand, 4}, faults,
+    with_structure(model, rig.scheme(model), period_s, rig.device.force_limit, [&](auto structure) {
+        Observing device{Faulty{SimulatedDevice{rig.device, rig.hand, 4}, faults,
                                 3.0 * run.guards.largest_speed * period_s},
                          run.observed};
         EXPECT_TRUE(device.open());
         Controller controller{device, std::move(structure),
-                              guards_of(run.guards, model, bench.scheme(model), period_s)};
+                              guards_of(run.guards, model, rig.scheme(model), period_s)};
         VirtualClock clock{late};
         Collected sink;
         sink.file = file;

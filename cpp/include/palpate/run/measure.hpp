@@ -2,7 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,14 +11,12 @@
 #include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/probe.hpp"
-#include "palpate/rendering/scheme.hpp"
+#include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/run/record_sinks.hpp"
 #include "palpate/run/session.hpp"
 #include "palpate/run/session_text.hpp"
-#include "palpate/simulation/simulated_device.hpp"
-#include "palpate/simulation/test_rig.hpp"
 
 namespace palpate {
 
@@ -40,15 +37,16 @@ template <Device D, Structure S, class Watch>
     return run_session(controller, settings, sinks, asked, watch);
 }
 
-/// A probe that suits a bench: its size follows the bench's, its range is given, its limit is the device's.
-[[nodiscard]] inline ProbeSettings probe_for(const Bench& bench, double lower, double upper) {
+/// Returns the default probe of a range for a device, at a model's scale.
+[[nodiscard]] inline ProbeSettings probe_for(const ModelScale& scale, const DeviceProfile& device, double lower,
+                                             double upper) {
     ProbeSettings probe;
     probe.lower = lower;
     probe.upper = upper;
-    probe.speed *= bench.length;
-    probe.stiffness *= bench.stiffness;
-    probe.damping *= bench.stiffness;
-    probe.force_limit = bench.device.force_limit;
+    probe.speed *= scale.length;
+    probe.stiffness *= scale.stiffness();
+    probe.damping *= scale.stiffness();
+    probe.force_limit = device.force_limit;
     return probe;
 }
 
@@ -66,20 +64,6 @@ template <Device D, Structure S, class Watch>
                                  " a second, no force above " + readable(probe->force_limit)
                            : "a hand"},
         {"rate_hz", readable(rate_hz)}};
-}
-
-/// A model as a thing that can be mounted on the simulated device of its bench, at rest at `start`.
-[[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, const Bench& bench,
-                                                             double start) {
-    SchemeChoices direct;
-    direct.structure = StructureKind::Direct;
-    return with_structure(model, bench.scheme(model, direct), bench.device.period_s, bench.device.force_limit,
-                          [start](auto structure) -> std::function<double(double)> {
-                              structure.reset(start);
-                              return [structure](double position) mutable {
-                                  return structure.step(position).force;
-                              };
-                          });
 }
 
 }  // namespace palpate

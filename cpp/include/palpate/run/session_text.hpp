@@ -15,7 +15,6 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/loop.hpp"
 #include "palpate/run/session.hpp"
-#include "palpate/simulation/test_rig.hpp"
 
 namespace palpate {
 
@@ -91,15 +90,6 @@ namespace palpate {
         text += ", predict " + std::to_string(scheme.predict);
     }
     return text;
-}
-
-/// What a flight record says of a simulated device.
-[[nodiscard]] inline Metadata simulated_metadata(const Bench& bench) {
-    return {{"simulated", "yes: device and hand; nothing here was measured"},
-            {"device", bench.device.id},
-            {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
-                         ", to a point between " + readable(bench.hand.lower) + " and " +
-                         readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"}};
 }
 
 /// The head of a flight record.
