@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nearest force that a device can render: slopes limited, everything else left as it was identified.
+"""The network nearest to a model that a device can render: slopes limited, the rest left as identified.
 
 The nearest force with slopes between two limits is an isotonic regression; it differs from the model on whole
 stretches around what is too steep, and has kinks at their ends. Smoothing by a narrow positive kernel rounds
@@ -16,16 +16,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
-from .._core.model import wavelet_columns, wavelet_slope_columns
+from .._core.model import ForceModel, wavelet_columns, wavelet_slope_columns
 from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
-from ..identification.constraints import domain_bounds, impose
+from ..identification.constraints import domain_bounds, impose, slope_limited
 from ..identification.identified import Readings
 from ..identification.separable import Basis, Block, SeparableProblem
-from ..model import Model
-from .nearest_force import changes_needed
-from .static_error import SAMPLES, strokes
+from .static_error import SAMPLES, strokes, with_network
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 """Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both
@@ -55,28 +54,28 @@ _SCALE_STEP = 0.75
 """Frame of the candidates: ratio of neighbouring dilations, translation step over width [-]"""
 
 _WIDE = 1e9
-"""A play of so many travels adds no slope while it sticks [-]"""
+"""A play radius of this many travels adds no slope while it sticks [-]"""
 
 
 @lru_cache(maxsize=8)
-def sliding_bounds(model: Model, force_limit: float = math.inf) -> ForceBounds:
-    """Proved bounds while sliding, continuations included: of a play that adds no slope."""
+def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBounds:
+    """Proved bounds while sliding, continuations included: those of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
     return force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
 
 
-def sliding_slopes(model: Model) -> tuple[float, float]:
+def sliding_slopes(model: ForceModel) -> tuple[float, float]:
     """The smallest and largest slope of these bounds."""
     bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
 
-def limit_slopes(model: Model, low: float, high: float) -> Model | None:
+def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | None:
     """The model with every slope proved to lie within limits; None where no such network was found.
 
     Parameters
     ----------
-    model : Model
+    model : ForceModel
         A model of one position.
     low, high : float
         Slopes of either stroke [force/position]; may be infinite.
@@ -92,21 +91,19 @@ def limit_slopes(model: Model, low: float, high: float) -> Model | None:
     return None
 
 
-def scale_loss(model: Model, share: float) -> Model:
-    """The model with h multiplied by a share: less of what press and release differ by."""
-    network = model.to_dict()["network"]
-    return model.with_network(
-        weight_hysteresis=[share * weight for weight in network["weight_hysteresis"]],
-        linear_hysteresis=[share * slope for slope in network["linear_hysteresis"]],
-        bias_hysteresis=share * network["bias_hysteresis"],
-    )
+def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
+    """The model with h multiplied by a share: the two strokes differ by less."""
+    names = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+    return with_network(model, **{name: share * getattr(model, name) for name in names})
 
 
-def _limited_once(model: Model, low: float, high: float, sigma: float, restoring: bool) -> Model | None:
+def _limited_once(
+    model: ForceModel, low: float, high: float, sigma: float, restoring: bool
+) -> ForceModel | None:
     """The model with the change fitted; None where its continuations would be steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
-    changes = changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
+    changes = _changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
     wanted = forces + changes
     middle, travel = wanted.mean(axis=0), x[-1] - x[0]
     pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
@@ -121,9 +118,66 @@ def _limited_once(model: Model, low: float, high: float, sigma: float, restoring
     return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
 
 
+def _changes_needed(
+    x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: ForceModel, restoring: bool
+) -> Float2D:
+    """What strokes (k, n) lack for their slopes to lie within limits, kinks rounded; zero elsewhere."""
+    n, step = len(x), x[1] - x[0]
+    margin = int(np.ceil(6.0 * sigma / step))
+    before = after = 0
+    if model.period is not None:
+        before = after = n - 1
+        wide = [np.concatenate([f[:-1] - f[-1] + f[0], f, f[1:] + f[-1] - f[0]]) for f in strokes]
+    else:
+        # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
+        before, after = (n if side == "free" else 0 for side in (model.below, model.above))
+        wide = [np.pad(force, (before, after)) for force in strokes]
+    grid = x[0] + step * (np.arange(len(wide[0])) - before)
+    nearest = np.array([slope_limited(grid, force, low, high) for force in wide])
+    if restoring and model.period is None:
+        rise, fall = high * (grid - x[0]), high * (grid - x[-1])
+        nearest = np.minimum(nearest, np.maximum(rise, 0.0) if model.below == "free" else rise)
+        nearest = np.maximum(nearest, np.minimum(fall, 0.0) if model.above == "free" else fall)
+    if len(strokes) == 2 and model.below == "free" and model.period is None:
+        nearest = _begun_together(grid, nearest, before, margin // 2, high)
+    inside = slice(margin + before, margin + before + n)
+    changes = []
+    for force, limited in zip(strokes, nearest, strict=True):
+        extended = _extended(limited, margin)
+        smooth = gaussian_filter1d(extended, sigma / step, mode="nearest")[inside]
+        touched = np.abs(extended[inside] - force) > 1e-9 * np.ptp(force)
+        near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
+        changes.append(np.where(near, smooth - force, 0.0))
+    return np.array(changes)
+
+
+def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
+    """Pressing (2, n) lowered where contact begins, if it would be too steep beyond the lower edge.
+
+    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Where it
+    rises as steeply as it may, that is too much if it begins above `high` / slope times where releasing
+    ends, the slope being that of releasing over the `near` samples that the rounding of kinks reaches.
+    """
+    press, release = strokes
+    first = release[edge]
+    slope = np.diff(release[edge : edge + near + 1]).max() / (grid[1] - grid[0])
+    if first <= 0.0 or slope <= 0.0:
+        return strokes
+    begin = release[edge + near] + first * (high / slope - 1.0)
+    return np.array([np.minimum(press, begin + high * (grid - grid[edge + near])), release])
+
+
+def _extended(force: Float1D, margin: int) -> Float1D:
+    """A force and its straight continuations."""
+    steps = np.arange(1, margin + 1)
+    before = force[0] - steps[::-1] * (force[1] - force[0])
+    after = force[-1] + steps * (force[-1] - force[-2])
+    return np.concatenate([before, force, after])
+
+
 def _fitted(
-    model: Model, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
-) -> Model:
+    model: ForceModel, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
+) -> ForceModel:
     """Least squares on the wavelets that there were and further ones, the slope limits and h >= 0 imposed."""
     lower, travel = model.lower, model.upper - model.lower
     box = ((x - lower) / travel)[:, None]
@@ -144,19 +198,19 @@ def _fitted(
     lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
     bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
     found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
-    new: dict[str, Any] = {"alpha": found.alpha.tolist(), "beta": found.beta.tolist()}
+    new: dict[str, Any] = {"alpha": found.alpha, "beta": found.beta}
     for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
         new[f"bias{suffix}"] = float(found.bias[k])
-        new[f"linear{suffix}"] = found.linear[k].tolist()
-        new[f"weight{suffix}"] = found.weights[k].tolist()
-    limited = model.with_network(**new)
+        new[f"linear{suffix}"] = found.linear[k]
+        new[f"weight{suffix}"] = found.weights[k]
+    limited = with_network(model, **new)
     if not lossy:
         return limited
     least = sliding_bounds(limited).loss_min
     if least >= 0.0:
         return limited
-    # What is imposed holds but for rounding, and h >= 0 is proved or not: raise it by that much.
-    return limited.with_network(bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
+    # The bound h >= 0 is imposed up to rounding, but must be proved: raise h by the difference.
+    return with_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
 
 
 def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ladder of structures: the simplest that is certified for a model on a device."""
+"""The plan of a model on a device: the first candidate structure that is certified."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from .._core.rendering import most_prediction_taps
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
+from .candidates import CANDIDATES, Candidate, Refusal, Task
+from .device_needs import needed
 from .device_profile import DeviceProfile, example_profiles, profile_file
-from .needs import needed
-from .plan import ACCEPTED_FORCE_ERROR, Plan
-from .rungs import RUNGS, Wishes
+from .plan import ACCEPTED_FORCE_ERROR, Plan, require_force
+from .static_error import network_of, with_network
 
 _FORCE_UNIT = {"rad": "N*m", "m": "N"}
 
@@ -99,9 +100,10 @@ def plan(
             f"the device {device.id} makes {_FORCE_UNIT[device.position_unit]}, the model's force is in "
             f"{model.units['force']}"
         )
-    content = model.to_dict()
-    content.update(plan=None, certificate=None)
-    wishes = Wishes(
+    require_force(model)
+    task = Task(
+        with_network(model),
+        device,
         coupling=coupling or coupling_stiffness is not None or coupling_damping is not None,
         coupling_stiffness=coupling_stiffness,
         coupling_damping=coupling_damping,
@@ -110,37 +112,41 @@ def plan(
         play_radius=play_radius,
         predict=samples,
     )
-    bare = Model.from_dict(content)
-    if bare.of_velocity and (wishes.coupling or wishes.dynamic):
+    if model.of_velocity and (task.coupling or task.dynamic):
         raise InputError(
             "a force of position and velocity is rendered directly: behind a coupling, or with a mass or "
             "damping beside it, no bound is known"
         )
-    if samples and (bare.of_velocity or wishes.coupling or wishes.dynamic):
+    if samples and (model.of_velocity or task.coupling or task.dynamic):
         raise InputError(
             f"predict is {samples}: must be 0 (off) for a coupling, a mass, a damping or a force of "
             "velocity; a prediction is certified for direct rendering of a force of position"
         )
     refused: list[str] = []
-    chosen: Plan | None = None
-    for name, rung in RUNGS.items():
-        outcome = rung(bare, device, wishes)
-        if isinstance(outcome, str):
-            refused.append(f"{name}: {outcome}")
+    chosen: Candidate | None = None
+    for name, propose in CANDIDATES.items():
+        outcome = propose(task)
+        if isinstance(outcome, Refusal):
+            refused.append(f"{name}: {outcome.reason}")
             continue
         chosen = outcome
-        assert outcome.certificate is not None
-        if not outcome.certificate.refused:
+        if not chosen.certificate.refused:
             break
-        refused.append(f"{name}: {outcome.certificate.why}")
-    assert chosen is not None  # the explicit rung always proposes something
-    chosen = replace(chosen, model=model, refused=tuple(refused), accept_force_error=accept_force_error)
-    assert chosen.certificate is not None
+        refused.append(f"{name}: {chosen.certificate.why}")
+    assert chosen is not None  # the direct or the explicit structure always has a scheme
+    identified = chosen.rendered is task.model
+    planned = Plan(
+        model,
+        chosen.scheme,
+        chosen.certificate,
+        tuple(refused),
+        None if identified else model.with_network(**network_of(chosen.rendered)),
+        accept_force_error,
+    )
     stable_only = not (chosen.certificate.certified or chosen.certificate.refused)
-    if stable_only or chosen.verdict.level == "no":
-        needs = needed(bare, device, wishes, accept_force_error, certified=stable_only)
-        chosen = replace(chosen, needs=needs)
-    return chosen
+    if stable_only or planned.verdict.level == "no":
+        planned = replace(planned, needs=needed(task, accept_force_error, certified=stable_only))
+    return planned
 
 
 def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) -> _core.device.DeviceProfile:

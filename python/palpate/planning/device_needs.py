@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from .._core.device import DeviceProfile
-from ..model import Model
-from .rungs import RUNGS, Wishes
-from .slope_limit import sliding_bounds
+from .._core.model import ForceModel
+from .candidates import CANDIDATES, Refusal, Task
+from .limited_network import sliding_bounds
+from .static_error import static_force_error
 
 _AMPLE = (40.0, 14.0, 8.0)
 """Doublings after which a property is ample. Too much of it can make an explicit structure diverge. [-]"""
@@ -31,43 +32,40 @@ class _Property:
     """The requirement that an improved device just meets"""
 
 
-def needed(
-    model: Model, device: DeviceProfile, wishes: Wishes, accept_force_error: float, *, certified: bool
-) -> str:
+def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
     """The device property that a model needs, for instance "needs b >= 6.07 N*s/m (has 0.005)".
 
     Empty where no property helps.
 
     Parameters
     ----------
-    model : Model
-        As it was identified.
-    device : DeviceProfile
-        The device that is too weak.
-    wishes : Wishes
-        What was asked of the plan.
+    task : Task
+        The model as it was identified, the device that is too weak, and the caller's requirements.
     accept_force_error : float
         Largest force error that is accepted [share of the range].
     certified : bool
-        Whether a plan that is only stable is not enough.
+        True if a plan that is only stable is not enough.
     """
-    names = _rungs(model, wishes)
-    as_identified = replace(wishes, limited=False, predict=wishes.predict or 0)
+    names = _candidates(task)
+    device = task.device
+    task = replace(task, may_limit=False, predict=task.predict or 0)
 
     def fits(changed: DeviceProfile) -> bool:
         for name in names:
-            outcome = RUNGS[name](model, changed, as_identified)
-            if isinstance(outcome, str) or outcome.certificate is None or outcome.certificate.refused:
+            outcome = CANDIDATES[name](replace(task, device=changed))
+            if isinstance(outcome, Refusal) or outcome.certificate.refused:
                 continue
-            proved = outcome.certificate.certified or not certified
-            return proved and outcome.force_error.share <= accept_force_error
+            if certified and not outcome.certificate.certified:
+                return False
+            error = static_force_error(task.model, outcome.rendered, outcome.scheme)
+            return error.share <= accept_force_error
         return False
 
     def least(*properties: _Property) -> str:
         found = _improved(device, properties, fits)
         return "" if found is None else " and ".join(each.told(found) for each in properties)
 
-    damping, friction, rate, encoder = _properties(model, device)
+    damping, friction, rate, encoder = _properties(task.model, device)
     for short, otherwise in (
         ((damping,), (rate,)),
         ((friction,), (encoder,)),
@@ -76,21 +74,23 @@ def needed(
         if need := least(*short):
             other = least(*otherwise)
             return f"needs {need}" + (f", or {other}" if other else "")
-    if wishes.coupling_stiffness is not None:
-        return f"needs another coupling stiffness than {wishes.coupling_stiffness:.4g}"
+    if task.coupling_stiffness is not None:
+        return f"needs another coupling stiffness than {task.coupling_stiffness:.4g}"
     return ""
 
 
-def _rungs(model: Model, wishes: Wishes) -> tuple[str, ...]:
-    """The structures that render a model as it was identified, for what was asked."""
-    if wishes.dynamic:
+def _candidates(task: Task) -> tuple[str, ...]:
+    """The candidate structures that render the identified model as the caller requires."""
+    if task.dynamic:
         return ("implicit", "energy-consistent", "explicit")
-    if wishes.coupling:
-        return ("massless", "explicit") if model.hysteretic else ("massless",)
+    if task.coupling:
+        return ("massless", "explicit") if task.model.hysteretic else ("massless",)
     return ("direct",)
 
 
-def _properties(model: Model, device: DeviceProfile) -> tuple[_Property, _Property, _Property, _Property]:
+def _properties(
+    model: ForceModel, device: DeviceProfile
+) -> tuple[_Property, _Property, _Property, _Property]:
     """Damping, friction, rate and encoder."""
     force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
     steepest = max(sliding_bounds(model).steepest, 1e-9)
