@@ -20,7 +20,6 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/simulated_device.hpp"

@@ -7,7 +7,6 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/rendering/explicit.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 

@@ -17,9 +17,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
-#include "palpate/rendering/free_motion.hpp"
-#include "palpate/rendering/probe.hpp"
-#include "palpate/rendering/pulses.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 #include "palpate/simulation/test_rig.hpp"
 #include "summary.hpp"

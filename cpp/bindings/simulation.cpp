@@ -115,7 +115,7 @@ void bind_simulation(py::module_& module) {
                 SchemeChoices chosen{std::nullopt, compensated, coupling_stiffness, coupling_damping,
                                      mass,         damping,     play_radius,        predict};
                 if (structure) {
-                    chosen.structure = structure_named(*structure);
+                    chosen.structure = named<StructureKind>(*structure, "structure");
                 }
                 return self.scheme(model, chosen);
             },

@@ -75,7 +75,7 @@ const ForceModel& rendered(const Options& options, const ModelFile& file) {
 Scheme scheme_of(const Options& options, const ModelFile& file, const TestRig& rig) {
     SchemeChoices choices = options.scheme;
     if (options.structure) {
-        choices.structure = structure_named(*options.structure);
+        choices.structure = named<StructureKind>(*options.structure, "structure");
     }
     const Scheme scheme = follows_plan(options, file) ? *file.plan : rig.scheme(file.model, choices);
     validate(scheme, rendered(options, file), rig.device.period_s);

@@ -59,7 +59,7 @@ CLI::Validator structure_word() {
     validator.operation([](std::string& text) -> std::string {
         const bool known =
             std::find(structure_names.begin(), structure_names.end(), text) != structure_names.end();
-        return known ? "" : "must be direct, massless, implicit or explicit, not " + text;
+        return known ? "" : "must be " + either(structure_names) + ", not " + text;
     });
     return validator;
 }
@@ -97,7 +97,7 @@ void add_rendering(CLI::App& app, Options& options) {
     const auto scaled = [](double value, const char* unit) {
         return " [" + readable(value) + " " + unit + ", scaled]";
     };
-    group(app.add_option("--structure", options.structure, "direct, massless, implicit or explicit"))
+    group(app.add_option("--structure", options.structure, either(structure_names)))
         ->check(structure_word())
         ->type_name("NAME")
         ->default_str(std::string(name_of(Scheme{}.structure)));

@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from ..recording.files import require_absent
-from ..recording.writing import write_csv
 from .arguments import PATH, json_option, plot_option
 from .ending import interrupted_at_once
 from .figures import require_figure_name
@@ -103,7 +102,7 @@ def simulate(
     }
     with finishing():
         if output is not None and not endings["NonFinite"]:
-            write_csv(rendered, output, replace=force)
+            rendered.write(output, replace=force)
         if plot is not None:
             picture_rendering(plot, plan, rendered)
         if as_json:

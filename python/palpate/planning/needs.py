@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 from .._core.device import DeviceProfile
 from ..model import Model
-from ..model.certified import device_record
 from .rungs import RUNGS, Wishes
 from .slope_limit import sliding_bounds
 
@@ -151,7 +150,7 @@ def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits
 
 
 def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
-    return DeviceProfile(**device_record(device) | fields)
+    return DeviceProfile(**device.to_dict() | fields)
 
 
 def _rounded(towards: Callable[[float], int], value: float) -> float:

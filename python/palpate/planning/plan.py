@@ -9,12 +9,13 @@ from functools import cached_property
 from typing import Any
 
 from .._core.device import DeviceProfile
+from .._core.io import checked_certificate, scheme_of
 from .._core.rendering import Scheme, solver_name
 from .._core.stability import Certificate, certify, device_difference
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
-from ..model.certified import certificate_record, checked_certificate, scheme_of
+from ..model.model_file import certificate_record
 from ..verdict import Finding, Verdict, no, usable
 from ..verification.perception import FLOOR_SHARE
 from .static_error import StaticForceError, static_force_error
@@ -130,15 +131,14 @@ class Plan:
     def record(self) -> dict[str, Any]:
         """The plan as it stands in a model file."""
         scheme = self.scheme
-        coupled, heavy = self.structure != "direct", self.structure not in ("direct", "massless")
         return {
             "structure": scheme.structure,
             "solver": self.solver,
             "network": None if self.limited is None else self.limited.to_dict()["network"],
             "coupling": {"stiffness": scheme.coupling_stiffness, "damping": scheme.coupling_damping}
-            if coupled
+            if scheme.has_coupling
             else None,
-            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if heavy else None,
+            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if scheme.has_mass else None,
             "compensated": scheme.compensated,
             "play_radius": scheme.play_radius or None,
             "predict": scheme.predict or None,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from .._core.device import DeviceProfile
-from .._core.rendering import Scheme
+from .._core.rendering import Scheme, compensated_share
 from .._core.stability import balancing_shift, certify, force_bounds, steepest_stick
 from ..model import Model
 from .choices import (
@@ -23,9 +23,6 @@ from .choices import (
 from .plan import Plan
 from .slope_limit import limit_slopes, scale_loss, sliding_slopes
 from .static_error import static_force_error
-
-_TAKEN_OUT = 0.9
-"""Behind a coupling K_c a force can be compensated while its slope stays below this share of K_c [-]"""
 
 _COUPLING_DAMPING = 0.2
 """Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""
@@ -146,14 +143,14 @@ def massless(model: Model, device: DeviceProfile, wishes: Wishes) -> Outcome:
     )
     if model.hysteretic:
         return Plan(model, scheme).certified_for(device)
-    highest = _TAKEN_OUT * stiffness
+    highest = compensated_share * stiffness
     balanced = _balanced(model, device)
     low, high = low if damping == 0.0 else -math.inf, min(highest, high)
     if not wishes.limited and not (balanced is model and _fits(model, low, high)):
         return _NOT_LIMITED
     limited = _within(balanced, low, high, device)
     if limited is None:
-        return f"no network was found whose slopes lie below {highest:.4g} = {_TAKEN_OUT} K_c"
+        return f"no network was found whose slopes lie below {highest:.4g} = {compensated_share} K_c"
     return Plan(model, scheme, limited=None if limited is model else limited).certified_for(device)
 
 

@@ -16,8 +16,8 @@ from ..identification.hysteresis_input import HysteresisInput
 from ..identification.inputs import input_columns
 from ..model import Model
 from ..recording import Recording
+from ..recording.conversion import Motion
 from ..recording.motion import GAP, acceleration, velocity
-from ..recording.recording import Motion
 from .flight import FlightRecord, flight_of
 from .strokes import with_strokes
 

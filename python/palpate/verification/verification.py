@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..identification.usable import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
-from ..recording.given import Given, recording_from
+from ..recording.reading import Given, recording_from
 from ..verdict import GOOD, Verdict
 from .judgement import findings_of
 from .metrics import durbin_watson, lag_one_autocorrelation, normalised, root_mean_square

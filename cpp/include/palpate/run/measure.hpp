@@ -10,7 +10,7 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/rendering/probe.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/run/controller.hpp"
@@ -38,8 +38,8 @@ template <Device D, Structure S, class Watch>
 }
 
 /// Returns the default probe of a range for a device, at a model's scale.
-[[nodiscard]] inline ProbeSettings probe_for(const ModelScale& scale, const DeviceProfile& device, double lower,
-                                             double upper) {
+[[nodiscard]] inline ProbeSettings probe_for(const ModelScale& scale, const DeviceProfile& device,
+                                             double lower, double upper) {
     ProbeSettings probe;
     probe.lower = lower;
     probe.upper = upper;
