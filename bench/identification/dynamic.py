@@ -125,7 +125,7 @@ def cascaded_tanks(folder: Path) -> list[Row]:
 
 
 def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
-    """Returns the study of a file without a published split: fitted on the first half, tested on the second."""
+    """Returns the study of a file without a published split: fitted on one half, tested on the other."""
 
     def rows(folder: Path) -> list[Row]:
         table = pd.read_csv(folder / "sysid_benchmarks" / file)
