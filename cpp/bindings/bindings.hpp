@@ -16,6 +16,5 @@ void bind_stability(pybind11::module_& module);
 void bind_io(pybind11::module_& module);
 void bind_simulation(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
-void bind_measure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

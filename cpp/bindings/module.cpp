@@ -49,5 +49,4 @@ PYBIND11_MODULE(_core, module) {
     bind_simulation(simulation);
     auto run = submodule("run", "Rendering and measuring in real time.");
     bind_run(run);
-    bind_measure(run);
 }

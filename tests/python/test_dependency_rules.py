@@ -58,6 +58,9 @@ LEAF_HEADERS = {
     "io/json_text.hpp",
     "io/model_file.hpp",
     "io/plan_file.hpp",
+    "run/open_inverse3.hpp",
+    "run/open_usb.hpp",
+    "simulation/open_device.hpp",
 }
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory

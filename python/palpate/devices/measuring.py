@@ -49,7 +49,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
                 f"the object has {object.dimension} inputs: one of the position alone can be mounted"
             )
     try:
-        return measure_live(device, object=object, **settings)
+        return measure_live(device=device, object=object, **settings)
     except InputError:
         raise
     except ValueError as error:

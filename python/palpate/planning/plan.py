@@ -16,8 +16,7 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
 from ..model.model_file import certificate_record
-from ..verdict import Finding, Verdict, no, usable
-from ..verification.perception import FLOOR_SHARE
+from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 from .static_error import StaticForceError, static_force_error
 
 ACCEPTED_FORCE_ERROR = 0.1
@@ -184,7 +183,7 @@ class Plan:
 
     def _force_findings(self) -> tuple[Finding, ...]:
         error = self.force_error
-        if error.share <= FLOOR_SHARE:
+        if error.share <= FORCE_FLOOR:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
         told = (
