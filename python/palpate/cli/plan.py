@@ -129,7 +129,7 @@ def plan(
     """
     from ..model import load_model
     from ..planning import DeviceProfile, profile_file
-    from ..planning.ladder import plan as choose
+    from ..planning.search import plan as choose
 
     profile_path = profile_file(device)
     if plot is not None:

@@ -91,6 +91,12 @@ struct SchemeChoices {
     std::optional<double> damping;
     std::optional<double> play_radius;
     std::optional<int> predict;
+
+    /// True if a field is chosen. A flag that is not set chooses nothing.
+    [[nodiscard]] bool any() const noexcept {
+        return structure || compensated.value_or(false) || coupling_stiffness || coupling_damping || mass ||
+               damping || play_radius || predict;
+    }
 };
 
 /// Returns the default play radius of a model that leaves it to the rendering, else 0.
