@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from palpate._core.simulation import motion_driven, simulate
-from palpate._core.stability import certify, force_bounds
 
 from palpate import DeviceProfile, Hand, Model, Scheme, identify, plan, read_recording
-from palpate.identification.constraints import slope_limited
+from palpate._core.simulation import motion_driven, simulate
+from palpate._core.stability import certify, force_bounds
+from palpate.identification.network.constraints import slope_limited
 from palpate.planning import Plan
 from palpate.planning.choices import renderable_slopes
 from palpate.recording import Recording

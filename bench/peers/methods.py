@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from palpate._core.model import wavelet_columns
 from scipy.interpolate import UnivariateSpline, make_lsq_spline
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
@@ -22,7 +21,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransformer
 
 from palpate import WaveletNetworkRegressor
-from palpate.identification.frame import truncated_frame
+from palpate._core.model import wavelet_columns
+from palpate.identification.network.basis import truncated_frame
 
 Array = NDArray[np.float64]
 Predict = Callable[[Array], Array]

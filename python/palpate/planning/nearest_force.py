@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from .._typing import Float1D, Float2D
-from ..identification.constraints import slope_limited
+from ..identification.network.constraints import slope_limited
 from ..model import Model
 
 

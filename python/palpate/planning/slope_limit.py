@@ -20,9 +20,10 @@ import numpy as np
 from .._core.model import wavelet_columns, wavelet_slope_columns
 from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
-from ..identification.constraints import domain_bounds, impose
-from ..identification.identified import Readings
-from ..identification.separable import Basis, Block, SeparableProblem
+from ..identification.network.basis import Basis
+from ..identification.network.constraints import domain_bounds, impose
+from ..identification.network.fitted import FittedNetwork
+from ..identification.network.separable import Block, SeparableProblem
 from ..model import Model
 from .nearest_force import changes_needed
 from .static_error import SAMPLES, strokes
@@ -130,7 +131,7 @@ def _fitted(
     ones = np.ones_like(x)
     hysteretic = len(wanted) == 2
     problem = SeparableProblem(
-        [Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted],
+        tuple(Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted),
         np.array([[0.5, 0.5], [0.5, -0.5]]) if hysteretic else np.array([[1.0]]),
         samples=wanted.size,
         within=0.0,
@@ -143,12 +144,13 @@ def _fitted(
     slopes = (low * float(travel[0]), high * float(travel[0]))
     lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
     bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
-    found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
-    new: dict[str, Any] = {"alpha": found.alpha.tolist(), "beta": found.beta.tolist()}
-    for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
-        new[f"bias{suffix}"] = float(found.bias[k])
-        new[f"linear{suffix}"] = found.linear[k].tolist()
-        new[f"weight{suffix}"] = found.weights[k].tolist()
+    solution = impose(problem, problem.solve(basis), bounds)
+    found = FittedNetwork.of(solution, problem.readout, lower, travel, inputs=model.inputs).parameters()
+    new: dict[str, Any] = {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in found.items()
+        if name not in ("lower", "upper") and value is not None
+    }
     limited = model.with_network(**new)
     if not lossy:
         return limited

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..identification.judgement import USABLE_NRMSE, error_findings
+from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..model import Model
 from ..recording import Recording
 from ..verdict import Finding, no, usable

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .._typing import Float1D
 from ..arguments import instance_of
 from ..errors import InputError
-from ..identification.usable import require_in_range
+from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
 from ..recording.given import Given, recording_from

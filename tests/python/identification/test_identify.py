@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from palpate._core.model import play
 
 import palpate
 from palpate import InputError, Model, Recording, identify
+from palpate._core.model import play
 from palpate.recording.sample import sample_recording
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -110,7 +110,7 @@ def test_control_c_leaves_identify_at_once(monkeypatch: pytest.MonkeyPatch) -> N
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("palpate.identification.growth.refine", interrupted)
+    monkeypatch.setattr("palpate.identification.search.growth.refine", interrupted)
     with pytest.raises(KeyboardInterrupt):
         identify(sample_recording(1, duration_s=2.0))
 

@@ -12,7 +12,7 @@ import pytest
 
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
 from palpate.cli.main import main
-from palpate.identification.constraints import slope_limited
+from palpate.identification.network.constraints import slope_limited
 from palpate.model.certified import device_record
 from palpate.planning import example_profiles, profile_file
 from palpate.planning.root_locus import root_locus
