@@ -55,7 +55,7 @@ def demo(output: Path, as_json: bool) -> None:
     simulated device with each structure.
     """
     from ..identification import identify
-    from ..identification.judgement import error_findings
+    from ..identification.classes.findings import error_findings
     from ..planning import compare_structures, describe, rig_for
     from ..recording.sample import sample_recording
     from ..verdict import Verdict

@@ -80,9 +80,9 @@ def identify(
     network, and hysteresis where press and release differ.
     """
     from ..identification import identify as identify_model
-    from ..identification.judgement import error_findings
+    from ..identification.classes.findings import error_findings
     from ..identification.options import RESERVED_INPUTS
-    from ..identification.progress import reporting_to
+    from ..identification.search.criteria import reporting_to
     from ..verdict import Verdict
     from ..verification import verify
     from ..verification.verification import circumstances

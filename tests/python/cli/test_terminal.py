@@ -19,7 +19,7 @@ from palpate import Recording, identify, load_model
 from palpate.cli.main import main
 from palpate.cli.printing import visible
 from palpate.cli.progress import Progress
-from palpate.identification.progress import reporting_to
+from palpate.identification.search.criteria import reporting_to
 from test_cli_identify import spring
 
 CLI = Path(__file__).parents[3] / "python" / "palpate" / "cli"
