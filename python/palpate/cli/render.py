@@ -9,22 +9,21 @@ from typing import Any
 import click
 
 from .._core.run import LoopSettings, usual_telemetry_hz
+from .._core.run import render as render_live
+from ..model import load_model
+from ..planning import rig_for
 from ..recording.files import require_absent
-from .arguments import PATH, json_option
+from .exit_status import end_with
 from .live_line import live_line
-from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
+from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
 from .scheme_options import chosen_plan, scheme_options
 from .session_verdict import session_verdict
-from .verb import Verb
+from .verb import PATH, json_option, verb
 
 _LOOP = LoopSettings()
 
 
-@click.command(
-    cls=Verb,
-    no_args_is_help=True,
-    epilog="Example: palpate render press.json --duration-s 10 --record felt.csv",
-)
+@verb("palpate render press.json --duration-s 10 --record felt.csv", ends_at_once=False)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option("--rate-hz", type=float, default=_LOOP.rate_hz, help="Ticks a second.")
 @click.option("--duration-s", type=float, default=_LOOP.duration_s, help="How long; inf: until Ctrl-C.")
@@ -70,9 +69,6 @@ def render(
     The loop is that of palpate-control, with real-time priority where the system allows it. Ctrl-C ends it in
     an orderly way: zero force first, then the recording is closed, then the summary is printed.
     """
-    from .._core.run import render as render_live
-    from ..model import load_model
-    from ..planning import rig_for
 
     if record is not None:
         require_writable(record, inputs=(model_file,))
