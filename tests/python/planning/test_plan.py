@@ -68,7 +68,7 @@ def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
         ("coulomb_friction", "inf", "coulomb_friction is inf"),
         ("encoder_step", "-1e-6", "encoder_step is -1e-06"),
         ("force_step", '"fine"', "force_step is 'fine', must be a number"),
-        ("delay_s", "-1e-4", "delay_s is -0.0001, must be 0 to 16 periods"),
+        ("delay_s", "-1e-4", "delay_s is -0.0001, must be >= 0"),
         ("delay_s", "0.017", "delay_s is 0.017, must be 0 to 16 periods"),
         ("force_limit", "0", "force_limit is 0"),
         ("position_unit", '"deg"', "position_unit is 'deg'"),
