@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .._core.rendering import compensated_share
 from ..arguments import shown
 from ..errors import InputError
 
@@ -26,9 +27,6 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "filters": ("matched", "paper-implicit", "paper-explicit"),
 }
 """Settings that are words, and what each may be."""
-
-COUPLING_SHARE = 0.9
-"""Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ class IdentifyOptions:
     fixed_force: tuple[float, float] | None = None
     """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
     coupling_stiffness: float | None = None
-    """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
+    """K_c: df/dx <= 0.9 K_c (`compensated_share`) is imposed over the domain [force/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
     """Play radii tried for hysteresis where a file does not tell directions; where it is there, the best
     one between the least and the largest is found [share of the travel]"""
@@ -136,7 +134,7 @@ class IdentifyOptions:
         if self.monotone:
             low = max(low, 0.0)
         if self.coupling_stiffness is not None:
-            high = min(high, COUPLING_SHARE * self.coupling_stiffness)
+            high = min(high, compensated_share * self.coupling_stiffness)
         return None if math.isinf(low) and math.isinf(high) else (low, high)
 
     def _require_possible_slopes(self) -> None:
