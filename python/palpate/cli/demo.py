@@ -10,7 +10,7 @@ import click
 
 from ..errors import InputError
 from ..identification import identify
-from ..identification.judgement import error_findings
+from ..identification.classes.findings import error_findings
 from ..planning import Comparison, compare_structures, describe, rig_for
 from ..recording.sample import sample_recording
 from ..verdict import Verdict

@@ -13,9 +13,9 @@ import click
 import numpy as np
 
 from ..identification import identify as identify_model
-from ..identification.judgement import error_findings
+from ..identification.classes.findings import error_findings
 from ..identification.options import RESERVED_INPUTS
-from ..identification.progress import reporting_to
+from ..identification.search.criteria import reporting_to
 from ..recording import Recording
 from ..verdict import Verdict
 from ..verification import Verification, verify

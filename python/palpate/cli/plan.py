@@ -12,11 +12,11 @@ import numpy as np
 
 from .._core.stability import Certificate, felt_slope, force_bounds
 from ..model import load_model
-from ..model.certified import certificate_record
+from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, profile_file
 from ..planning.choices import explicit_scheme, usual_play_radius
-from ..planning.ladder import plan as choose
 from ..planning.root_locus import root_locus
+from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
 from .figures import figure_file, require_figure_name, source_name
 from .printing import (
@@ -202,11 +202,11 @@ def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: f
     rows = {"structure": structure_words(plan)}
     if plan.solver is not None:
         rows["solver"] = plan.solver
-    if plan.structure != "direct":
+    if scheme.has_coupling:
         rows["coupling"] = (
             f"K_c = {number(scheme.coupling_stiffness)}, B_c = {number(scheme.coupling_damping)}"
         )
-    if plan.structure not in ("direct", "massless"):
+    if scheme.has_mass:
         rows["object"] = f"m = {number(scheme.mass)}, B_o = {number(scheme.damping)}"
     if scheme.predict:
         rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
