@@ -11,8 +11,7 @@ from . import rendering
 from . import stability
 from . import simulation
 from . import run
-from . import failure
-__all__: list[str] = ['Status', 'device', 'dynamics', 'failure', 'model', 'rendering', 'run', 'simulation', 'stability', 'status_meanings']
+__all__: list[str] = ['Status', 'device', 'dynamics', 'model', 'rendering', 'run', 'simulation', 'stability', 'status_meanings']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.

@@ -95,7 +95,7 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
     if model.plan is None:
         return None
     from ..planning import Plan
-    from .plan import structure_words
+    from ..planning.text import structure_words
 
     plan = Plan.of(model)
     return {

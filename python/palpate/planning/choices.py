@@ -31,7 +31,7 @@ _WANTED = 1.02
 _STABLE_SHARES = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
 """Coupling stiffness tried for the explicit structure, over the stiffest that the device can hold [-]"""
 _STABLE_DAMPINGS = (0.1, 0.25, 0.5, 1.0)
-"""T B_o / m tried for the explicit structure; the paper's choice is 0.5 [-]"""
+"""Object damping tried for the explicit structure; the paper's choice is 0.5 [m / T]"""
 _STABLE_RESERVES = (1.1, 1.5, 2.5, 5.0)
 """Slope limit of the explicit structure over the slope that it has to meet [-]"""
 
@@ -83,10 +83,10 @@ def explicit_scheme(
     bounds: ForceBounds,
     device: DeviceProfile,
     *,
-    mass: float | None,
-    damping: float | None,
-    coupling_stiffness: float | None,
-    coupling_damping: float | None,
+    mass: float | None = None,
+    damping: float | None = None,
+    coupling_stiffness: float | None = None,
+    coupling_damping: float | None = None,
     play_radius: float,
 ) -> Scheme:
     """Coupling, mass and damping for the explicit structure: stable with the stiffest coupling, and for that
@@ -105,15 +105,14 @@ def explicit_scheme(
             for reserve in _STABLE_RESERVES:
                 needed = reserve * (max(0.0, bounds.slope_max) + K_c) + 2.0 * B_c / T
                 m = mass if mass else needed * T**2 / (4.0 - 2.0 * ratio)
-                B_o = damping if damping is not None else ratio * m / T
-                trials.append((B_o, m))
-        for B_o, m in sorted(set(trials)):
+                trials.append((damping if damping is not None else ratio * m / T, m))
+        for object_damping, m in sorted(set(trials)):
             scheme = Scheme(
                 structure="explicit",
                 coupling_stiffness=K_c,
                 coupling_damping=B_c,
                 mass=m,
-                damping=B_o,
+                damping=object_damping,
                 play_radius=play_radius,
             )
             if not certify_bounds(bounds, scheme, device).refused:

@@ -22,6 +22,7 @@ from ..recording import Recording
 from ..recording.units import COLUMN_SUFFIX
 from ..verdict import Finding, Verdict, no, usable
 from .plan import Plan
+from .text import describe
 
 START = "handle_start"
 MIDDLE = "handle_middle"
@@ -38,6 +39,12 @@ _TOLERATED_TICKS = 0.01
 """Share of ticks that may be extrapolated, clipped or not solved."""
 _SMALLEST_DOMAIN_SHARE = 0.1
 """Of the model's domain that the handle should cover."""
+
+_COMPENSATED_DAMPING = 0.25
+"""Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
+
+_PREDICT = 4
+"""Samples of the prediction that is compared [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
 
@@ -91,14 +98,9 @@ def simulate(
     duration = real_of("duration", duration)
     plan.check_for(device)
     start = float(np.clip(0.0, plan.model.lower[0], plan.model.upper[0]))
-    try:
-        trace = _core.simulation.simulate(
-            plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
-        )
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    trace = _core.simulation.simulate(
+        plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
+    )
     recording = Recording.from_arrays(
         trace["position"],
         trace["applied"],
@@ -262,16 +264,58 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     return force
 
 
-def describe(scheme: Scheme) -> str:
-    """A scheme in the words of the comparison: "implicit, m = 0.001, B_o = 0.5"."""
-    words = [scheme.structure]
-    if scheme.compensated:
-        words.append("compensated")
-    if scheme.predict:
-        words.append(f"predict {scheme.predict}")
-    if scheme.structure in ("implicit", "explicit"):
-        words += [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"]
-    return ", ".join(words)
+@dataclass(frozen=True)
+class Comparison:
+    """One structure of a comparison: its recording, or the reason why it was refused."""
+
+    scheme: Scheme
+    recording: Recording | None
+    error: ForceError | None
+    refused: str | None
+    """One sentence, or None"""
+
+    @property
+    def name(self) -> str:
+        return describe(self.scheme)
+
+
+def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Comparison, ...]:
+    """Renders a model with each structure and measures its force error.
+
+    The order is that of their force errors: direct, with and without prediction; massless behind a coupling,
+    with the coupling's spring taken out of the model; massless; implicit with mass alone, then with the
+    damping that the explicit structure needs; explicit. A structure that the model or the device rules out is
+    refused with its reason.
+
+    Parameters
+    ----------
+    model : Model
+        A model of one position.
+    rig : TestRig
+        Device, hand and coupling, from :func:`rig_for`.
+    duration : float
+        Simulated time of each rendering [s].
+    """
+    quarter = _COMPENSATED_DAMPING * rig.scheme(model).coupling_damping
+    schemes = (
+        rig.scheme(model, structure="direct", predict=_PREDICT),
+        rig.scheme(model, structure="direct"),
+        rig.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
+        rig.scheme(model, structure="massless"),
+        rig.scheme(model, structure="implicit", damping=0.0),
+        rig.scheme(model, structure="implicit"),
+        rig.scheme(model, structure="explicit"),
+    )
+    return tuple(_render(model, scheme, rig.device, rig.hand, duration) for scheme in schemes)
+
+
+def _render(model: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, duration: float) -> Comparison:
+    try:
+        plan = Plan(model, scheme)
+        recording = simulate(plan, device, hand, duration)
+    except InputError as error:
+        return Comparison(scheme, None, None, str(error))
+    return Comparison(scheme, recording, force_error(plan, recording), None)
 
 
 def _suffix(unit: str) -> str:
