@@ -26,7 +26,7 @@ from bench.studies import markdown_table, write_text
 from palpate.cli.figures import figure_file
 from palpate.cli.output import number
 from palpate.plotting.look import grid
-from palpate.verification.perception import FORCE_JND
+from palpate.verdict import FORCE_JND
 
 PERIOD_S = 1e-3
 """Motion for which the computing times of different periods are compared [s]"""

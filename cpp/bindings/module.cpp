@@ -44,9 +44,10 @@ PYBIND11_MODULE(_core, module) {
     bind_rendering(rendering);
     auto stability = submodule("stability", "Certificates and the inequalities they consist of.");
     bind_stability(stability);
+    auto io = submodule("io", "Model files.");
+    bind_io(io);
     auto simulation = submodule("simulation", "Rendering in virtual time on a simulated device.");
     bind_simulation(simulation);
     auto run = submodule("run", "Rendering and measuring in real time.");
     bind_run(run);
-    bind_measure(run);
 }

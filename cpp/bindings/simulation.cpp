@@ -15,6 +15,7 @@
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/test_rig.hpp"
+#include "settings.hpp"
 #include "signals.hpp"
 
 namespace palpate::bindings {
@@ -108,21 +109,19 @@ void bind_simulation(py::module_& module) {
             "Forces, relative to those of the default knob.")
         .def(
             "scheme",
-            [](const TestRig& self, const ForceModel& model, const std::optional<std::string>& structure,
-               std::optional<bool> compensated, std::optional<double> coupling_stiffness,
-               std::optional<double> coupling_damping, std::optional<double> mass,
-               std::optional<double> damping, std::optional<double> play_radius, std::optional<int> predict) {
-                SchemeChoices chosen{std::nullopt, compensated, coupling_stiffness, coupling_damping,
-                                     mass,         damping,     play_radius,        predict};
-                if (structure) {
-                    chosen.structure = structure_named(*structure);
-                }
+            [](const TestRig& self, const ForceModel& model, const py::kwargs& fields) {
+                static const auto setters = [] {
+                    Setters<SchemeChoices> all;
+                    add_scheme_choices(all);
+                    return all;
+                }();
+                SchemeChoices chosen;
+                set_fields(chosen, fields, setters);
                 return self.scheme(model, chosen);
             },
-            "model"_a, py::kw_only(), "structure"_a = py::none(), "compensated"_a = py::none(),
-            "coupling_stiffness"_a = py::none(), "coupling_damping"_a = py::none(), "mass"_a = py::none(),
-            "damping"_a = py::none(), "play_radius"_a = py::none(), "predict"_a = py::none(),
-            "Returns the scheme with the given fields, in the model's units. None: the default at the "
+            "model"_a,
+            "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at "
+            "the "
             "model's "
             "scale.");
     define_by_fields(rig, {"device", "hand", "length", "force"});

@@ -164,11 +164,10 @@ _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", 
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
-    from ..model.certified import certificate_record
-    from ..planning.text import felt_slopes
+    from ..model.model_file import certificate_record
 
     error = plan.force_error
-    felt, steepest = felt_slopes(plan)
+    felt, steepest = plan.felt_slopes
     return {
         "structure": plan.structure,
         "verdict": str(plan.verdict),
@@ -189,13 +188,11 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
 
 def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
     """Print the verdict, the plan, the refused structures, and every inequality."""
-    from ..planning.text import plan_rows
-
     print_verdict(plan.verdict)
     file = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
     if plan.verdict.level == "no":
         file = "nothing, because the verdict is no"
-    print_numbers({**plan_rows(plan), "planned in": f"{seconds:.1f} s", "written": file})
+    print_numbers({**plan.rows(), "planned in": f"{seconds:.1f} s", "written": file})
     if plan.refused:
         click.echo("\nrefused")
         for sentence in plan.refused:

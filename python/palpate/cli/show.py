@@ -95,11 +95,10 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
     if model.plan is None:
         return None
     from ..planning import Plan
-    from ..planning.text import structure_words
 
     plan = Plan.of(model)
     return {
-        "structure": structure_words(plan),
+        "structure": plan.description,
         "device": None if plan.certificate is None else plan.certificate.device.id,
         "verdict": str(plan.verdict),
     }

@@ -13,7 +13,6 @@ import numpy as np
 from .._core.device import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..model import Model
-from ..model.certified import device_record
 from ..planning import DeviceProfile
 from ..verdict import Verdict
 from .measuring import Progress, measure
@@ -95,7 +94,7 @@ class Check:
         assert period is not None
         assert jitter is not None
         return DeviceProfile(
-            **device_record(self.base)
+            **self.base.to_dict()
             | {
                 "jitter_s": max(0.0, period + jitter - self.base.period_s),
                 "inertia": inertia,

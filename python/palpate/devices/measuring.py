@@ -48,7 +48,12 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
             raise InputError(
                 f"the object has {object.dimension} inputs: one of the position alone can be mounted"
             )
-    return measure_live(device, object=object, **settings)
+    try:
+        return measure_live(device=device, object=object, **settings)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def record(

@@ -13,7 +13,7 @@ from .._core.simulation import Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
-from .plan import ACCEPTED_FORCE_ERROR, Plan
+from .plan import ACCEPTED_FORCE_ERROR, Plan, describe
 from .simulation import (
     Comparison,
     ForceError,
@@ -26,7 +26,6 @@ from .simulation import (
     simulate,
 )
 from .static_error import StaticForceError
-from .text import describe
 
 __all__ = [
     "ACCEPTED_FORCE_ERROR",

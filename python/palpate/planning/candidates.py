@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
-from .._core.rendering import Scheme
+from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import Certificate, balancing_shift, certify, force_bounds, steepest_stick
 from .choices import (
     LONGEST_PLAY,
@@ -18,13 +18,9 @@ from .choices import (
     explicit_scheme,
     play_radius_for,
     renderable_slopes,
-    usual_play_radius,
 )
 from .limited_network import limit_slopes, scale_hysteresis, sliding_slopes
 from .static_error import static_force_error, with_network
-
-_TAKEN_OUT = 0.9
-"""Behind a coupling K_c a force can be compensated while its slope stays below this share of K_c [-]"""
 
 _COUPLING_DAMPING = 0.2
 """Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""
@@ -98,7 +94,7 @@ class Task:
     @property
     def usual_play(self) -> float:
         """The caller's play radius, or the usual one [position]."""
-        return self.play_radius or usual_play_radius(self.model, self.device)
+        return self.play_radius or default_play_radius(self.model, self.device.encoder_step)
 
     def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
         """A scheme for the model, or for a network in its place, with its certificate."""
@@ -200,14 +196,14 @@ def _massless(task: Task) -> Candidate | Refusal:
     )
     if model.hysteretic:
         return task.certified(scheme)
-    highest = _TAKEN_OUT * stiffness
+    highest = compensated_share * stiffness
     balanced = _balanced(model, device)
     low, high = low if damping == 0.0 else -math.inf, min(highest, high)
     if not task.may_limit and not (balanced is model and _fits(model, low, high)):
         return _NOT_LIMITED
     limited = _within(balanced, low, high, device)
     if limited is None:
-        return Refusal(f"no network was found whose slopes lie below {highest:.4g} = {_TAKEN_OUT} K_c")
+        return Refusal(f"no network was found whose slopes lie below {highest:.4g} = {compensated_share} K_c")
     return task.certified(scheme, limited)
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
-from ..model.certified import device_record
 from .candidates import CANDIDATES, Refusal, Task
 from .limited_network import sliding_bounds
 from .static_error import static_force_error
@@ -151,7 +150,7 @@ def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits
 
 
 def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
-    return DeviceProfile(**device_record(device) | fields)
+    return DeviceProfile(**device.to_dict() | fields)
 
 
 def _rounded(towards: Callable[[float], int], value: float) -> float:

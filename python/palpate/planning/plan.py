@@ -9,15 +9,21 @@ from functools import cached_property
 from typing import Any
 
 from .._core.device import DeviceProfile
+from .._core.io import checked_certificate, scheme_of
 from .._core.rendering import Scheme, solver_name
-from .._core.stability import Certificate, certify, device_difference
+from .._core.stability import Certificate, certify, device_difference, felt_slope
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
-from ..model.certified import certificate_record, checked_certificate, scheme_of
-from ..verdict import Finding, Verdict, no, usable
-from ..verification.perception import FLOOR_SHARE
+from ..model.model_file import certificate_record
+from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 from .static_error import StaticForceError, static_force_error
+
+_CERTIFICATE = {
+    "certified": "certified",
+    "stable-locally": "stable (local), passivity not certified",
+    "refused": "refused",
+}
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Force error that is accepted where nothing else is said [share of the range of the identified force]"""
@@ -127,21 +133,69 @@ class Plan:
     def record(self) -> dict[str, Any]:
         """The plan as it stands in a model file."""
         scheme = self.scheme
-        coupled, heavy = self.structure != "direct", self.structure not in ("direct", "massless")
         return {
             "structure": scheme.structure,
             "solver": self.solver,
             "network": None if self.limited is None else self.limited.to_dict()["network"],
             "coupling": {"stiffness": scheme.coupling_stiffness, "damping": scheme.coupling_damping}
-            if coupled
+            if scheme.has_coupling
             else None,
-            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if heavy else None,
+            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if scheme.has_mass else None,
             "compensated": scheme.compensated,
             "play_radius": scheme.play_radius or None,
             "predict": scheme.predict or None,
             "refused": list(self.refused),
             "accepted_force_error": self.accept_force_error,
         }
+
+    @property
+    def description(self) -> str:
+        """The structure and its changes to the identified network, in words."""
+        return ", ".join(
+            [*_words(self.scheme), *([] if self.limited is None else ["with a limited network"])]
+        )
+
+    @property
+    def felt_slopes(self) -> tuple[float, float]:
+        """The steepest felt slope and that of the model; a coupling makes it softer [force/position].
+
+        Where the coupling was taken out of the model, the bounds of the certificate are those of the rest.
+        """
+        assert self.certificate is not None
+        steepest = max(0.0, self.certificate.bounds.slope_max)
+        if not self.scheme.has_coupling:
+            return steepest, steepest
+        felt = felt_slope(steepest, self.scheme.coupling_stiffness)
+        return felt, felt if self.scheme.compensated else steepest
+
+    def rows(self) -> dict[str, str]:
+        """The numbers of a certified plan for a person, each under its name."""
+        assert self.certificate is not None
+        scheme, error = self.scheme, self.force_error
+        rows = {"structure": self.description}
+        if self.solver is not None:
+            rows["solver"] = self.solver
+        if scheme.has_coupling:
+            rows["coupling"] = f"K_c = {scheme.coupling_stiffness:.4g}, B_c = {scheme.coupling_damping:.4g}"
+        if scheme.has_mass:
+            rows["object"] = f"m = {scheme.mass:.4g}, B_o = {scheme.damping:.4g}"
+        if scheme.predict:
+            rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
+        if scheme.play_radius:
+            rows["play radius"] = f"{scheme.play_radius:.4g}"
+        unit = self.model.units["force"] or "in the model's unit"
+        felt, steepest = self.felt_slopes
+        if felt < steepest:
+            rows["softer"] = f"slopes up to {steepest:.4g} are felt as up to {felt:.4g}"
+        rows["force error"] = (
+            f"up to {error.largest:.4g} {unit}, "
+            f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
+            if error.largest
+            else "none"
+        )
+        rows["certificate"] = _CERTIFICATE[self.certificate.verdict]
+        rows["holds for"] = f"up to {1e3 * self.certificate.longest_period_s:.4g} ms between two samples"
+        return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
         """The same plan with what is proved of it on a device, whatever that is."""
@@ -181,7 +235,7 @@ class Plan:
 
     def _force_findings(self) -> tuple[Finding, ...]:
         error = self.force_error
-        if error.share <= FLOOR_SHARE:
+        if error.share <= FORCE_FLOOR:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
         told = (
@@ -200,6 +254,21 @@ class Plan:
                 f"to accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
             ),
         )
+
+
+def describe(scheme: Scheme) -> str:
+    """A scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
+    mass = [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"] if scheme.has_mass else []
+    return ", ".join([*_words(scheme), *mass])
+
+
+def _words(scheme: Scheme) -> list[str]:
+    words = [scheme.structure]
+    if scheme.compensated:
+        words.append("compensated")
+    if scheme.predict:
+        words.append(f"predict {scheme.predict}")
+    return words
 
 
 def require_force(model: Model) -> None:

@@ -21,8 +21,7 @@ from ..model import Model
 from ..recording import Recording
 from ..recording.units import COLUMN_SUFFIX
 from ..verdict import Finding, Verdict, no, usable
-from .plan import Plan
-from .text import describe
+from .plan import Plan, describe
 
 START = "handle_start"
 MIDDLE = "handle_middle"

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from .._core.device import DeviceProfile
-from .._core.rendering import Scheme
+from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import force_bounds
 from .._typing import Float1D
 from ..planning import Plan
-from ..planning.choices import explicit_scheme, usual_play_radius
+from ..planning.choices import explicit_scheme
 
 _LINES = ("-", "--", ":", "-.")
 
@@ -84,12 +84,14 @@ def draw_root_locus(axes: Axes, plan: Plan, device: DeviceProfile) -> None:
     device : DeviceProfile
         The device of the plan.
     """
-    radius = usual_play_radius(plan.model, device)
+    radius = default_play_radius(plan.model, device.encoder_step)
     bounds = force_bounds(plan.rendered, radius)
     scheme = plan.scheme
     if plan.structure != "explicit":
         scheme = explicit_scheme(bounds, device, mass=plan.model.mass, play_radius=radius)
-    slopes = np.unique([max(bounds.slope_min, -0.9 * scheme.coupling_stiffness), bounds.slope_max])
+    slopes = np.unique(
+        [max(bounds.slope_min, -compensated_share * scheme.coupling_stiffness), bounds.slope_max]
+    )
     units = plan.model.units
     unit = f"{units['force']}/{units['position']}".replace("*", "\u00b7") if units["force"] else ""
     locus = root_locus(scheme, slopes, device.period_s)

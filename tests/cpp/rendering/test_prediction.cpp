@@ -11,7 +11,6 @@
 #include <gtest/gtest.h>
 
 #include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session_text.hpp"
 #include "palpate/simulation/closed_loop.hpp"

@@ -230,7 +230,7 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
     process.send_signal(ask)  # the emulator passes it on
     out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert "stopped because it was asked to" in out
+    assert "stopped on request" in out
     assert frames(trace)[-1].torque == 0.0
     assert not frames(trace)[-1].enabled
 

@@ -75,12 +75,13 @@ template <Structure S, SimulatedHand H, class Watch>
                                         settings.start_velocity};
     const auto delay = static_cast<std::size_t>(profile.late_samples());
     ClosedLoopEnd end;
-    end.ticks = closed_loop(device, std::move(structure), settings.guards, ticks, [&](const SimulatedTick& now) {
-        if (now.number == 0 || now.number == delay) {
-            end.met = now.start;
-        }
-        return watch(now.tick, now.end, device.plant().account());
-    });
+    end.ticks =
+        closed_loop(device, std::move(structure), settings.guards, ticks, [&](const SimulatedTick& now) {
+            if (now.number == 0 || now.number == delay) {
+                end.met = now.start;
+            }
+            return watch(now.tick, now.end, device.plant().account());
+        });
     end.energy = device.plant().account();
     end.handle = device.handle();
     return end;

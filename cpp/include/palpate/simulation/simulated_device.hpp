@@ -30,8 +30,8 @@ inline constexpr int most_substeps = 1000;  ///< of one tick of a simulated devi
 template <SimulatedHand H, class Plant>
 class SimulatedHandle {
   public:
-    explicit SimulatedHandle(DeviceProfile profile, H hand = {}, int substeps = usual_substeps, double start = 0.0,
-                             double start_velocity = 0.0)
+    explicit SimulatedHandle(DeviceProfile profile, H hand = {}, int substeps = usual_substeps,
+                             double start = 0.0, double start_velocity = 0.0)
         : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start, start_velocity} {
         validate(profile_);
         if (substeps < 1 || substeps > most_substeps) {
