@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plan: how a model is rendered, what is proved of that, and how far the felt force is from the model's."""
+"""Plan: the structure that renders a model, its certificate and its force error."""
 
 from __future__ import annotations
 
@@ -26,15 +26,14 @@ _CERTIFICATE = {
 }
 
 ACCEPTED_FORCE_ERROR = 0.1
-"""Force error that is accepted where nothing else is said [share of the range of the identified force]"""
+"""Force error that is accepted by default [share of the range of the identified force]"""
 
 
 @dataclass(frozen=True)
 class Plan:
     """A model, and the structure and numbers with which it is rendered.
 
-    Made by hand, a plan states what its author wants, and nothing is proved; :func:`palpate.plan` chooses one
-    for a device and certifies it.
+    A plan made by hand has no certificate. :func:`palpate.plan` chooses a plan for a device and certifies it.
 
     Raises
     ------
@@ -46,15 +45,15 @@ class Plan:
     """The identified model, which the plan never changes. Force errors refer to it."""
     scheme: Scheme
     certificate: Certificate | None = None
-    """What was proved of the rendered model, and for which device; None where nothing was looked at"""
+    """Certificate of the rendered model on a device; None if nothing was certified"""
     refused: tuple[str, ...] = ()
-    """Simpler structures that were refused, each with the inequality that failed and by how much"""
+    """Refused simpler structures, each with the inequality that failed and by how much"""
     limited: Model | None = None
-    """The model that is rendered in place of `model`, because the device is too weak; None: `model` itself"""
+    """The model rendered in place of `model` because the device is too weak; None: `model` itself"""
     accept_force_error: float = ACCEPTED_FORCE_ERROR
     """Largest force error that is accepted [share of the range of the identified force]"""
     needs: str = ""
-    """The device property that `model` itself would need; empty where it is rendered, or none helps"""
+    """The device property that `model` itself needs; empty if it is rendered, or if none helps"""
 
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
@@ -74,12 +73,12 @@ class Plan:
 
     @property
     def solver(self) -> str | None:
-        """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
+        """Solver of the load line at 1 kHz: table or newton; None if there is nothing to solve."""
         return solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
 
     @cached_property
     def force_error(self) -> StaticForceError:
-        """Felt minus identified force at rest: of a limited network, and of the softness of a coupling."""
+        """Felt minus identified force at rest, caused by a limited network and a soft coupling."""
         return static_force_error(self.model, self.rendered, self.scheme)
 
     @property
@@ -92,12 +91,12 @@ class Plan:
 
     @classmethod
     def of(cls, model: Model) -> Plan:
-        """The plan that stands in a model file, with its certificate.
+        """The plan in a model file, with its certificate.
 
         Raises
         ------
         InputError
-            There is none.
+            The model has no plan.
         """
         instance_of("model", model, Model, "make one with palpate.load_model")
         if model.plan is None:
@@ -198,11 +197,11 @@ class Plan:
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
-        """The same plan with what is proved of it on a device, whatever that is."""
+        """The same plan with its certificate on a device, which may be a refusal."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
-        """Refuse what is sure to diverge on this device, and a device that the certificate is not for.
+        """Refuses a plan that diverges on this device, and a device other than that of the certificate.
 
         Raises
         ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render a plan on a simulated device, and say how far the rendered force is from the model's."""
+"""Renders a plan on a simulated device, and measures its force error."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ MEAN_APPLIED = "mean_applied"
 """Stem of the column with the mean force over a tick, which a fractional delay divides."""
 
 _GRID = 1001
-"""Positions at which the force range is looked for."""
+"""Positions at which the force range is computed [-]"""
 _TOLERATED_ERROR = 0.02
-"""Force error over force range up to which nothing is said."""
+"""Largest force error without a finding [share of the force range]"""
 _TOLERATED_TICKS = 0.01
-"""Share of ticks that may be extrapolated, clipped or not solved."""
+"""Largest number of extrapolated, clipped or unsolved ticks without a finding [share of the ticks]"""
 _SMALLEST_DOMAIN_SHARE = 0.1
-"""Of the model's domain that the handle should cover."""
+"""Least motion of the handle without a finding [share of the domain]"""
 
 _COMPENSATED_DAMPING = 0.25
 """Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
@@ -60,14 +60,14 @@ def simulate(
     duration: float,
     progress: Callable[[int], None] | None = None,
 ) -> Recording:
-    """Render a plan in closed loop, in virtual time: device, hand and controller are simulated.
+    """Renders a plan in closed loop, in virtual time: device, hand and controller are simulated.
 
     The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
 
     Parameters
     ----------
     plan : Plan
-        What is rendered.
+        The plan to render.
     device : DeviceProfile
         The simulated device.
     hand : Hand
@@ -155,7 +155,7 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     Parameters
     ----------
     plan : Plan
-        What was rendered.
+        The rendered plan.
     rendered : Recording
         From :func:`simulate`.
     """
@@ -189,12 +189,12 @@ def force_range(plan: Plan) -> float:
 
 
 def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
-    """Judge a simulated rendering by its force error, its motion and its ticks.
+    """Judges a simulated rendering by its force error, its motion and its ticks.
 
     Parameters
     ----------
     plan : Plan
-        What was rendered.
+        The rendered plan.
     rendered : Recording
         From :func:`simulate`.
     error : ForceError
