@@ -40,8 +40,8 @@ def plan(
 
     The candidate structures are, in this order: direct; direct with the slope limited to the device's limit;
     massless behind a coupling, if a coupling is required; implicit, if the object has mass or damping;
-    energy-consistent, if its force falls too steeply for that; explicit, which is stable at best. Numbers that
-    are not given are chosen from the device.
+    energy-consistent, if its force falls too steeply for that; explicit, which is stable at best. Numbers
+    that are not given are chosen from the device.
 
     Parameters
     ----------
