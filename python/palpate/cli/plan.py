@@ -5,18 +5,22 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from .arguments import PATH, json_option, plot_option
-from .ending import interrupted_at_once
-from .figures import require_figure_name
-from .output import (
-    end_with,
-    finishing,
+from .._core.stability import Certificate
+from ..model import load_model
+from ..model.model_file import certificate_record
+from ..planning import DeviceProfile, Plan, example_profiles, profile_file
+from ..planning.search import plan as choose
+from .exit_status import end_with, finishing
+from .figures import figure_file, require_figure_name, source_name
+from .printing import (
+    Verb,
     number,
     print_json,
+    print_line,
     print_numbers,
     print_paragraph,
     print_verdict,
@@ -24,13 +28,7 @@ from .output import (
     require_writable,
     talk,
 )
-from .printing import print_line
-from .verb import Verb
-
-if TYPE_CHECKING:
-    from .._core.device import DeviceProfile
-    from .._core.stability import Certificate
-    from ..planning import Plan
+from .verb import PATH, json_option, plot_option, verb
 
 
 class Samples(click.ParamType[int | str]):
@@ -59,7 +57,6 @@ class _PlanVerb(Verb):
 
 def _list_examples(*, as_json: bool) -> None:
     """Print every example profile with its file and its sources."""
-    from ..planning import example_profiles
 
     examples = example_profiles()
     if as_json:
@@ -73,11 +70,7 @@ def _list_examples(*, as_json: bool) -> None:
             print_paragraph(paragraph, indent="  ")
 
 
-@click.command(
-    cls=_PlanVerb,
-    no_args_is_help=True,
-    epilog="Example: palpate plan press.json --device knob.toml -o press.json",
-)
+@verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
@@ -115,7 +108,6 @@ def _list_examples(*, as_json: bool) -> None:
     help="List the example profiles with their sources, and end.",
 )
 @json_option
-@interrupted_at_once()
 def plan(
     model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
 ) -> None:
@@ -127,9 +119,6 @@ def plan(
     network stands under plan. Exit code 1: no structure holds, or the force error is larger than accepted.
     Nothing is written then.
     """
-    from ..model import load_model
-    from ..planning import DeviceProfile, profile_file
-    from ..planning.search import plan as choose
 
     profile_path = profile_file(device)
     if plot is not None:
@@ -164,8 +153,6 @@ _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", 
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
-    from ..model.model_file import certificate_record
-
     error = plan.force_error
     felt, steepest = plan.felt_slopes
     return {
@@ -210,8 +197,6 @@ def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
     """Draw the root locus of the explicit structure."""
     from ..plotting import draw_root_locus
-    from .figures import figure_file
-    from .pictures import source_name
 
     title = f"model of {source_name(plan.model.data.files)}, explicit, on {profile.id}"
     with figure_file(path, height_inches=3.8, title=title) as (axes,):

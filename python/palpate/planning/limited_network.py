@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -21,9 +20,10 @@ from scipy.ndimage import gaussian_filter1d
 from .._core.model import ForceModel, wavelet_columns, wavelet_slope_columns
 from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
-from ..identification.constraints import domain_bounds, impose, slope_limited
-from ..identification.identified import Readings
-from ..identification.separable import Basis, Block, SeparableProblem
+from ..identification.network.basis import Basis
+from ..identification.network.constraints import domain_bounds, impose, slope_limited
+from ..identification.network.fitted import FittedNetwork
+from ..identification.network.separable import Block, SeparableProblem
 from .static_error import SAMPLES, strokes, with_network
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
@@ -183,7 +183,7 @@ def _fitted(
     ones = np.ones_like(x)
     hysteretic = len(wanted) == 2
     problem = SeparableProblem(
-        [Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted],
+        tuple(Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted),
         np.array([[0.5, 0.5], [0.5, -0.5]]) if hysteretic else np.array([[1.0]]),
         samples=wanted.size,
         within=0.0,
@@ -196,12 +196,11 @@ def _fitted(
     slopes = (low * float(travel[0]), high * float(travel[0]))
     lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
     bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
-    found = Readings.of(impose(problem, problem.solve(basis), bounds), problem.readout, lower, travel)
-    new: dict[str, Any] = {"alpha": found.alpha, "beta": found.beta}
-    for k, suffix in enumerate(("", "_hysteresis") if hysteretic else ("",)):
-        new[f"bias{suffix}"] = float(found.bias[k])
-        new[f"linear{suffix}"] = found.linear[k]
-        new[f"weight{suffix}"] = found.weights[k]
+    solution = impose(problem, problem.solve(basis), bounds)
+    found = FittedNetwork.of(solution, problem.readout, lower, travel, inputs=("position",)).parameters()
+    new = {
+        name: value for name, value in found.items() if name not in ("lower", "upper") and value is not None
+    }
     limited = with_network(model, **new)
     if not lossy:
         return limited
