@@ -177,7 +177,7 @@ class Plan:
         if scheme.has_coupling:
             rows["coupling"] = f"K_c = {scheme.coupling_stiffness:.4g}, B_c = {scheme.coupling_damping:.4g}"
         if scheme.has_mass:
-            rows["object"] = f"m = {scheme.mass:.4g}, B_o = {scheme.damping:.4g}"
+            rows["object"] = f"mass {scheme.mass:.4g}, damping {scheme.damping:.4g}"
         if scheme.predict:
             rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
         if scheme.play_radius:

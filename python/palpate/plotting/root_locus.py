@@ -24,9 +24,9 @@ _SAMPLES = 801
 
 @dataclass(frozen=True)
 class RootLocus:
-    """Poles of the linearised explicit structure (paper figure 14) at a held device, over the damping B_o.
+    """Poles of the linearised explicit structure (paper figure 14) at a held device, over its damping.
 
-    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the object's slope and K_c together, B = B_o + B_c.
+    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the object's slope and K_c together, B both dampings.
     """
 
     slopes: Float1D
@@ -40,7 +40,7 @@ class RootLocus:
 
 
 def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:
-    """Computes poles for a damping from 0 to the limit of the step, (B_o + B_c) T = 2 m.
+    """Computes poles for a damping from 0 to the limit of the step, B T = 2 m.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def draw_root_locus(axes: Axes, plan: Plan, device: DeviceProfile) -> None:
             color="black",
             markerfacecolor="white",
             zorder=3,
-            label=f"the same, $B_o$ = {scheme.damping:.3g}",
+            label=f"the same, damping {scheme.damping:.3g}",
         )
     axes.set_aspect("equal")
     axes.set_xlim(-1.3, 1.3)
