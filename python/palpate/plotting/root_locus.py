@@ -26,7 +26,7 @@ _SAMPLES = 801
 class RootLocus:
     """Poles of the linearised explicit structure (paper figure 14) at a held device, over its damping.
 
-    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the object's slope and K_c together, B both dampings.
+    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the slope and K_c together, B both dampings.
     """
 
     slopes: Float1D
