@@ -21,7 +21,6 @@ namespace palpate {
 namespace {
 
 using bench::EvenHysteresis;
-
 using test::Spring;
 
 TEST(Prediction, AdvancesARampByHalfASampleForEveryNumberOfTaps) {
