@@ -22,7 +22,7 @@ from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransf
 
 from palpate import WaveletNetworkRegressor
 from palpate._core.model import wavelet_columns
-from palpate.identification.frame import truncated_frame
+from palpate.identification.network.basis import truncated_frame
 
 Array = NDArray[np.float64]
 Predict = Callable[[Array], Array]

@@ -14,7 +14,7 @@ import numpy as np
 from palpate import DeviceProfile, Hand, Model, Scheme, identify, plan, read_recording
 from palpate._core.simulation import motion_driven, simulate
 from palpate._core.stability import certify, force_bounds
-from palpate.identification.constraints import slope_limited
+from palpate.identification.network.constraints import slope_limited
 from palpate.planning import Plan
 from palpate.planning.choices import renderable_slopes
 from palpate.recording import Recording

@@ -37,8 +37,9 @@ PYBIND11_MODULE(_core, module) {
     bind_model(model);
     auto dynamics = submodule("dynamics", "Transfer functions and the filters of the paper.");
     bind_dynamics(dynamics);
-    auto device = submodule("device", "Profiles of haptic devices.");
+    auto device = submodule("device", "Profiles of haptic devices, and the packets of USB devices.");
     bind_device(device);
+    bind_wire(device);
     auto rendering = submodule("rendering", "Structures between a model and a device.");
     bind_rendering(rendering);
     auto stability = submodule("stability", "Certificates and the inequalities they consist of.");

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdict on a result (good, usable with reservations, or no), and the force difference that a hand notices."""
+"""Verdict on a result (good, usable, no), and the force difference that a hand notices."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a model file that are no network: the history of the fit, the certificate, the layout of the text.
+"""Parts of a model file beside the network: the history of the fit, the certificate, the layout of the text.
 
 The core reads and checks model files; `model.schema.json` describes them.
 """

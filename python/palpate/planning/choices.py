@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from .. import _core
 from .._core.device import DeviceProfile
+from .._core.model import ForceModel
 from .._core.rendering import Scheme, default_play_radius, explicit_object, fewest_encoder_steps_in_play
 from .._core.stability import ForceBounds, certify_bounds, narrowest_play, stiffest_coupling
-from ..model import Model
-from .slope_limit import sliding_bounds, sliding_slopes
+from .limited_network import sliding_bounds, sliding_slopes
 
 SPARE = 0.95
 """Share of what the device allows that is used where nothing else sets a number [-]"""
@@ -31,7 +31,7 @@ _STABLE_RESERVES = (1.1, 1.5, 2.5, 5.0)
 
 
 def renderable_slopes(
-    device: DeviceProfile, stick: float = 0.0, model: Model | None = None
+    device: DeviceProfile, stick: float = 0.0, model: ForceModel | None = None
 ) -> tuple[float, float]:
     """(lowest, highest) slope that direct rendering is certified for, shared out as the model needs them.
 
@@ -53,7 +53,7 @@ def coupling_for(device: DeviceProfile, damping: float, falling: float = 0.0) ->
     return stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
 
 
-def play_radius_for(model: Model, device: DeviceProfile) -> float:
+def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
     """Narrowest certified play radius for direct rendering, at least 4 encoder steps.
 
     Infinite if none is certified up to `LONGEST_PLAY`.
@@ -65,7 +65,7 @@ def play_radius_for(model: Model, device: DeviceProfile) -> float:
     return radius if radius == narrowest else 1.000001 * radius
 
 
-def usual_play_radius(model: Model, device: DeviceProfile) -> float:
+def usual_play_radius(model: ForceModel, device: DeviceProfile) -> float:
     """Play radius where nothing is certified that depends on it; 0 without hysteresis or with one's own."""
     return default_play_radius(model, device.encoder_step)
 

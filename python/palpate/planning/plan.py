@@ -53,11 +53,8 @@ class Plan:
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
         instance_of("scheme", self.scheme, Scheme, "make one with palpate.Scheme")
-        if self.model.units["force"] == "A":
-            raise InputError(
-                "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A"
-            )
-        self._validate(None)
+        require_force(self.model)
+        self.scheme.validate(self.rendered)
 
     @property
     def rendered(self) -> Model:
@@ -158,7 +155,7 @@ class Plan:
             The explicit structure's slope limit is not above the model's steepest slope, or the certificate
             is for another device; the message names what differs.
         """
-        self._validate(device.period_s)
+        self.scheme.validate(self.rendered, device.period_s)
         if self.certificate is not None:
             wrong = device_difference(self.certificate.device, device)
             if wrong:
@@ -203,13 +200,13 @@ class Plan:
             ),
         )
 
-    def _validate(self, period_s: float | None) -> None:
-        try:
-            self.scheme.validate(self.rendered, period_s)
-        except InputError:
-            raise
-        except ValueError as error:
-            raise InputError(str(error)) from None
+
+def require_force(model: Model) -> None:
+    """Refuses a model whose force is a motor current."""
+    if model.units["force"] == "A":
+        raise InputError(
+            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A"
+        )
 
 
 def _percent(share: float) -> str:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..errors import InputError
-from ..identification.hysteresis_input import HysteresisInput
-from ..identification.inputs import input_columns
+from ..identification.data.rows import input_columns
+from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from .._typing import Float1D
 from ..arguments import instance_of
 from ..errors import InputError
-from ..identification.judgement import USABLE_NRMSE, error_findings
-from ..identification.usable import require_in_range
+from ..identification.classes.findings import USABLE_NRMSE, error_findings
+from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
 from ..recording.reading import Given, recording_from

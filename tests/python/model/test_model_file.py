@@ -71,6 +71,15 @@ def refusal(path: Path, content: bytes) -> str:
     return sentence.removeprefix(f"{path}: ")
 
 
+def refused(path: Path) -> str | None:
+    """The sentence that refuses a file, or None."""
+    try:
+        load_model(path)
+    except InputError as error:
+        return str(error)
+    return None
+
+
 def test_the_list_names_every_good_file() -> None:
     assert {entry["file"] for entry in GOOD} == {f"good/{path.name}" for path in CORPUS.glob("good/*.json")}
 
@@ -267,8 +276,5 @@ def test_mutations_are_read_or_refused_with_one_sentence(tmp_path: Path) -> None
                 else mutated[place] ^ (1 << chance.randrange(8))
             )
         path.write_bytes(mutated)
-        try:
-            load_model(path)
-        except InputError as error:
-            assert str(error).isprintable()
-            assert str(error).startswith(str(path))
+        error = refused(path)
+        assert error is None or (error.isprintable() and error.startswith(str(path)))

@@ -13,7 +13,7 @@ import pytest
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
 from palpate.cli.main import main
-from palpate.identification.constraints import slope_limited
+from palpate.identification.network.constraints import slope_limited
 from palpate.planning import example_profiles, profile_file
 from palpate.planning.root_locus import root_locus
 

@@ -93,6 +93,3 @@ def test_parquet_without_pyarrow_says_what_to_install(
     assert refusal(path) == (
         "a.parquet is Parquet, which needs pyarrow: install it with pip install 'palpate[parquet]'"
     )
-        refusal(path)
-        == "a.parquet is Parquet, which needs pyarrow: install it with pip install 'palpate[parquet]'"
-    )
