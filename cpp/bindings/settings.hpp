@@ -5,6 +5,8 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -22,7 +24,7 @@ template <class T, class... Path>
 [[nodiscard]] auto setter(Path... path) {
     return [=](T& settings, const pybind11::handle& value) {
         auto& field = (settings.*....*path);
-        field = value.cast<std::remove_reference_t<decltype(field)>>();
+        field = value.template cast<std::remove_reference_t<decltype(field)>>();
     };
 }
 
@@ -31,8 +33,9 @@ template <class T, class... Path>
 template <class T>
 void set_fields(T& settings, const pybind11::kwargs& given, const Setters<T>& setters) {
     namespace py = pybind11;
-    for (const auto& [key, value] : given) {
-        const auto name = key.cast<std::string>();
+    for (const std::pair<py::handle, py::handle> item : given) {
+        const py::handle value = item.second;
+        const std::string name = py::str(item.first);
         const auto known = setters.find(name);
         if (known == setters.end()) {
             throw py::type_error("there is no argument '" + name + "'");
