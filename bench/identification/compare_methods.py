@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""P1 to P6: error, parameters and time of palpate and its rivals, measured in one run.
+"""Measures error, parameters and time of palpate and other methods on P1 to P6.
 
 python bench/identification/compare_methods.py [P1 ...] [--draws 12] [--json FILE] [--only NAME ...]
 
 Each draw has different positions and noise. Numbers are medians of the draws; error, wavelets and parameters
 have their range beside them. All methods take their turn in every draw, so a busy machine slows all of them;
-the slowest take part in the first draws only. "over ours" is a rival's fit and tuning time over palpate's
+the slowest take part in the first draws only. "over ours" is a method's fit and tuning time over palpate's
 whole time, median of the draws.
 """
 
@@ -29,13 +29,13 @@ from bench.studies import SCALE, count, write_results
 OURS = METHODS[0].name
 
 SLOW = 5.0
-"""A rival that takes so many times as long as ours takes part in the first FEW draws only."""
+"""A method that takes this many times as long as palpate takes part in the first FEW draws only."""
 
 FEW = 3
 
 
 def skipped(method: Method, rows: Problem) -> str | None:
-    """Why a method does not take part in a problem."""
+    """Returns the reason why a method does not take part in a problem, or None."""
     if rows.X.shape[1] not in method.inputs:
         return "one input only"
     if len(rows.y) > method.most_rows:
@@ -44,7 +44,7 @@ def skipped(method: Method, rows: Problem) -> str | None:
 
 
 def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
-    """Returns one row for each method: medians and ranges over the draws, or why there are none."""
+    """Returns medians and ranges over the draws for each method, or the reason why it was skipped."""
     found: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
     reasons: dict[str, str] = {}
     for draw in range(wanted):
@@ -70,7 +70,7 @@ def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str
 
 
 def _sits_out(theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None) -> bool:
-    """True if a rival is so slow that it takes part in the first draws only."""
+    """True if a method is so slow that it takes part in the first draws only."""
     return len(theirs) >= FEW and ours is not None and _medians(theirs, ours)["over_ours"] > SLOW
 
 
@@ -108,7 +108,7 @@ def line(row: dict[str, Any]) -> str:
 
 
 def _sized(row: dict[str, Any], key: str) -> str:
-    """Median and range of a count."""
+    """Returns median and range of a count."""
     if row[key] is None:
         return ""
     low, high = row[f"{key}_range"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Published dynamic benchmarks: one step ahead and in free run, beside published figures.
+"""Measures published dynamic benchmarks, one step ahead and in free run, beside published figures.
 
 python bench/identification/dynamic.py [SET ...] [--json FILE]     PALPATE_DATA names the folder of recordings
 
@@ -33,32 +33,32 @@ from palpate import WaveletNetworkRegressor
 Array = NDArray[np.float64]
 
 PUBLISHED = ("LTI SS", "polynomial NARX", "best known (SOTA row)")
-"""What is told of the table: a linear model, a black box like ours, and the best."""
+"""Printed rows of the table: a linear model, a black box, and the best."""
 
 DRIVE_MASS = 90.0
-"""Where the search for the drive's mass starts [kg]."""
+"""Start of the search for the mass of the drive [kg]."""
 
 SUBSTEPS = 10
-"""Of a sample period, in the simulation of the drive."""
+"""Steps of a sample period in the simulation of the drive."""
 
 
 @dataclass(frozen=True)
 class Set:
-    """What is told beside every number of one benchmark."""
+    """Name, unit and rows of one benchmark."""
 
     name: str
     unit: str
     factor: float = 1.0
-    """From the file's unit to this one"""
+    """Factor from the unit of the file"""
     skip: int = 0
     """First rows of a test that are not scored"""
     comparable: bool = True
-    """Whether the published rows are these"""
+    """True if the published figures are of the same rows"""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One model on one test set."""
+    """Errors of one model on one test set."""
 
     benchmark: str
     test_set: str
@@ -72,7 +72,7 @@ class Row:
 
 
 def rms(error: Array) -> float:
-    """NaN where a free run has diverged."""
+    """Returns the RMS; NaN if a free run diverged."""
     return float(np.sqrt(np.mean(error**2)))
 
 
@@ -94,7 +94,7 @@ def scored(
 
 
 def silverbox(folder: Path) -> list[Row]:
-    """An electronic oscillator with a cubic spring; the arrow grows beyond what was learned from."""
+    """An electronic oscillator with a cubic spring. The amplitude of the arrow exceeds that of the data."""
     table = pd.read_csv(folder / "silverbox" / "silverbox_snls80mv.csv")
     u, y = table.input_V1_V.to_numpy(), table.output_V2_V.to_numpy()
     multisine, last = slice(40_650, 127_410), 8_700
@@ -125,7 +125,7 @@ def cascaded_tanks(folder: Path) -> list[Row]:
 
 
 def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
-    """Files without a published split: first half to learn from, second to be judged on."""
+    """Returns the study of a file without a published split: fitted on one half, tested on the other."""
 
     def rows(folder: Path) -> list[Row]:
         table = pd.read_csv(folder / "sysid_benchmarks" / file)
@@ -142,7 +142,7 @@ def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callabl
 
 
 def emps(folder: Path) -> list[Row]:
-    """Force = m a + f(velocity): a drive's friction over its velocity, then the motion from the force.
+    """Identifies force = m a + f(velocity) of a drive, then simulates the motion from the force.
 
     The force is the motor's, in both files the same multiple of its voltage. The second file tells of pulses
     beside it, the first has none: whether the voltage holds them is decided by the drive's controller.
@@ -178,7 +178,7 @@ def emps(folder: Path) -> list[Row]:
 
 
 def holds_pulses(learned: pd.DataFrame, table: pd.DataFrame, period: float) -> bool:
-    """Whether the motor's voltage rises with the pulses beyond what the drive's own controller asks for.
+    """True if the voltage of the motor rises with the pulses beyond the command of the controller.
 
     The controller, voltage over position error and both velocities, is fitted to the file without pulses; no
     model of the motion is asked. Pulses that act on the drive from outside leave its law as it is.
@@ -197,14 +197,14 @@ def holds_pulses(learned: pd.DataFrame, table: pd.DataFrame, period: float) -> b
 
 
 def smooth(signal: Array, period: float, derivative: int) -> Array:
-    """A cubic over 0.1 s: the signal, or its derivative."""
+    """Returns the signal or its derivative, smoothed by cubics over 0.1 s."""
     return np.asarray(savgol_filter(signal, 25, 3, deriv=derivative, delta=period))
 
 
 def simulated(
     force: Array, start: float, mass: float, friction: Callable[[float], float], period: float
 ) -> Array:
-    """m dv/dt = F - f(v), by semi-implicit Euler steps."""
+    """Solves m dv/dt = F - f(v) by semi-implicit Euler steps."""
     position, velocity, result, step = start, 0.0, np.empty(len(force)), period / SUBSTEPS
     for k, held in enumerate(force):
         result[k] = position
@@ -227,7 +227,7 @@ SETS: dict[str, Callable[[Path], list[Row]]] = {
 
 
 def with_published(folder: Path, row: Row) -> Row:
-    """With the figures of the published table for its test set, where that has any."""
+    """Returns the row with the published figures of its test set, if there are any."""
     table = pd.read_csv(folder / "sysid_benchmarks" / "published_results.csv")
     rows = table[(table.benchmark == row.benchmark) & (table.test_set == row.test_set)]
     found = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value

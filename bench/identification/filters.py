@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's filters against matched ones: the error of f from moving objects whose truth is known.
+"""Compares the filters of the paper with matched ones on moving objects with known truth.
 
 python bench/identification/filters.py [--json FILE]
 
-The paper's mode is told the true mass and damping, which it has to assume; the matched one finds them.
+The mode of the paper gets the true mass and damping, which it has to assume. The matched one identifies them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from palpate.recording.sample import LOWER, UPPER
 
 MASS, DAMPING = 1e-3, 0.06
 FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
-"""Highest frequency of the hand; its lowest is a tenth of it."""
+"""Highest frequency of the hand; the lowest is a tenth of it."""
 
 WAYS: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "matched, mass": ({"mass": MASS}, {}),
@@ -39,11 +39,11 @@ WAYS: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
         {"filters": "paper-explicit", "assumed_mass": MASS, "assumed_damping": DAMPING},
     ),
 }
-"""What the object has beside its force, and how it is identified."""
+"""Mass and damping of the object, and the options of its identification."""
 
 
 def error(there: dict[str, float], options: dict[str, Any], fastest_hz: float, draw: int) -> float:
-    """NRMSE of the identified f over the positions that were visited."""
+    """Returns the NRMSE of the identified f over the visited positions."""
     recording = moved(draw, seconds=20.0, slowest_hz=fastest_hz / 10.0, fastest_hz=fastest_hz, **there)
     model = identify(recording, **options)
     margin = 0.01 * (UPPER - LOWER)
@@ -53,7 +53,7 @@ def error(there: dict[str, float], options: dict[str, Any], fastest_hz: float, d
 
 
 def mean_force(model: Model, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """f, between press and release where a model tells them apart (and is wrong to do so here)."""
+    """Returns f, or the mean of press and release of a model with (wrongly identified) hysteresis."""
     if not model.hysteretic:
         return np.asarray(model.force(x))
     strokes = [np.asarray(model.force(x, direction=np.full(len(x), side))) for side in (1.0, -1.0)]

@@ -12,10 +12,10 @@ from palpate._core.model import wavelet_columns
 Array = NDArray[np.float64]
 
 SWEEPS = 8
-"""Alternations between the linear part and the network of the physical form."""
+"""Alternations between the fits of the linear part and of the network."""
 
 OUTSIDE = 3.0
-"""A free run that leaves this many ranges of its data has diverged."""
+"""A free run has diverged beyond this many ranges of its data."""
 
 
 class Lagged:
@@ -32,7 +32,7 @@ class Lagged:
 
     @property
     def start(self) -> int:
-        """Measured outputs that a free run needs."""
+        """Number of measured outputs at the start of a free run."""
         return max(self._p, self._q)
 
     @property
@@ -41,7 +41,7 @@ class Lagged:
         return linear + int(self._network.n_parameters_)
 
     def fit(self, u: Array, y: Array) -> Lagged:
-        """Learn from inputs u (n,) and outputs y (n,)."""
+        """Fits inputs u (n,) and outputs y (n,)."""
         X, target = self._lags(u, y), y[self.start :]
         if self._state is None:
             self._network.fit(X, target)
@@ -49,10 +49,10 @@ class Lagged:
             return self
         curved = np.zeros((len(target), 0))
         for _ in range(SWEEPS):
-            # lags and wavelets together: they are nearly collinear, and in turns would take forever
+            # lags and wavelets are nearly collinear: alternating fits would converge slowly
             columns = np.concatenate([X, np.ones((len(X), 1)), curved], axis=1)
             self._linear = np.linalg.lstsq(columns, target, rcond=1e-10)[0][: X.shape[1]]
-            # as a force that rises with position: so its continuation outside the data rises too
+            # with the sign of a force, whose continuation outside the data rises with position
             self._network.fit(X[:, list(self._state)], X @ self._linear - target)
             network = self._network.network_
             curved = wavelet_columns(
@@ -61,13 +61,13 @@ class Lagged:
         return self
 
     def one_step(self, u: Array, y: Array) -> Array:
-        """From measured outputs, for all rows past the start."""
+        """Predicts all rows past the start from measured outputs."""
         lags = self._lags(u, y)
         inputs = lags if self._state is None else lags[:, list(self._state)]
         return np.asarray(lags @ self._linear + self._sign * self._network.predict(inputs))
 
     def free_run(self, u: Array, y: Array) -> Array:
-        """From the first measured outputs and the input alone, for all rows past the start; NaN: diverged."""
+        """Predicts all rows past the start from the first measured outputs and the input; NaN: diverged."""
         limit = OUTSIDE * float(np.ptp(y))
         simulated = y.copy()
         simulated[self.start :] = np.nan

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rivals as functions of a problem's rows: (X, y) -> Fitted. Settings come from a fifth of the rows."""
+"""Methods as functions of the rows of a problem: (X, y) -> Fitted; settings from a fifth of the rows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransf
 
 from palpate import WaveletNetworkRegressor
 from palpate._core.model import wavelet_columns
-from palpate.identification.frame import truncated_frame
+from palpate.identification.network.basis import truncated_frame
 
 Array = NDArray[np.float64]
 Predict = Callable[[Array], Array]
@@ -30,7 +30,7 @@ Predict = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Fitted:
-    """A method after it has chosen its settings and learned from all rows."""
+    """A method fitted to all rows with its chosen setting."""
 
     predict: Predict
     n_parameters: int
@@ -41,13 +41,13 @@ class Fitted:
 
     @property
     def seconds(self) -> float:
-        """From rows to a model."""
+        """Fit and tuning time."""
         return self.fit_seconds + self.tuning_seconds
 
 
 @dataclass(frozen=True)
 class Method:
-    """A rival, and the problems that it can do in reasonable time."""
+    """A method and the problems that it solves in reasonable time."""
 
     name: str
     fit: Callable[[Array, Array], Fitted]
@@ -55,34 +55,22 @@ class Method:
     most_rows: int = 10**9
 
 
-def palpate_regressor(X: Array, y: Array) -> Fitted:
-    """Ours: no tuning apart, the size is found on the way."""
-    start = time.perf_counter()
-    network = WaveletNetworkRegressor().fit(X, y)
-    seconds = time.perf_counter() - start
-    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
+def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
+    """Returns the fit of palpate with some options; it chooses its size by itself and needs no tuning."""
 
+    def fit(X: Array, y: Array) -> Fitted:
+        start = time.perf_counter()
+        network = WaveletNetworkRegressor(**options).fit(X, y)
+        seconds = time.perf_counter() - start
+        return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 
-def palpate_selection_alone(X: Array, y: Array) -> Fitted:
-    """Ours without refinement: dilations and translations stay on the frame."""
-    start = time.perf_counter()
-    network = WaveletNetworkRegressor(refine=False).fit(X, y)
-    seconds = time.perf_counter() - start
-    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
-
-
-def palpate_quasi_newton(X: Array, y: Array) -> Fitted:
-    """Ours refined as published: all parameters at once, by quasi-Newton."""
-    start = time.perf_counter()
-    network = WaveletNetworkRegressor(refinement="quasi-newton").fit(X, y)
-    seconds = time.perf_counter() - start
-    return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
+    return fit
 
 
 def _tuned(
     fit: Callable[[Any, Array, Array], tuple[Predict, int]], settings: Iterable[Any], X: Array, y: Array
 ) -> Fitted:
-    """Choose on every fifth row, then learn from all."""
+    """Chooses the setting on every fifth row, then fits all rows."""
     start = time.perf_counter()
     held = np.arange(len(y)) % 5 == 4
     scores = []
@@ -128,13 +116,13 @@ def univariate_spline(X: Array, y: Array) -> Fitted:
         interior = len(spline.get_knots()) - 2
         return lambda at: spline(at[:, 0]), len(spline.get_coeffs()) + interior
 
-    # without noise the spline interpolates; with many rows FITPACK would take minutes to do so
+    # without noise the spline interpolates; with many rows FITPACK would take minutes
     shares = (0.98, 0.99, 1.0, 1.005, 1.01, 1.02, 1.05, 1.1)
     return _tuned(fit, (1e-6, *shares) if len(y) <= 1_000 else shares, X, y)
 
 
 def spline_ridge(X: Array, y: Array) -> Fitted:
-    """B-splines of each input, with two inputs their products, and ridge regression."""
+    """Fits B-splines of one input, or their products for two inputs, by ridge regression."""
 
     def fit(setting: tuple[int, float], X: Array, y: Array) -> tuple[Predict, int]:
         knots, penalty = setting
@@ -160,7 +148,7 @@ def spline_ridge(X: Array, y: Array) -> Fitted:
 
 
 def frame_pursuit(X: Array, y: Array) -> Fitted:
-    """Orthogonal matching pursuit on the frame that our selection starts from."""
+    """Fits by orthogonal matching pursuit on the frame of palpate's selection."""
     low, reach = X.min(axis=0), np.ptp(X, axis=0)
 
     def columns(atoms: Any, at: Array) -> Array:
@@ -234,7 +222,7 @@ def polynomial_ridge(X: Array, y: Array) -> Fitted:
 
 
 def mars(X: Array, y: Array) -> Fitted:
-    """Multivariate adaptive regression splines, where the package `pyearth` is installed."""
+    """Fits multivariate adaptive regression splines; needs the package `pyearth`."""
     from pyearth import Earth
 
     start = time.perf_counter()
@@ -245,9 +233,9 @@ def mars(X: Array, y: Array) -> Fitted:
 
 
 METHODS = (
-    Method("palpate", palpate_regressor),
-    Method("palpate, selection alone", palpate_selection_alone),
-    Method("palpate, quasi-Newton", palpate_quasi_newton, most_rows=100_000),
+    Method("palpate", palpate_with()),
+    Method("palpate, selection alone", palpate_with(refine=False)),
+    Method("palpate, quasi-Newton", palpate_with(refinement="quasi-newton"), most_rows=100_000),
     Method("OMP on a Mexican-hat frame", frame_pursuit, most_rows=100_000),
     Method("make_lsq_spline", lsq_spline, inputs=(1,)),
     Method("UnivariateSpline", univariate_spline, inputs=(1,), most_rows=100_000),
@@ -257,4 +245,4 @@ METHODS = (
     Method("Gaussian process", gaussian_process, most_rows=500),
     Method("MARS (pyearth)", mars, most_rows=100_000),
 )
-"""Ours first; a rival that is not installed is skipped and said so."""
+"""palpate first. A method that is not installed is skipped, and the output says so."""

@@ -10,7 +10,7 @@ from palpate.recording import sample_force
 from palpate.recording.sample import ENCODER_STEP, FORCE_NOISE, LOWER, SAMPLE_PERIOD, UPPER
 
 PLAY = 0.005
-"""Radius of the hysteresis [rad]."""
+"""Play radius of the hysteresis [rad]."""
 
 
 def moved(

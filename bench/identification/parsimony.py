@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Is what is there found, and nothing else? Simulated recordings of known objects, counted.
+"""Counts how often the model class of simulated objects is identified correctly.
 
 python bench/identification/parsimony.py [--draws 100] [--json FILE]
 """
@@ -22,14 +22,14 @@ from bench.studies import count, write_results
 from palpate import Model, Recording, identify
 
 MASS, DAMPING = 1e-3, 0.06
-"""What is to be recovered from a minute [N*m*s^2/rad, N*m*s/rad]."""
+"""True values of the moving object [N*m*s^2/rad, N*m*s/rad]."""
 
 WITHIN = 0.05
-"""How close it has to come, as a share."""
+"""Allowed relative error of mass and damping."""
 
 
 def spring(draw: int) -> Recording:
-    """A linear spring under a hand, by an encoder: 100 to 3000 rows, noise of 0.01 to 100 % of its range."""
+    """Returns a recording of a linear spring: 100 to 3000 rows, noise of 0.01 to 100 % of its range."""
     random = np.random.default_rng([7, draw])
     n = round(10.0 ** random.uniform(2.0, 3.5))
     x = 0.3 - 0.3 * np.cos(np.cumsum(random.uniform(0.5, 1.5, n)) * 40.0 / n)
@@ -43,7 +43,7 @@ def velocity_is_there(model: Model) -> bool:
 
 
 def recovered(model: Model) -> bool:
-    """Whether mass and damping are those of the object."""
+    """True if mass and damping are those of the object."""
     return (
         model.mass is not None
         and model.damping is not None
@@ -76,11 +76,11 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
         recovered,
     ),
 }
-"""Draws, the recording of each, and whether its model is right."""
+"""Number of draws, recording of a draw, and test of its model."""
 
 
 def is_right(claim: str, draw: int) -> bool:
-    """Whether one draw is told as what it is."""
+    """True if the model of one draw is right."""
     _, recording, right = CLAIMS[claim]
     return right(identify(recording(draw)))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Six identification problems with known truth: noisy rows to learn from, noise-free ones to be judged on."""
+"""Six identification problems with known truth: noisy rows for the fit, noise-free rows for the test."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """Rows to learn from and rows to be judged on."""
+    """Rows for the fit and rows for the test."""
 
     name: str
     X: Array
@@ -38,7 +38,7 @@ class Problem:
     """Without noise"""
 
     def nrmse(self, predicted: Array) -> float:
-        """RMSE over the standard deviation of the truth."""
+        """Returns the RMSE over the standard deviation of the truth."""
         return float(np.sqrt(np.mean((predicted - self.truth) ** 2)) / np.std(self.truth))
 
 

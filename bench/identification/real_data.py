@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measured objects: palpate beside the baselines, every fifth row held out, fitted and judged in one run.
+"""Compares palpate with the baselines on measured objects; every fifth row is held out.
 
 python bench/identification/real_data.py [SET ...] [--files 5] [--json FILE]
 
@@ -38,24 +38,24 @@ EVERY = 5
 """Rows i with i mod 5 = 4 are held out."""
 
 MOST_FILES = 16
-"""Of a set."""
+"""Largest number of files of a set."""
 
 
 AT_TURN = 0.01
-"""Share of the travel before its end where strokes turn."""
+"""Share of the travel before its end, where the direction changes."""
 
 
 @dataclass(frozen=True)
 class Set:
-    """How the recordings of one folder are read and identified."""
+    """Options for reading and identifying the recordings of one folder."""
 
     pattern: str = "*.csv"
     reading: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     folder: str = ""
-    """Where it is not the set's name"""
+    """Folder, if its name is not that of the set"""
     beside: bool = True
-    """Whether baselines are told beside it; not where they are those of another set"""
+    """False if the baselines are those of another set"""
 
 
 SETS = {
@@ -86,19 +86,19 @@ SETS = {
 
 @dataclass(frozen=True)
 class Crossing:
-    """Of one recording with both strokes."""
+    """Rows of a recording where release was measured above press. No passive model can follow them."""
 
     floor: float
-    """NRMSE on some rows of the best force with h >= 0: both strokes as measured, and their mean where they
-    cross. It was shown these very rows, noise and all."""
+    """NRMSE of the best force with h >= 0: both strokes as measured, their mean where they cross. It is
+    fitted to the judged rows, noise included."""
     above: float
-    """How far release lies above press at most [force]"""
+    """Largest difference of release and press [force]"""
     at_turn: Rows
     """(n,) rows in the last hundredth of the travel"""
 
     @staticmethod
     def of(recording: palpate.Recording, judged: Rows) -> Crossing | None:
-        """On the judged rows (n,); None where there are no two strokes."""
+        """Evaluates the judged rows (n,); returns None without two strokes."""
         x, direction, force = recording.position, recording.direction, recording.force
         if direction is None or not {-1, 1} <= set(direction.tolist()):
             return None
@@ -110,7 +110,7 @@ class Crossing:
 
 
 def _stroke(recording: palpate.Recording, side: int) -> tuple[Array, Array]:
-    """Distinct positions of one stroke and the mean forces there."""
+    """Returns the distinct positions of one stroke and the mean forces there."""
     assert recording.direction is not None
     on = recording.direction == side
     places, where = np.unique(recording.position[on], return_inverse=True)
@@ -120,7 +120,7 @@ def _stroke(recording: palpate.Recording, side: int) -> tuple[Array, Array]:
 def ours(
     recording: palpate.Recording, train: palpate.Recording, options: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """palpate on the kept rows, judged on the held-out ones that the baselines are judged on.
+    """Identifies the kept rows and tests the held-out rows of the baselines.
 
     It is led along the whole motion, since a velocity and a play need the rows between; of the rows that are
     held out only the force is unknown.
@@ -153,12 +153,12 @@ def ours(
 
 
 def row_of(path: Path, kind: Set) -> dict[str, Any]:
-    """One file: ours, and every baseline on the same rows."""
+    """Returns the results of palpate and of every baseline on the same rows of one file."""
     reading = dict(kind.reading)
     try:
         recording = palpate.read_recording(path, **reading)
     except palpate.InputError as first:
-        # files of one folder differ in a column: let the reader choose
+        # files of one folder differ in a column: the reader chooses
         reading.pop("position", None)
         try:
             recording = palpate.read_recording(path, **reading)
@@ -190,7 +190,7 @@ def _numbers(each: Compared) -> dict[str, Any]:
 
 
 def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """The medians of one set, and whatever is not as it should be."""
+    """Prints the medians of one set, refused files and diverged models."""
     good = [row for row in rows if "nrmse" in row]
     for row in rows:
         for who, told in (
@@ -215,7 +215,7 @@ def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _report_line(method: str, each: Sequence[Mapping[str, Any]], of: int) -> None:
-    """Medians; how many files they are of is told where it is not all of them."""
+    """Prints medians, with the number of files if it is not all of them."""
     if each:
         told = method if len(each) == of else f"{method} ({len(each)} files)"
         nrmse, size, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
@@ -223,7 +223,7 @@ def _report_line(method: str, each: Sequence[Mapping[str, Any]], of: int) -> Non
 
 
 def _report_ratios(than: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
-    """How palpate's error compares, file by file."""
+    """Prints the ratio of errors, file by file."""
     ratios = {
         file: own["nrmse"] / other["nrmse"] for file, (own, other) in pairs.items() if other["nrmse"] > 0.0
     }

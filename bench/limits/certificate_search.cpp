@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How close motions come to each line of the certificate: the largest damping or friction, over what the certificate
-// asks for, at which a motion takes energy out. Prints one row for each line and delay.
+// Searches motions that take out energy, for each line of the certificate: prints the largest damping or friction at
+// which one does, over the value that the certificate requires, one row for each line and delay.
 //
 //   certificate_search [scenes of each line] [part of a line's name]
 

@@ -11,7 +11,6 @@
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/simulation/hand.hpp"
 #include "palpate/stability/held_force.hpp"
 #include "palpate/stability/predicted_force.hpp"

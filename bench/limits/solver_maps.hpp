@@ -9,7 +9,6 @@
 #include "coupled_maps.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
 
 namespace palpate::bench {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One object on one device: what is planned for it, and the best that trial finds."""
+"""Compares the plan of one object on one device with the best structure that trial finds."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ import numpy as np
 from palpate import DeviceProfile, Hand, Model, Scheme, identify, plan, read_recording
 from palpate._core.simulation import motion_driven, simulate
 from palpate._core.stability import certify, force_bounds
-from palpate.identification.constraints import slope_limited
+from palpate.identification.network.constraints import slope_limited
 from palpate.planning import Plan
 from palpate.planning.choices import renderable_slopes
 from palpate.recording import Recording
 
 SAMPLES = 1001
 PUSH = 0.01
-"""Of the hand before it is let go [share of the travel]"""
+"""Displacement of the hand before it is released [share of the travel]"""
 SWING = 4.0
-"""To and fro after four seconds is no rest [encoder steps]"""
+"""Largest oscillation at rest after four seconds [encoder steps]"""
 ANGLE = (
     DeviceProfile(id="knob", coulomb_friction=0.005),
     DeviceProfile(id="weak knob", viscous_damping=0.005, coulomb_friction=0.002),
@@ -39,7 +39,7 @@ TRAVEL = (
 
 @dataclass(frozen=True)
 class Row:
-    """One object on one device; forces in the model's unit."""
+    """Result of one object on one device; forces in the unit of the model."""
 
     object: str
     device: str
@@ -47,22 +47,22 @@ class Row:
     verdict: str
     error: float
     best: str
-    """Of the candidates that are certified, or stable at every equilibrium"""
+    """Best candidate that is certified, or stable at every equilibrium"""
     best_error: float
     best_at_rest: str
-    """Of all that come to rest, proved or not"""
+    """Best candidate that comes to rest, proved or not"""
     best_at_rest_error: float
     shakes: bool
-    """The plan is left shaking"""
+    """The plan does not come to rest"""
     direct_shakes: bool
-    """The identified model is, rendered directly"""
+    """The identified model, rendered directly, does not come to rest"""
     force_range: float
     loss_rms: float | None
     loss_largest: float | None
     kept: float | None
-    """Share of the travel where no slope had to be limited"""
+    """Share of the travel without a limited slope"""
     kept_departure: float | None
-    """Largest departure of the rendered force from the identified one there"""
+    """Largest difference of rendered and identified force there"""
 
     @property
     def ratio(self) -> float:
@@ -70,14 +70,14 @@ class Row:
 
 
 def analytic(force: np.ndarray, x: np.ndarray) -> Model:
-    """A model of an object that is known exactly."""
+    """Returns the model of an object that is known exactly."""
     return identify(
         Recording.from_arrays(x, force, units={"position": "rad", "force": "N*m"}), inputs=("position",)
     )
 
 
 def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ...]]]:
-    """Name, model and the devices of its unit."""
+    """Yields name, model and the devices of its unit."""
     x = np.linspace(0.0, 0.47, 3000)
     yield "spring and wall", analytic(2.0 * x + 0.24 * np.logaddexp(0.0, (x - 0.4) / 0.004), x), ANGLE
     yield "snap-through", analytic(4.0 * x + 0.5 * np.exp(-(((x - 0.2) / 0.03) ** 2)), x), ANGLE
@@ -86,21 +86,21 @@ def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ..
 
 
 def measured_switches(wanted: int) -> list[Path]:
-    """Files spread over the measured switches; none without measured data."""
+    """Returns files spread over the measured switches; none without measured data."""
     given = os.environ.get("PALPATE_DATA")
     files = sorted((Path(given) / "keyswitches").glob("*.csv")) if given else []
     return files[:: max(1, len(files) // max(1, wanted))][:wanted]
 
 
 def strokes(model: Model, x: np.ndarray) -> np.ndarray:
-    """(1, n) the force, or (2, n) pressing and releasing."""
+    """Returns the force (1, n), or press and release (2, n)."""
     return np.array(
         [model.force(x, direction=side) for side in ((1.0, -1.0) if model.hysteretic else (None,))]
     )
 
 
 def sweep(model: Model, device: DeviceProfile) -> Hand:
-    """A hand that takes what the plan renders through the domain and back, as far as the force reaches."""
+    """Returns a hand that sweeps the domain to and fro, as far as the force of the device allows."""
     lower, upper = float(model.lower[0]), float(model.upper[0])
     x = np.linspace(lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower), 500)
     force = strokes(model, x)[0]
@@ -116,7 +116,7 @@ def sweep(model: Model, device: DeviceProfile) -> Hand:
 def error(
     model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, seconds: float
 ) -> float:
-    """RMS of commanded force less the identified model's at the end of the tick; infinite where it breaks."""
+    """Returns the RMS of commanded minus identified force at the end of the tick; infinity if it diverges."""
     start = float(np.clip(0.0, model.lower[0], model.upper[0]))
     try:
         trace = simulate(rendered, scheme, device, hand, seconds, start_position=start)
@@ -131,7 +131,7 @@ def error(
 
 
 def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile) -> bool:
-    """Whether a push keeps a hand moving that damps nothing and leans on the object's steepest part.
+    """True if a push keeps a hand without damping moving that presses the steepest part of the object.
 
     One hand has no mass, and one is so heavy that a force comes 0.03 rad of the swing late.
     """
@@ -162,7 +162,7 @@ def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile)
 
 
 def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) -> Iterator[Scheme]:
-    """Every structure over couplings, masses and dampings around what the device can hold."""
+    """Yields every structure over couplings, masses and dampings around the limit of the device."""
     play = {"play_radius": radius}
     yield Scheme(structure="direct", **play)
     held = 2.0 * device.viscous_damping / device.period_s
@@ -179,8 +179,8 @@ def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) ->
 
 
 def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
-    """Share of the travel where the nearest force within the device's slopes is the identified one, and the
-    largest departure of what is rendered from it there. A stick's h / r counts as slope."""
+    """Returns the share of the travel where no slope is limited, and the largest difference of rendered and
+    identified force there. h / r counts as slope."""
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
     stick = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
     low, high = renderable_slopes(device, stick, model)
@@ -189,7 +189,7 @@ def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, floa
     for force in forces:
         nearest = slope_limited(x, force, low, high)
         unchanged &= np.abs(nearest - force) <= 1e-6 * np.ptp(force)
-    # Kinks are rounded over 0.5 % of the travel: six of these are no part of what was left alone.
+    # Kinks are rounded over 0.5 % of the travel: six of these do not count as unchanged.
     margin = round(0.03 * SAMPLES)
     unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
     departure = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a proved bound costs, and how much wider it is than what a dense search finds: of the slope over the
-// domain, for networks of one input and of two, harmless, and with weights of a million that cancel.
+// Time of a proved slope bound, and its excess over a dense search: networks of one and two inputs, also with weights
+// of a million that cancel.
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +37,7 @@ NetworkParameters random_network(std::size_t size, std::size_t dimension, double
     return network;
 }
 
-/// How much too wide, of the largest.
+/// Fails if the bound is violated or its excess over the largest slope is above `allowed`.
 void assert_tight(benchmark::State& state, Interval proved, Interval seen, double allowed) {
     const double excess = std::max(proved.upper - seen.upper, seen.lower - proved.lower) / seen.largest();
     state.counters["excess"] = excess;
@@ -65,7 +65,7 @@ void slope_bound(benchmark::State& state) {
     bound(state, random_network(static_cast<std::size_t>(state.range(0)), 1, 50.0));
 }
 
-/// Every other wavelet takes the one before it away, but for a millionth.
+/// Every other wavelet cancels the one before it up to a millionth.
 NetworkParameters cancelling(NetworkParameters network) {
     const std::size_t d = network.dimension;
     for (std::size_t i = 0; i + 1 < network.weight.size(); i += 2) {

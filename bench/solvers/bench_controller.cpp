@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole tick of the controller without its device: reading judged, force rendered, limited and slewed, with the
-// solver that the loop takes by default. The device plays a recorded motion back and costs nothing. Beside the
-// mean stand the median and the 99.9th percentile of single ticks, the clock's own time taken off.
+// A whole tick of the controller without its device: reading checked, force rendered, limited and slewed, with the
+// default solver of the loop. The device plays a recorded motion back and costs nothing. Beside the mean stand the
+// median and the 99.9th percentile of single ticks, less the time of the clock.
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,7 @@
 
 namespace {
 
-/// Plays a motion back, again and again.
+/// Plays a motion back repeatedly.
 class Playback {
   public:
     explicit Playback(std::vector<double> motion) : motion_{std::move(motion)} {}
@@ -43,7 +43,7 @@ class Playback {
 
 using Clock = std::chrono::steady_clock;
 
-/// The `share` quantile of how long `work` takes, in ns.
+/// Returns the sorted durations of `work` [ns].
 template <class Work>
 std::vector<double> durations(Work work) {
     constexpr int count = 200'000;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Value and slope of a network: what one evaluation takes on a dependent chain, as a solver asks for it, and
-// what a sample costs in a batch. Yardsticks: the loop over std::exp that anybody would write, a lookup table
+// what a sample costs in a batch. References: the plain loop over std::exp, a lookup table
 // with linear interpolation and a cubic spline, both of 4096 cells. Every line shows its largest error.
 
 #include <cmath>
@@ -22,7 +22,7 @@ struct Answer {
     double value, slope;
 };
 
-/// The loop that anybody would write.
+/// The plain loop.
 struct ExpLoop {
     static constexpr double promised = 1e-12;  ///< largest error of the value
     NetworkParameters p;
@@ -176,7 +176,7 @@ void throughput_batch(benchmark::State& state) {
     }
 }
 
-/// A network of several inputs, value and gradient, and the loop that anybody would write.
+/// A network of several inputs, value and gradient, and the plain loop.
 struct Radial {
     palpate::RadialNetwork network;
 
@@ -238,7 +238,7 @@ void latency_of_inputs(benchmark::State& state) {
     }
 }
 
-/// What loading a model costs once: the table and its certificate.
+/// Cost of loading a model: the table and its certificate.
 void compile(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     for (auto _ : state) {

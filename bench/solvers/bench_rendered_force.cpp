@@ -20,7 +20,6 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/simulated_device.hpp"
@@ -62,7 +61,7 @@ double implicit_slope(palpate::Inertia inertia) {
     return palpate::Implicit<CompiledNetwork>::load_line_slope(inertia, coupling, period);
 }
 
-/// A structure in the closed loop: what the hand felt, and the motion that came of it.
+/// Force and motion of a structure in the closed loop.
 struct Felt {
     palpate::ForceError error;
     double force = 0.0;  ///< RMS of f along the motion
@@ -110,7 +109,7 @@ Felt closed_loop(S structure) {
     return felt;
 }
 
-/// `expected` is the error at the end of a tick [N*m] that the structure itself leaves, whatever solves it.
+/// `expected` is the error at the end of a tick [N*m] of the structure, for every solver.
 template <class S>
 void tick(benchmark::State& state, const S& initial, double expected) {
     const Felt felt = closed_loop(initial);
@@ -138,7 +137,7 @@ void tick(benchmark::State& state, const S& initial, double expected) {
     state.counters["evaluations"] = felt.evaluations;
 }
 
-// What every structure leaves of this object, from the table of its scene.
+// Force errors of the structures for this object.
 constexpr double of_the_hold = 0.00362;
 constexpr double of_the_predicted_hold = 0.00194;
 constexpr double of_the_coupling = 0.1202;

@@ -34,7 +34,7 @@ using palpate::WaveletNetwork;
 
 constexpr double period = 1e-3;
 
-/// An object and what suits it. Nothing of the clicks' scene is unique but the explicit step.
+/// An object with a coupling and an inertia. In the scene of the clicks only the explicit step has one solution.
 struct SpringWall {
     static constexpr VirtualCoupling coupling{100.0, 0.02};
     static constexpr Inertia inertia{0.001, 0.5};
@@ -88,7 +88,7 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
     }
 }
 
-/// A search over the sum itself that walks slowly enough to miss no root.
+/// A search over the sum of wavelets with steps short enough to miss no root.
 LoadLineSolver reference_solver() {
     LoadLineSolver solver;
     solver.longest_step = 0.002;
@@ -121,7 +121,7 @@ void massless(benchmark::State& state, const WaveletNetwork& object, const Solve
          palpate::Massless{object, Scene::coupling, period, reference_solver()}, exactly);
 }
 
-/// The yardstick: nothing to solve, and as exact a table of f as the others use.
+/// The reference: nothing to solve, and the table of f that the others use.
 template <class Scene>
 void explicit_step(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
@@ -182,7 +182,7 @@ void direct(benchmark::State& state) {
     step(state, object, palpate::Direct{CompiledNetwork{object}}, palpate::Direct{object}, exactly);
 }
 
-/// Exact for a line only: what it strays by is what one step of Newton's method leaves.
+/// Exact for a line only: its deviation is the residual of one step of Newton's method.
 void linearly_implicit(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     step(state, object,
@@ -220,7 +220,7 @@ void substepped(benchmark::State& state) {
     step(state, object, over(CompiledNetwork{object}), over(object), exactly);
 }
 
-/// What loading costs once: the tables and their certificates.
+/// Cost of loading: the tables and their certificates.
 template <class Scene>
 void build(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Work against precision: a mass behind the coupling follows a hand's motion, by every time step, with periods
 // from 4 ms to 1/16 ms. The truth is the solution of m y'' = K_c (x - y) + B_c (x' - y') - f(y) - B_o y' by
-// Runge-Kutta steps of 1/1024 ms. Beside the time of a step stands the error of the motion; a time step that
-// diverges says so, and is expected to exactly where its limit lies.
+// Runge-Kutta steps of 1/1024 ms. Beside the time of a step stands the error of the motion; a time step
+// must diverge exactly where its limit lies.
 
 #include <cmath>
 #include <cstddef>
@@ -84,7 +84,7 @@ const std::vector<double>& truth() {
     return solution;
 }
 
-/// RMS of y_k - y(t_k) once settled; infinity for a motion that runs away.
+/// RMS of y_k - y(t_k) once settled; infinity if the motion diverges.
 template <class S>
 double motion_error(S structure, std::int64_t period_ns) {
     const auto stride = static_cast<std::size_t>(period_ns / shortest_ns);
@@ -106,8 +106,7 @@ double motion_error(S structure, std::int64_t period_ns) {
     return std::sqrt(squares / static_cast<double>(counted));
 }
 
-/// `error_per_s`: what a period may cost at most, in rad of error for each second of it; `limit_ns`: from
-/// this period on the motion runs away.
+/// `error_per_s`: largest error over the period [rad/s]; `limit_ns`: shortest period at which the motion diverges.
 template <class Make>
 void step(benchmark::State& state, Make make, double error_per_s, std::int64_t limit_ns = longest_ns + 1) {
     const std::int64_t period_ns = state.range(0);

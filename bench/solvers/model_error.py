@@ -43,7 +43,7 @@ Predict = Callable[[np.ndarray], np.ndarray]
 
 
 def models(X: np.ndarray, y: np.ndarray) -> Iterator[tuple[str, int, int, Predict]]:
-    """Method, wavelets (0: none), parameters and prediction."""
+    """Yields method, wavelets (0: none), parameters and prediction."""
     seen = set()
     for most in WAVELETS:
         network = WaveletNetworkRegressor(max_wavelets=most).fit(X, y)

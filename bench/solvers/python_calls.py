@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a prediction costs from Python, beside NumPy and SciPy: python bench/solvers/python_calls.py FILE.json
+"""Measures a prediction from Python beside NumPy and SciPy: python bench/solvers/python_calls.py FILE.json
 
 One position as a number, and 10^6 in an array. Yardsticks: a lookup table of 64 entries, and a cubic spline
 through them. The model's answer is compared with eq. 4 in NumPy.

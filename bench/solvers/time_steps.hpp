@@ -7,15 +7,14 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/rendering/explicit.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
-// Time steps that no device renders with: they are compared with those that one does.
+// Time steps for the comparison; no device renders with them.
 namespace palpate::bench {
 
-/// One step of Newton's method and no more, from the last position: with it `Implicit` is the linearly
-/// implicit Euler scheme. One evaluation a step, exact for a line, no certificate for anything else.
+/// One step of Newton's method from the last position. With it `Implicit` is the linearly implicit Euler scheme. It
+/// evaluates once per step, is exact for a line, and has no certificate otherwise.
 struct OneNewtonStep {
     using Memory = WarmStart;
 
@@ -90,8 +89,7 @@ class Substepped {
 ///
 ///     v_k = v_{k-1} + T (G_k + G_{k-1}) / (2m),   y_k = y_{k-1} + T (v_k + v_{k-1}) / 2,
 ///
-/// a load line with p = 4m/T^2 + 2(B_o + B_c)/T + K_c. It damps nothing and rings on stiff walls; here for the
-/// comparison.
+/// a load line with p = 4m/T^2 + 2(B_o + B_c)/T + K_c. It damps nothing and rings on stiff walls.
 template <Environment E, class Solver = LoadLineSolver>
 class Trapezoidal {
   public:
@@ -114,7 +112,7 @@ class Trapezoidal {
         force_ = -own_;
     }
 
-    /// Behind the coupling: the device's measured position in, the coupling's force out.
+    /// Behind the coupling: takes the measured position of the device, returns the force of the coupling.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
         Rendered rendered = advance(coupling_, coupling_.force(device, device_velocity), force_);
@@ -127,7 +125,7 @@ class Trapezoidal {
         return rendered;
     }
 
-    /// Without the coupling: a given force, held for the tick, drives the environment.
+    /// Without the coupling: the force, held for the tick, drives the environment.
     [[nodiscard]] Rendered drive(double force) noexcept {
         Rendered rendered = advance({0.0, 0.0}, force, force);
         rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;

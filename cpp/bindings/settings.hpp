@@ -5,8 +5,6 @@
 #include <map>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
-#include <utility>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -24,7 +22,7 @@ template <class T, class... Path>
 [[nodiscard]] auto setter(Path... path) {
     return [=](T& settings, const pybind11::handle& value) {
         auto& field = (settings.*....*path);
-        field = value.template cast<std::remove_reference_t<decltype(field)>>();
+        field = value.cast<std::remove_reference_t<decltype(field)>>();
     };
 }
 
@@ -33,9 +31,8 @@ template <class T, class... Path>
 template <class T>
 void set_fields(T& settings, const pybind11::kwargs& given, const Setters<T>& setters) {
     namespace py = pybind11;
-    for (const std::pair<py::handle, py::handle> item : given) {
-        const py::handle value = item.second;
-        const std::string name = py::str(item.first);
+    for (const auto& [key, value] : given) {
+        const std::string name = py::str(key);
         const auto known = setters.find(name);
         if (known == setters.end()) {
             throw py::type_error("there is no argument '" + name + "'");
@@ -57,9 +54,9 @@ template <class T, class... Path>
 void add_scheme_choices(Setters<T>& setters, Path... path) {
     setters["structure"] = [=](T& settings, const pybind11::handle& value) {
         if constexpr (sizeof...(Path) == 0) {
-            settings.structure = structure_named(value.cast<std::string>());
+            settings.structure = named<StructureKind>(value.cast<std::string>(), "structure");
         } else {
-            (settings.*....*path).structure = structure_named(value.cast<std::string>());
+            (settings.*....*path).structure = named<StructureKind>(value.cast<std::string>(), "structure");
         }
     };
     setters["compensated"] = setter<T>(path..., &SchemeChoices::compensated);

@@ -54,20 +54,12 @@ CLI::Validator not_negative() {
     return number_between(0.0, infinite);
 }
 
-std::string structure_list() {
-    std::string list;
-    for (const std::string_view name : structure_names) {
-        list += (list.empty() ? "" : ", ") + std::string(name);
-    }
-    return list;
-}
-
 CLI::Validator structure_word() {
     CLI::Validator validator;
     validator.operation([](std::string& text) -> std::string {
         const bool known =
             std::find(structure_names.begin(), structure_names.end(), text) != structure_names.end();
-        return known ? "" : "must be one of " + structure_list() + ", not " + text;
+        return known ? "" : "must be one of " + either(structure_names) + ", not " + text;
     });
     return validator;
 }
@@ -106,8 +98,11 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
         return " [" + readable(value) + " " + unit + ", scaled]";
     };
     group(app.add_option_function<std::string>(
-              "--structure", [&scheme](const std::string& name) { scheme.structure = structure_named(name); },
-              "One of " + structure_list()))
+              "--structure",
+              [&scheme](const std::string& name) {
+                  scheme.structure = named<StructureKind>(name, "structure");
+              },
+              "One of " + either(structure_names)))
         ->check(structure_word())
         ->type_name("NAME")
         ->default_str(std::string(name_of(Scheme{}.structure)));
@@ -119,10 +114,11 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
                          "B_c, force per velocity" + scaled(usual.coupling.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--mass", scheme.mass,
-                         "m of implicit and explicit" + scaled(usual.inertia.mass, "kg*m^2")))
+                         "Mass of the object, where it has mass" + scaled(usual.inertia.mass, "kg*m^2")))
         ->check(positive());
-    group(app.add_option("--damping", scheme.damping,
-                         "B_o of implicit and explicit" + scaled(usual.inertia.damping, "N*m*s/rad")))
+    group(app.add_option(
+              "--damping", scheme.damping,
+              "Damping of the object, where it has mass" + scaled(usual.inertia.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--play-radius", scheme.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"))

@@ -4,34 +4,26 @@
 from typing import Any
 
 from palpate import Model
-from palpate.model import Fit
-from palpate.recording import Source
 
 
 def model_by_hand(**changes: Any) -> Model:
     """f = 5 x + one wavelet over 0 to 0.5 rad, at most 3 N*m; with changes."""
     arguments: dict[str, Any] = {
-        "kind": "position",
-        "inputs": ("position",),
         "units": {"position": "rad", "force": "N*m"},
         "alpha": [[20.0]],
         "beta": [[0.3]],
         "weight": [0.1],
         "linear": [5.0],
-        "bias": 0.0,
         "lower": [0.0],
         "upper": [0.5],
-        "fit": Fit("network", "bic", 0.01, 1, 5),
-        "data": Source(("by-hand.csv",), "0" * 64, 100, {}),
     }
-    return Model(**{**arguments, **changes})
+    return Model.from_network(**{**arguments, **changes})
 
 
 def keyswitch_by_hand(**changes: Any) -> Model:
     """A tactile switch of 4 mm travel whose press lies 0.1 N above its release."""
     return model_by_hand(
         **{
-            "kind": "hysteresis",
             "units": {"position": "m", "force": "N"},
             "alpha": [[2000.0]],
             "beta": [[0.002]],

@@ -19,7 +19,7 @@ COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 ROOMS = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
 # Leaves may import any room but cli; they are imported by cli and the report only.
-LEAVES = {"plotting", "analysis", "baselines"}
+LEAVES = {"plotting", "baselines"}
 
 # Folder of the headers -> what it may include, besides itself, status.hpp and fields.
 INCLUDES = {
@@ -45,17 +45,6 @@ INCLUDES = {
         "io",
     },
     "simulation": {"run", "io", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
-    "failure": {
-        "simulation",
-        "run",
-        "guard",
-        "stability",
-        "rendering",
-        "solver",
-        "dynamics",
-        "model",
-        "device",
-    },
 }
 
 # Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.

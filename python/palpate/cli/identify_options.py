@@ -11,7 +11,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 
 import click
 
-from ..identification.options import WORDS, IdentifyOptions
+from ..identification.options import CHOICES, IdentifyOptions
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -86,5 +86,5 @@ def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
     if len(kinds) == 1 and get_args(kinds[0]):
         text |= {"nargs": len(get_args(kinds[0])), "metavar": _METAVAR.get(name)}
         return click.option(flag, name, type=float, **text)
-    kind = click.Choice(WORDS[name]) if name in WORDS else kinds[0]
+    kind = click.Choice(CHOICES[name]) if name in CHOICES else kinds[0]
     return click.option(flag, name, type=kind, **text)

@@ -2,9 +2,9 @@
 """Identification of a wavelet network from recorded force over position (paper section 3)."""
 
 from .environment import fit_environment
-from .frame import frame_bounds
-from .identified import IdentifiedNetwork
 from .identify import identify
+from .network.basis import frame_bounds
+from .network.fitted import FittedNetwork
 from .options import IdentifyOptions
 
-__all__ = ["IdentifiedNetwork", "IdentifyOptions", "fit_environment", "frame_bounds", "identify"]
+__all__ = ["FittedNetwork", "IdentifyOptions", "fit_environment", "frame_bounds", "identify"]

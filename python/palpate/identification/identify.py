@@ -16,13 +16,13 @@ from ..model import Fit, Model, PathStep
 from ..recording import Source
 from ..recording.reading import Given, recordings_from
 from ..verdict import Verdict
-from .environment import VELOCITY_INPUTS, fit_environment
-from .identified import IdentifiedNetwork
-from .inputs import observations
-from .isolated import without_isolated
-from .judgement import verdict_of
+from .classes.findings import verdict_of
+from .classes.selection import VELOCITY_INPUTS
+from .data.outliers import without_isolated
+from .data.rows import observations, require_in_range
+from .environment import fit_environment
+from .network.fitted import FittedNetwork
 from .options import RESERVED_INPUTS, IdentifyOptions, described_fields, kind_of, options_from
-from .usable import require_in_range
 
 
 def identify(
@@ -114,7 +114,7 @@ _show_options()
 
 
 def model_of(
-    network: IdentifiedNetwork,
+    network: FittedNetwork,
     units: Mapping[str, str],
     source: Source,
     options: IdentifyOptions,
@@ -122,7 +122,7 @@ def model_of(
 ) -> Model:
     """The model of an identified network, with the verdict on it."""
     path: list[PathStep] = [
-        {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.rung}
+        {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.model_class}
         for at in network.path
     ]
     return Model(
@@ -131,13 +131,13 @@ def model_of(
         units=units,
         **network.parameters(),
         below=network.below,
-        above=network.above,
+        above="linear",
         period=options.period,
         play_radius=network.play_radius,
         mass=network.mass if options.filters == "matched" else options.assumed_mass,
         damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
         fit=Fit(
-            rung=network.rung,
+            rung=network.model_class,
             stop_reason=network.stop_reason,
             nrmse=network.nrmse,
             n_wavelets=len(network.weight),
@@ -149,7 +149,7 @@ def model_of(
     )
 
 
-def _kind(network: IdentifiedNetwork) -> str:
+def _kind(network: FittedNetwork) -> str:
     if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
     return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

@@ -23,16 +23,14 @@ from ..recording.long_recording import PART_ROWS, LongRecording, open_long_recor
 from ..recording.rows import LeftOut
 from ..recording.strokes import strokes_from_order
 from ..verdict import Finding, usable
+from .classes.findings import verdict_of
+from .data.large_files import Summary, in_order, merged, summarise
+from .data.outliers import refuse_isolated
+from .data.rows import modulo, require_in_range
 from .environment import fit_environment
-from .identified import IdentifiedNetwork
 from .identify import model_of
-from .isolated import refuse_isolated
-from .judgement import verdict_of
+from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
-from .periodic import modulo
-from .summary import Summary, merged, summarise
-from .usable import require_in_range
-from .workers import in_order
 
 LEAST_KNOWN = 0.5
 """Share of the rows whose direction must be known to test hysteresis [-]."""
@@ -190,7 +188,7 @@ def _require_all_rows(recording: LongRecording, read: PartRead) -> None:
 
 
 def _error_on_rows(
-    summary: Summary, network: IdentifiedNetwork, side: Float1D | None, period: float | None
+    summary: Summary, network: FittedNetwork, side: Float1D | None, period: float | None
 ) -> float:
     """RMS error on the rows of a summary; the network is a line within each cell."""
     position, lower = summary.position, float(network.lower[0])

@@ -14,13 +14,12 @@ import numpy as np
 
 from ..arguments import shown
 from ..errors import InputError
-from .stopping import CRITERIA
 
 RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
 """What `inputs` may hold beside the names of columns."""
 
-WORDS: dict[str, tuple[str, ...]] = {
-    "criterion": tuple(CRITERIA),
+CHOICES: dict[str, tuple[str, ...]] = {
+    "criterion": ("bic", "aicc", "gcv", "fpe", "fresh", "perceptual"),
     "selection": ("orthogonal", "residual", "backward"),
     "refinement": ("projection", "quasi-newton"),
     "loss": ("squares", "huber"),
@@ -111,10 +110,10 @@ class IdentifyOptions:
                     f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
                     "depends on: hysteresis, velocity, columns"
                 )
-        for name, words in WORDS.items():
+        for name, words in CHOICES.items():
             if not isinstance(value := getattr(self, name), str) or value not in words:
                 raise InputError(f"{name} is {shown(value)}; it must be one of {', '.join(words)}")
-        for name in _TRUE_OR_FALSE:
+        for name in _SWITCHES:
             if not isinstance(value := getattr(self, name), (bool, np.bool_)):
                 raise InputError(f"{name} is {shown(value)}; it must be True or False")
         for name, least in _WHOLE_NUMBERS.items():
@@ -157,7 +156,7 @@ class IdentifyOptions:
             raise InputError(f"fixed_force is {shown(self.fixed_force)}; it must be (position, force)")
 
 
-_TRUE_OR_FALSE = ("refine", "hysteresis_nonnegative", "monotone")
+_SWITCHES = ("refine", "hysteresis_nonnegative", "monotone")
 """Settings that are on or off."""
 
 _WHOLE_NUMBERS = {

@@ -6,11 +6,28 @@ from __future__ import annotations
 import hashlib
 import inspect
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from .._typing import Float1D, Float2D
+from ..arguments import shown
+from ..errors import InputError
+from ..model import Fit, Model, PathStep
+from ..recording import Source
+from .classes.climb import BoxRows
+from .classes.findings import RowError
+from .classes.selection import select
+from .data.held_out import held_out_rows
+from .data.limits import ForceScale, distinct_rows
+from .data.rows import LARGEST
+from .network.fitted import FittedNetwork
+from .options import IdentifyOptions
+from .search.criteria import ON_HELD_OUT_ROWS
 
 try:
     from sklearn.base import BaseEstimator, RegressorMixin
@@ -19,14 +36,6 @@ except ImportError as missing:
     raise ImportError(
         "WaveletNetworkRegressor needs scikit-learn 1.6 or later: pip install palpate[sklearn] brings it"
     ) from missing
-
-from .._typing import Float1D
-from ..arguments import shown
-from ..errors import InputError
-from ..model import Fit, Model, PathStep
-from ..recording import Source
-from .options import IdentifyOptions
-from .regression import Regression, fit_regression
 
 OF_RECORDINGS = {
     "inputs",
@@ -46,6 +55,13 @@ OF_RECORDINGS = {
 
 SETTINGS = {each.name: each.default for each in fields(IdentifyOptions) if each.name not in OF_RECORDINGS}
 """Those of :class:`IdentifyOptions` that the regressor takes, with their defaults."""
+
+
+NARROWEST = 1e-12
+"""A column whose range is below this share of its largest value is constant but for rounding."""
+
+MOST_ROWS = 200_000
+"""Rows, evenly spread, that the error is computed on: more change its third digit at most."""
 
 
 class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -139,9 +155,8 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         rows, values = _validated(self, X, y, dtype=np.float64, y_numeric=True)
         values = np.asarray(values, dtype=np.float64)
         weight = None if sample_weight is None else _weights(sample_weight, len(values))
-        found = fit_regression(rows, values, weight, options)
-        self.network_ = _model_of(found, self._input_names(found), rows, values, weight)
-        self.columns_ = found.columns
+        self.columns_, found = fit_regression(rows, values, weight, options)
+        self.network_ = _model_of(found, self._input_names(self.columns_), rows, values, weight)
         self.n_wavelets_ = self.network_.n_wavelets
         self.n_parameters_ = self.network_.n_parameters
         self.stop_reason_ = self.network_.stop_reason
@@ -163,9 +178,106 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         rows = _validated(self, X, dtype=np.float64, reset=False)
         return self.network_.predict(rows[:, self.columns_])
 
-    def _input_names(self, found: Regression) -> list[str]:
+    def _input_names(self, columns: NDArray[np.int64]) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
-        return [f"x{column}" if names is None else str(names[column]) for column in found.columns]
+        return [f"x{column}" if names is None else str(names[column]) for column in columns]
+
+
+def fit_regression(
+    X: Float2D, y: Float1D, weight: Float1D | None, options: IdentifyOptions
+) -> tuple[NDArray[np.int64], FittedNetwork]:
+    """Fits f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4) to rows of any meaning.
+
+    The model classes are constant, linear and network, judged by the criterion on n samples, n the sum of the
+    weights; none is tried that has as many parameters as there are samples.
+
+    Parameters
+    ----------
+    X : (n, d)
+        Finite numbers.
+    y : (n,)
+        Finite numbers.
+    weight : (n,), optional
+        How many samples each row stands for, >= 0; 1 without it. A row of weight 0 is left out.
+    options : IdentifyOptions
+
+    Returns
+    -------
+    (columns, network)
+        Which columns of X the network has as inputs, the constant ones left out, and the network; its domain
+        reaches beyond the rows by the margin of a sample.
+
+    Raises
+    ------
+    palpate.InputError
+        No row has a weight above 0.
+    """
+    if weight is None:
+        weight = np.ones(len(y))
+    counted = weight > 0.0
+    if not counted.any():
+        raise InputError("the sample weights are all zero; at least one row must count")
+    X, y, weight = X[counted], y[counted], weight[counted]
+    largest = max(float(np.abs(X).max()), float(np.abs(y).max()))
+    if largest > LARGEST:
+        raise InputError(f"the data hold {largest:.3g}; the limit is {LARGEST:g}. Use other units")
+    if scale := ForceScale.of(y, options):
+        columns, scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
+        return columns, scaled.unscaled(scale)
+    varies = np.ptp(X, axis=0) > NARROWEST * np.abs(X).max(axis=0)
+    # a network needs an input: where none varies, the first stands in a box of its own width
+    columns = np.flatnonzero(varies) if varies.any() else np.zeros(1, dtype=np.int64)
+    lower, upper = X[:, columns].min(axis=0), X[:, columns].max(axis=0)
+    if not varies.any():
+        lower, upper = lower - 0.5 * _unit(lower), upper + 0.5 * _unit(upper)
+    box = (X[:, columns] - lower) / (upper - lower)
+    if options.criterion in ON_HELD_OUT_ROWS and not held_out_rows(len(y), None).any():
+        raise InputError(f"criterion {options.criterion!r} holds rows out; {len(y)} are too few for that")
+    rows = BoxRows(
+        names=tuple(f"x{column}" for column in columns),
+        positions=X[:, columns],
+        lower=lower,
+        reach=upper - lower,
+        box=box,
+        path=box[:, 0],
+        force=y,
+        weight=weight,
+        counted=weight,
+    )
+    with threadpool_limits(limits=1, user_api="blas"):
+        selected = select(rows, options, on_held_out=False)
+        best = selected.best
+        some = slice(None, None, max(1, -(-len(y) // MOST_ROWS)))
+        error = RowError(y[some] - best.force_at(box, some), y[some], weight[some])
+    network = FittedNetwork.of(
+        best.solution,
+        best.problem.readout,
+        lower,
+        upper - lower,
+        inputs=rows.names,
+        model_class=best.model_class,
+        stop_reason=best.stop_reason,
+        n_parameters=best.n_parameters,
+        rmse=error.rmse,
+        path=tuple(selected.report.path),
+    )
+    margin = _margin(box) * (upper - lower)
+    return columns, replace(network, lower=lower - margin, upper=upper + margin)
+
+
+def _margin(box: Float2D) -> float:
+    """How far the range that rows were drawn from reaches beyond them, on each side [box].
+
+    The extremes of m values drawn evenly from a range fall short of it by 1/(m + 1) of it on average, which
+    is 1/(m - 1) of what they span: no more than a few rows of a wavelet's core.
+    """
+    distinct = np.unique(box) if box.shape[1] == 1 else distinct_rows(box)[0]
+    return 1.0 / max(len(distinct) - 1, 1)
+
+
+def _unit(value: Float1D) -> Float1D:
+    """A width that a number of this size can be moved by."""
+    return np.maximum(1.0, np.abs(value))
 
 
 def _validated(estimator: WaveletNetworkRegressor, X: object, *y: object, **checks: Any) -> Any:
@@ -203,7 +315,9 @@ def _weights(sample_weight: npt.ArrayLike, n: int) -> Float1D:
     return weight
 
 
-def _model_of(found: Regression, inputs: list[str], X: Float1D, y: Float1D, weight: Float1D | None) -> Model:
+def _model_of(
+    found: FittedNetwork, inputs: list[str], X: Float1D, y: Float1D, weight: Float1D | None
+) -> Model:
     digest = hashlib.sha256()
     for array in (X, y, weight):
         if array is not None:
@@ -215,27 +329,20 @@ def _model_of(found: Regression, inputs: list[str], X: Float1D, y: Float1D, weig
             "n_wavelets": at.n_wavelets,
             "rmse": at.rmse,
             "criterion": at.criterion if math.isfinite(at.criterion) else None,
-            "rung": at.rung,
+            "rung": at.model_class,
         }
         for at in found.path
     ]
-    readings = found.readings
     return Model(
         kind="general",
         inputs=inputs,
         units={"position": "", "force": ""},
-        alpha=readings.alpha,
-        beta=readings.beta,
-        weight=readings.weights[0],
-        linear=readings.linear[0],
-        bias=float(readings.bias[0]),
-        lower=found.lower,
-        upper=found.upper,
+        **found.parameters(),
         fit=Fit(
-            rung=found.rung,
+            rung=found.model_class,
             stop_reason=found.stop_reason,
             nrmse=found.rmse / spread if spread > 0 else 0.0,
-            n_wavelets=len(readings.alpha),
+            n_wavelets=len(found.alpha),
             n_parameters=found.n_parameters,
             path=path,
         ),

@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "limits/trials.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session_text.hpp"
 #include "palpate/simulation/closed_loop.hpp"
@@ -20,6 +20,7 @@
 namespace palpate {
 namespace {
 
+using bench::EvenHysteresis;
 using test::Spring;
 
 TEST(Prediction, AdvancesARampByHalfASampleForEveryNumberOfTaps) {

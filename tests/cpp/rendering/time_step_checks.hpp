@@ -8,7 +8,6 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 
 // Checks that every time step with a mass behind a coupling has to pass.

@@ -68,7 +68,10 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL, "--rate-hz", "fast"], "--rate-hz: must be a number from 100 to 10000, not fast"),
         ([MODEL, "--rate-hz", "nan"], "--rate-hz: must be a number from 100 to 10000, not nan"),
         ([MODEL, "--duration-s", "0"], "--duration-s: must be a number above 0, not 0"),
-        ([MODEL, "--structure", "soft"], "must be one of direct, massless, implicit, explicit, energy-consistent, not soft"),
+        (
+            [MODEL, "--structure", "soft"],
+            "must be one of direct, massless, implicit, explicit or energy-consistent, not soft",
+        ),
         (
             [MODEL, "--structure", "explicit", "--mass", "1e-4"],
             "explicit, which diverges: the model's steepest",

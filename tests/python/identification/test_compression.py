@@ -4,8 +4,9 @@
 import numpy as np
 import pytest
 
-from palpate.identification.compression import Compressed, Compressor, binning_error
-from palpate.identification.separable import Basis, problem_of
+from palpate.identification.data.compression import Compressed, Compressor, binning_error
+from palpate.identification.network.basis import Basis
+from palpate.identification.network.separable import problem_of
 
 
 def wall(x: np.ndarray) -> np.ndarray:

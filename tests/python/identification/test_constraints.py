@@ -9,13 +9,14 @@ import pytest
 
 from palpate import InputError
 from palpate._core.model import wavelet_columns, wavelet_slope_columns
-from palpate.identification import IdentifiedNetwork, IdentifyOptions, fit_environment
-from palpate.identification.compression import Compressor
-from palpate.identification.constraints import domain_bounds, impose, violated_positions
-from palpate.identification.separable import Basis, SeparableProblem, Solution, problem_of
+from palpate.identification import FittedNetwork, IdentifyOptions, fit_environment
+from palpate.identification.data.compression import Compressor
+from palpate.identification.network.basis import Basis
+from palpate.identification.network.constraints import domain_bounds, impose, violated_positions
+from palpate.identification.network.separable import SeparableProblem, Solution, problem_of
 
 
-def g_and_h(network: IdentifiedNetwork, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def g_and_h(network: FittedNetwork, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     wavelets = wavelet_columns(x, network.alpha, network.beta)
     g = wavelets @ network.weight + network.linear[0] * x + network.bias
     if network.weight_hysteresis is None:

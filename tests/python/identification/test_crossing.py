@@ -30,7 +30,7 @@ def pressed_onto_a_wall(late_s: float, seed: int = 0) -> Recording:
 def told(recording: Recording) -> list[str]:
     assert recording.direction is not None
     network = fit_environment(recording.position[:, None], recording.force, recording.direction.astype(float))
-    assert network.rung == "hysteresis"
+    assert network.model_class == "hysteresis"
     return [note for note in network.notes if "release lies above press" in note]
 
 

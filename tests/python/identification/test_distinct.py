@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from palpate.identification.distinct import distinct_rows
+from palpate.identification.data.limits import distinct_rows
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 5])

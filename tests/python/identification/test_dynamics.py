@@ -104,7 +104,7 @@ def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None
     assert (model.kind, model.inputs) == ("position_velocity", ("position", "velocity"))
     assert (model.fit.rung, model.damping) == ("velocity", None)
     assert verify(model, contact(2)).rmse < 0.004
-    assert any(note.startswith("velocity taken as an input") for note in model.notes["identification"])
+    assert any(note.startswith("velocity accepted as an input") for note in model.notes["identification"])
 
 
 def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
@@ -129,7 +129,7 @@ def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input
     assert result.n < len(held)
     assert any("give --negate force" in reason for reason in model.verdict.reasons)
     assert any(
-        note.startswith("velocity taken as an input: a network over position and velocity lowers")
+        note.startswith("velocity accepted as an input: a network over position and velocity lowers")
         for note in model.notes["identification"]
     )
 

@@ -8,7 +8,7 @@ import pytest
 
 import palpate
 from imperfect import NOISE, TRAVEL, Array, Law, line, noise, recorded, strokes, sweep, true_nrmse, wall
-from palpate.identification.limits import (
+from palpate.identification.data.limits import (
     NO_LIMITS,
     RowLimits,
     correlation,

@@ -9,7 +9,7 @@ import pytest
 
 import palpate
 from imperfect import Array, noise, recorded, strokes, sweep, wall
-from palpate.identification.explained import explained_findings, likely_cause, unexplained_variance
+from palpate.identification.classes.findings import explained_findings, likely_cause, unexplained_variance
 
 DATA = Path(os.environ.get("PALPATE_DATA", "../shared/data"))
 N = 4000

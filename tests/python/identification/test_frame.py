@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from palpate import InputError, frame_bounds
-from palpate.identification.frame import truncated_frame
+from palpate.identification.network.basis import truncated_frame
 
 # Unit-norm Mexican hat, a0 = 2: b0 -> (A, B) for 1, 2 and 4 voices; the frame table of section 2 of the
 # mathematics that the product follows (Daubechies 1990, table of the Mexican hat).

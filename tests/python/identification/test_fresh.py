@@ -9,9 +9,9 @@ import pytest
 from palpate import identify
 from palpate._core.model import wavelet_columns
 from palpate.identification import IdentifyOptions, fit_environment
-from palpate.identification.evidence import Evidence
-from palpate.identification.fresh import BLOCKS, FreshRows, gain, inside, kept_back
-from palpate.identification.stopping import choice, enough, standard_error
+from palpate.identification.data.held_out import BLOCKS, HeldOutRows, gain, held_out_rows, inside
+from palpate.identification.search.criteria import choice, enough, standard_error
+from palpate.identification.search.evidence import Samples
 from palpate.recording import sample_recording
 
 
@@ -38,7 +38,7 @@ def test_the_perceptual_rule_takes_the_first_network_that_is_not_told_apart() ->
 
 
 def test_a_difference_is_felt_above_seven_percent_or_one_percent_of_the_largest() -> None:
-    rows = FreshRows(np.zeros((3, 1)), np.array([0.0, 1.0, 10.0]), None)
+    rows = HeldOutRows(np.zeros((3, 1)), np.array([0.0, 1.0, 10.0]), None)
     np.testing.assert_allclose(rows.felt(np.array([0.1, 0.1, 0.7])), [1.0, 1.0, 1.0])
 
 
@@ -50,12 +50,12 @@ def test_rules_on_fresh_rows_stop_earlier_and_say_so(criterion: str) -> None:
     assert network.stop_reason == criterion
     assert 1 <= len(network.weight) <= len(plain.weight)
     assert np.ptp([point.criterion for point in network.path]) > 0.0
-    fitted = [point for point in network.path if point.rung == "position"]
+    fitted = [point for point in network.path if point.model_class == "position"]
     assert fitted[-1].n_wavelets <= max(point.n_wavelets for point in fitted)
 
 
 def test_fresh_stretches_of_a_motion_are_not_scattered_rows() -> None:
-    scattered, stretches = kept_back(10_000, None), kept_back(10_000, (0,))
+    scattered, stretches = held_out_rows(10_000, None), held_out_rows(10_000, (0,))
     assert scattered.mean() == pytest.approx(0.2)
     assert stretches.mean() == pytest.approx(0.2)
     assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * BLOCKS / 5
@@ -92,7 +92,7 @@ def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
     """One stretch that is held back goes on into a wall, where no fitted row is."""
     n = 2000
     x = 0.5 - 0.5 * np.cos(20.0 * np.pi * np.arange(n) / n)
-    fresh = np.flatnonzero(kept_back(n, (0,)))
+    fresh = np.flatnonzero(held_out_rows(n, (0,)))
     stretches = np.split(fresh, np.flatnonzero(np.diff(fresh) > 1) + 1)
     into_wall = stretches[len(stretches) // 2]
     push = np.sin(np.pi * np.arange(len(into_wall)) / len(into_wall)) ** 2
@@ -100,20 +100,20 @@ def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
     force = 0.1 * np.sin(9.0 * x) + 0.3 * x + 20.0 * np.maximum(x - 1.0, 0.0)
     force += np.random.default_rng(0).normal(0.0, 0.002, n)
     network = fit_environment(x[:, None], force, None, IdentifyOptions(inputs="position"), starts=[0])
-    assert network.rung == "position"
+    assert network.model_class == "position"
     assert network.nrmse < 0.02
 
 
 def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def gains(_: Evidence, below: object, above: Any) -> tuple[float, float]:
+    def gains(_: Samples, below: object, above: Any) -> tuple[float, float]:
         return (1.0, 0.0) if len(above.solution.basis) <= 3 else (-1.0, 0.1)
 
-    monkeypatch.setattr(Evidence, "_fresh_gain", gains)
+    monkeypatch.setattr(Samples, "held_out_gain", gains)
     x, _, y = wall(2000, 3)
     network = fit_environment(x[:, None], y)
-    assert (network.rung, network.stop_reason) == ("position", "held-back rows")
+    assert (network.model_class, network.stop_reason) == ("position", "held-out rows")
     assert 1 <= len(network.weight) <= 3
     assert sum(note.startswith("position refused: bic falls by") for note in network.notes) >= 1
 
@@ -121,9 +121,10 @@ def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
 def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:
     notes = identify(sample_recording(1, duration_s=20.0)).notes["identification"]
     assert any(
-        note.startswith("linear taken: bic falls by ") and "fresh rows falls by" in note for note in notes
+        note.startswith("linear accepted: bic falls by ") and "held-out rows falls by" in note
+        for note in notes
     )
-    assert any(note.startswith("position taken: bic falls by ") for note in notes)
+    assert any(note.startswith("position accepted: bic falls by ") for note in notes)
 
 
 @pytest.mark.parametrize("selection", ["orthogonal", "residual", "backward"])

@@ -2,19 +2,20 @@
 """Growth ends with finer wavelets where there is no noise, or with wide ones alone, and only there."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D
-from palpate.identification import IdentifyOptions, growth
-from palpate.identification.compression import Compressor
-from palpate.identification.frame import resolved_frame
-from palpate.identification.growth import SMOOTH, WITHOUT_NOISE, WORTH_FINER, Grown, grow
-from palpate.identification.refinement import COARSEST
-from palpate.identification.selection import Library
-from palpate.identification.separable import CORE, RESOLVED, Basis, SeparableProblem, problem_of
+from palpate.identification import IdentifyOptions
+from palpate.identification.data.compression import Compressor
+from palpate.identification.data.limits import RESOLVED
+from palpate.identification.network.basis import Basis
+from palpate.identification.network.refinement import COARSEST
+from palpate.identification.network.separable import CORE, SeparableProblem, problem_of
+from palpate.identification.search.growth import SMOOTH, WITHOUT_NOISE, WORTH_FINER, Grown, Growth
 
 OPTIONS = IdentifyOptions()
 
@@ -28,15 +29,14 @@ def kinked(noise: float, seed: int = 0) -> SeparableProblem:
 
 
 def grown(problem: SeparableProblem) -> Grown:
-    library = Library(problem, resolved_frame(problem, OPTIONS))
-    return grow(problem, library, Basis.empty(problem.dimension), "position", OPTIONS)
+    return Growth(OPTIONS).grow(problem, Basis.empty(problem.dimension), "position")
 
 
 def test_without_noise_wavelets_become_as_fine_as_a_kink_needs() -> None:
     problem = kinked(0.0)
     coarse = problem.finest(np.array([[0.25]]))[0, 0]
     found = grown(problem)
-    assert problem.resolved_by == WITHOUT_NOISE
+    assert found.problem.resolved_by == WITHOUT_NOISE
     assert found.solution.basis.alpha.max() > 1.05 * coarse
     assert problem.rmse(found.solution) < 1e-3
 
@@ -45,7 +45,7 @@ def test_without_noise_wavelets_become_as_fine_as_a_kink_needs() -> None:
 def test_noise_is_not_taken_for_structure(noise: float) -> None:
     problem = kinked(noise)
     found = grown(problem)
-    assert problem.resolved_by == OPTIONS.resolved_by
+    assert found.problem.resolved_by == OPTIONS.resolved_by
     assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
 
 
@@ -79,11 +79,11 @@ def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: py
     problem = over_two_inputs(smooth, 200)
     found = grown(problem)
     assert problem.rmse(found.solution) <= WORTH_FINER * RESOLVED * problem.force_range
-    assert problem.resolved_by == OPTIONS.resolved_by
-    problem.resolved_by = int(SMOOTH * 200)
+    assert found.problem.resolved_by == OPTIONS.resolved_by
+    problem = replace(problem, resolved_by=int(SMOOTH * 200))
     widest = problem.finest(found.solution.basis.beta)
     assert np.all(found.solution.basis.alpha <= np.maximum(widest, COARSEST) * (1.0 + 1e-9))
-    monkeypatch.setattr(growth, "_smooth", lambda *_: None)
+    monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
     narrow = grown(over_two_inputs(smooth, 200))
     ours, theirs = (np.linalg.norm(errors_between_rows(each, smooth)) for each in (found, narrow))
     assert ours < 0.5 * theirs
@@ -92,11 +92,11 @@ def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: py
 def test_what_is_not_smooth_is_grown_as_if_wide_wavelets_had_not_been_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tried, wide = [], growth._smooth
-    monkeypatch.setattr(growth, "_smooth", lambda *given: tried.append(wide(*given)))
+    tried, wide = [], Growth._smooth
+    monkeypatch.setattr(Growth, "_smooth", lambda *given: tried.append(wide(*given)))
     found = grown(over_two_inputs(creased, 120))
     assert tried == [None]
-    monkeypatch.setattr(growth, "_smooth", lambda *_: None)
+    monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
     without = grown(over_two_inputs(creased, 120))
     assert np.array_equal(found.solution.coefficients, without.solution.coefficients)
 
@@ -105,7 +105,7 @@ def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.Mo
     def tried(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(growth, "_smooth", tried)
+    monkeypatch.setattr(Growth, "_smooth", tried)
     assert len(grown(over_two_inputs(smooth, 200, noise=0.02)).solution.basis) > 0
 
 
@@ -121,7 +121,7 @@ def detents(noise: float, seed: int = 0) -> SeparableProblem:
 def test_where_neighbours_agree_about_what_is_left_wavelets_become_finer() -> None:
     problem = detents(0.1)
     found = grown(problem)
-    assert problem.resolved_by == WITHOUT_NOISE
+    assert found.problem.resolved_by == WITHOUT_NOISE
     assert len(found.solution.basis) == 20
     assert problem.rmse(found.solution) < 0.11
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from palpate import InputError, identify, verify
-from palpate.identification.hysteresis_input import HysteresisInput
+from palpate.identification.data.strokes import HysteresisInput
 from palpate.recording import Recording
 from palpate.verification import compare
 

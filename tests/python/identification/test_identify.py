@@ -110,7 +110,7 @@ def test_control_c_leaves_identify_at_once(monkeypatch: pytest.MonkeyPatch) -> N
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("palpate.identification.growth.refine", interrupted)
+    monkeypatch.setattr("palpate.identification.search.growth.refine", interrupted)
     with pytest.raises(KeyboardInterrupt):
         identify(sample_recording(1, duration_s=2.0))
 

@@ -57,7 +57,7 @@ def test_an_input_without_influence_earns_no_wavelet() -> None:
     random = np.random.default_rng(2)
     X = random.uniform(0.0, 1.0, (2000, 3))
     network = fit_environment(X, 3.0 * X[:, 0] - X[:, 1] + random.normal(0.0, 0.1, len(X)))
-    assert (network.rung, len(network.weight), network.n_parameters) == ("linear", 0, 4)
+    assert (network.model_class, len(network.weight), network.n_parameters) == ("linear", 0, 4)
 
 
 def test_six_inputs_and_many_rows_need_no_grid() -> None:

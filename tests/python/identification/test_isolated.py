@@ -7,8 +7,8 @@ import pytest
 
 import palpate
 from imperfect import TRAVEL, Array, noise, recorded, strokes, sweep, true_nrmse, wall
+from palpate.identification.data.outliers import without_isolated
 from palpate.identification.identify_files import identify_files
-from palpate.identification.isolated import without_isolated
 
 N = 10_000
 

@@ -9,8 +9,8 @@ import pytest
 from palpate import InputError
 from palpate._core.model import wavelet_columns
 from palpate.identification import IdentifyOptions, fit_environment
-from palpate.identification.evidence import Evidence
-from palpate.identification.identified import IdentifiedNetwork
+from palpate.identification.network.fitted import FittedNetwork
+from palpate.identification.search.evidence import Samples
 
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) > 1
 DRAWS = 100 if LONG else 40
@@ -43,20 +43,20 @@ def test_a_linear_spring_with_noise_needs_no_wavelet(n: int, encoder_step: float
 def test_noise_about_a_level_is_a_constant() -> None:
     random = np.random.default_rng(2)
     network = fit_environment(sweep(500, 3)[:, None], 0.7 + random.normal(0.0, 0.1, 500))
-    assert (network.rung, network.n_parameters, len(network.weight)) == ("constant", 1, 0)
+    assert (network.model_class, network.n_parameters, len(network.weight)) == ("constant", 1, 0)
     assert network.linear[0] == 0.0
     assert network.bias == pytest.approx(0.7, abs=0.02)
 
 
 def test_a_force_that_never_changes_is_a_constant() -> None:
     network = fit_environment(np.linspace(0.0, 1.0, 50)[:, None], np.full(50, 2.5))
-    assert (network.rung, network.bias, network.nrmse) == ("constant", 2.5, 0.0)
+    assert (network.model_class, network.bias, network.nrmse) == ("constant", 2.5, 0.0)
 
 
 def test_exactly_linear_data_are_linear() -> None:
     x = np.linspace(-1.0, 2.0, 50)
     network = fit_environment(x[:, None], 4.0 * x - 1.0)
-    assert (network.rung, len(network.weight), network.n_parameters) == ("linear", 0, 2)
+    assert (network.model_class, len(network.weight), network.n_parameters) == ("linear", 0, 2)
     assert (network.linear[0], network.bias) == (pytest.approx(4.0), pytest.approx(-1.0))
 
 
@@ -66,7 +66,7 @@ def test_data_without_noise_stop_growth_where_a_sensor_would_see_no_difference(e
     x = sweep(3000, 6, encoder_step)
     force = 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
     network = fit_environment(x[:, None], force, starts=[0])
-    assert network.rung == "position"
+    assert network.model_class == "position"
     assert len(network.weight) <= 12
     assert network.rmse <= 2.0**-16 * np.ptp(force)
 
@@ -76,7 +76,7 @@ def test_friction_between_strokes_earns_hysteresis_without_a_wavelet() -> None:
     x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
     side = np.repeat([1.0, -1.0], 200)
     network = fit_environment(x[:, None], 2.0 * x + 0.3 * side + random.normal(0.0, 0.02, 400), side)
-    assert (network.rung, len(network.weight), network.n_parameters) == ("hysteresis", 0, 4)
+    assert (network.model_class, len(network.weight), network.n_parameters) == ("hysteresis", 0, 4)
     assert network.bias_hysteresis == pytest.approx(0.3, abs=0.01)
     assert network.play_radius is None
 
@@ -88,7 +88,7 @@ def test_strokes_that_agree_do_not_earn_hysteresis_and_the_notes_say_by_how_much
         x = np.concatenate([np.linspace(0.0, 1.0, 150), np.linspace(1.0, 0.0, 150)])
         y = x + 0.3 * np.exp(-(((x - 0.5) / 0.1) ** 2)) + random.normal(0.0, 0.02, 300)
         network = fit_environment(x[:, None], y, np.repeat([1.0, -1.0], 150))
-        surprises += network.rung != "position"
+        surprises += network.model_class != "position"
         assert any(note.startswith("hysteresis refused: bic ") for note in network.notes) or surprises
     assert surprises <= ALLOWED_SURPRISES
 
@@ -100,7 +100,7 @@ def test_rows_without_a_direction_are_left_out_and_counted() -> None:
     y = 2.0 * x + 0.3 * side + random.normal(0.0, 0.02, len(x))
     y[side == 0] = 50.0
     network = fit_environment(x[:, None], y, side)
-    assert network.rung == "hysteresis"
+    assert network.model_class == "hysteresis"
     assert network.rmse < 0.03
     assert "30 rows without a direction were left out to judge hysteresis" in network.notes
 
@@ -110,7 +110,7 @@ def test_rows_without_a_direction_come_back_when_hysteresis_is_refused() -> None
     x = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 1.5, 60), np.linspace(1, 0, 200)])
     side = np.repeat([1.0, 0.0, -1.0], [200, 60, 200])
     network = fit_environment(x[:, None], 2.0 * x + random.normal(0.0, 0.02, len(x)), side)
-    assert network.rung == "linear"
+    assert network.model_class == "linear"
     assert network.upper[0] == 1.5
     assert any("hysteresis refused" in note for note in network.notes)
 
@@ -147,11 +147,11 @@ def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> Non
 def test_a_gain_on_fresh_rows_below_its_standard_error_earns_nothing(
     gain: float, rung: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Evidence, "_fresh_gain", lambda *rungs: (gain, 0.02))
+    monkeypatch.setattr(Samples, "held_out_gain", lambda *rungs: (gain, 0.02))
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    assert network.rung == rung
+    assert network.model_class == rung
     verdict = "taken" if rung == "position" else "refused"
     assert all(note.split()[1] == f"{verdict}:" for note in network.notes)
     assert all(note.endswith(f"falls by {100 * gain:g} +- 2 %") for note in network.notes)
@@ -169,7 +169,7 @@ def test_play_radius_is_found_from_the_motion_when_no_direction_is_given() -> No
         play[k] = min(x[k] + radius, max(x[k] - radius, play[k - 1]))
     y = 2.0 * x + 0.3 * np.clip((x - play) / radius, -1.0, 1.0) + random.normal(0.0, 0.01, len(x))
     network = fit_environment(x[:, None], y, starts=[0])
-    assert network.rung == "hysteresis"
+    assert network.model_class == "hysteresis"
     assert network.play_radius == pytest.approx(0.01, rel=0.01)
     assert network.n_parameters == 4 * len(network.weight) + 5
     assert network.rmse == pytest.approx(0.01, rel=0.1)
@@ -190,9 +190,9 @@ def test_every_network_on_the_way_stands_in_the_path() -> None:
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    rungs = [point.rung for point in network.path]
+    rungs = [point.model_class for point in network.path]
     assert rungs[:2] == ["constant", "linear"]
-    sizes = [point.n_wavelets for point in network.path if point.rung == "position"]
+    sizes = [point.n_wavelets for point in network.path if point.model_class == "position"]
     assert sizes[:-1] == list(range(len(sizes) - 1))
     assert sizes[-1] == len(network.weight)
     assert network.path[-1].rmse == pytest.approx(network.rmse)
@@ -251,7 +251,7 @@ def test_named_inputs_decide_the_rung() -> None:
     y = x + random.normal(0.0, 0.02, 200)
     named = fit_environment(x[:, None], y, side, IdentifyOptions(inputs="position, hysteresis"))
     plain = fit_environment(x[:, None], y + side, side, IdentifyOptions(inputs=("position",)))
-    assert named.rung == "hysteresis"
+    assert named.model_class == "hysteresis"
     assert plain.weight_hysteresis is None
 
 
@@ -282,7 +282,7 @@ def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() ->
     force = 2.0 * x + np.random.default_rng(5).normal(0.0, 1e-3, len(x))
     starts = [0, *range(70, len(x), 3)]
     network = fit_environment(x[:, None], force, starts=starts)
-    assert network.rung == "linear"
+    assert network.model_class == "linear"
     assert any(note.startswith("hysteresis was not tried: the motions") for note in network.notes)
     with pytest.raises(InputError, match="inputs names hysteresis, but the motions"):
         fit_environment(
@@ -295,7 +295,7 @@ def test_a_motion_that_never_turns_back_leaves_hysteresis_untried_and_says_so() 
     x = np.linspace(0.0, 1.0, 3000)
     force = 1e-4 / (x + 0.08) ** 4 + np.random.default_rng(7).normal(0.0, 0.005, len(x))
     network = fit_environment(x[:, None], force, starts=[0])
-    assert network.rung == "position"
+    assert network.model_class == "position"
     assert any("never turn back" in note for note in network.notes)
     with pytest.raises(InputError, match=r"inputs names hysteresis, but .*never turn back"):
         fit_environment(
@@ -312,7 +312,7 @@ def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.
     return x[:, None], 2.0 * x + side * np.concatenate([height, height[::-1]]) + noise, side
 
 
-def sign_findings(network: IdentifiedNetwork) -> list[str]:
+def sign_findings(network: FittedNetwork) -> list[str]:
     return [finding.sentence for finding in network.findings if "gains energy" in finding.sentence]
 
 

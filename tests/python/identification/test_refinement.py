@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from palpate.identification import IdentifyOptions
-from palpate.identification.compression import Compressor
-from palpate.identification.frame import truncated_frame
-from palpate.identification.growth import grow, judge, prune
-from palpate.identification.quasi_newton import _gradient, refine_all
-from palpate.identification.refinement import COARSEST, REACH, refine
-from palpate.identification.selection import Library
-from palpate.identification.separable import Basis, SeparableProblem, problem_of
+from palpate.identification.data.compression import Compressor
+from palpate.identification.network.basis import Basis, truncated_frame
+from palpate.identification.network.refinement import COARSEST, REACH, _gradient, refine, refine_all
+from palpate.identification.network.separable import SeparableProblem, problem_of
+from palpate.identification.search.criteria import criterion_of
+from palpate.identification.search.growth import Growth
+from palpate.identification.search.selection import Library
 
 
 def hat(x: np.ndarray, alpha: float, beta: float) -> np.ndarray:
@@ -45,7 +45,7 @@ def any_basis(seed: int, n: int = 5) -> Basis:
 def test_descent_direction_is_the_gradient_of_the_eliminated_objective(kind: str) -> None:
     """d objective / d(log alpha, alpha beta) = -2 * direction, by central differences."""
     problem, basis = noisy_switch(1, kind), any_basis(2)
-    problem.set_prior(1.0)
+    problem = problem.with_prior(1.0)
     _, direction = problem.normal_equations(problem.solve(basis))
     n, step = len(basis), 1e-5
     for unknown in range(2 * n):
@@ -77,7 +77,7 @@ def test_refinement_is_never_worse_than_its_start_and_keeps_its_bounds(seed: int
 def test_quasi_newton_descends_along_the_gradient_of_all_parameters(kind: str) -> None:
     """By central differences, in one random direction of coefficients, log(alpha) and beta."""
     problem, basis = noisy_switch(1, kind), any_basis(2)
-    problem.set_prior(1.0)
+    problem = problem.with_prior(1.0)
     random, table = np.random.default_rng(3), problem.solve(basis).coefficients
     along = [random.normal(size=each.shape) for each in (table, basis.alpha, basis.beta)]
 
@@ -115,8 +115,8 @@ def test_one_of_two_coincident_wavelets_is_removed_at_no_cost() -> None:
     y = x + hat(x, 9.0, 0.5) + np.random.default_rng(0).normal(0.0, 0.01, len(x))
     problem = problem_from(x, y)
     doubled = problem.solve(Basis(np.full((2, 1), 9.0), np.full((2, 1), 0.5)))
-    problem.set_prior(doubled.rss)
-    pruned = prune(problem, problem.solve(doubled.basis), IdentifyOptions())
+    problem = problem.with_prior(doubled.rss)
+    _, pruned = Growth(IdentifyOptions()).prune(problem, problem.solve(doubled.basis))
     assert len(pruned.basis) == 1
     assert pruned.rss <= doubled.rss * (1 + 1e-6)
 
@@ -130,10 +130,10 @@ def test_growth_settles_on_the_number_of_wavelets_that_made_the_force() -> None:
         x[:, None], coarsest=1.0, finest=200.0, frame_scale=2.0, frame_step=0.5, max_candidates=4096
     )
     options = IdentifyOptions()
-    grown = grow(problem, Library(problem, frame), Basis.empty(1), "position", options)
+    grown = Growth(options).grow(problem, Basis.empty(1), "position", library=Library(problem, frame))
     assert len(grown.solution.basis) == 2
     assert grown.stop_reason == "bic"
-    assert grown.criterion == judge(problem, grown.solution, options)
+    assert grown.criterion == criterion_of(problem, grown.solution, options.criterion)
     assert sorted(grown.solution.basis.beta[:, 0]) == pytest.approx([0.3, 0.7], abs=2e-3)
 
 
@@ -144,6 +144,6 @@ def test_growth_says_that_the_largest_network_stopped_it() -> None:
         x[:, None], coarsest=1.0, finest=64.0, frame_scale=2.0, frame_step=0.5, max_candidates=4096
     )
     options = IdentifyOptions(max_wavelets=3)
-    grown = grow(problem, Library(problem, frame), Basis.empty(1), "position", options)
+    grown = Growth(options).grow(problem, Basis.empty(1), "position", library=Library(problem, frame))
     assert (len(grown.solution.basis), grown.stop_reason) == (3, "max_wavelets")
     assert [point.n_wavelets for point in grown.path] == [0, 1, 2, 3, 3]

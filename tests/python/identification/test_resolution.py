@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from palpate.identification.resolution import Resolution
+from palpate.identification.network.basis import Resolution
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])

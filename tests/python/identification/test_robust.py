@@ -6,7 +6,7 @@ import pytest
 
 import palpate
 from imperfect import Array, noise, recorded, strokes, sweep, true_nrmse, wall
-from palpate.identification.robust import suspects
+from palpate.identification.data.outliers import suspects
 
 N = 4000
 

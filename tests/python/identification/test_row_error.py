@@ -9,7 +9,7 @@ import pytest
 import palpate
 from imperfect import Array, line, noise, recorded, strokes, sweep, wall
 from palpate import WaveletNetworkRegressor
-from palpate.identification.row_error import RowError, disagreement
+from palpate.identification.classes.findings import RowError, disagreement
 
 N = 4000
 X = strokes(N)

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from palpate._core.model import wavelet_columns
-from palpate.identification.compression import Compressed, Compressor
-from palpate.identification.frame import truncated_frame
-from palpate.identification.selection import (
+from palpate.identification.data.compression import Compressed, Compressor
+from palpate.identification.network.basis import Basis, truncated_frame
+from palpate.identification.network.separable import SeparableProblem, problem_of
+from palpate.identification.search.criteria import CRITERIA, ON_HELD_OUT_ROWS, deviance
+from palpate.identification.search.selection import (
     STRETCHES,
     UNLIKE,
     Library,
@@ -17,8 +19,6 @@ from palpate.identification.selection import (
     orthogonal_gains,
     select_forward,
 )
-from palpate.identification.separable import Basis, SeparableProblem, problem_of
-from palpate.identification.stopping import CRITERIA, ON_FRESH_ROWS, deviance
 
 SIDES = {"one force": None, "two strokes": 1.0, "play": 0.7}
 
@@ -125,7 +125,7 @@ def test_wavelets_that_are_tried_beside_each_other_are_unlike() -> None:
         assert max(apart, abs(np.log(alpha[0] / alpha[1]))) > UNLIKE
 
 
-@pytest.mark.parametrize("criterion", sorted(set(CRITERIA) - set(ON_FRESH_ROWS)))
+@pytest.mark.parametrize("criterion", sorted(set(CRITERIA) - set(ON_HELD_OUT_ROWS)))
 def test_every_criterion_charges_for_parameters_and_rewards_a_smaller_error(criterion: str) -> None:
     assert deviance(criterion, 1.0, 100, 5) < deviance(criterion, 1.0, 100, 6)
     assert deviance(criterion, 0.9, 100, 5) < deviance(criterion, 1.0, 100, 5)

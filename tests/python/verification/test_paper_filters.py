@@ -7,7 +7,7 @@ import pytest
 from palpate import InputError, Recording, identify
 from palpate._core.dynamics import environment_filters
 from palpate.identification import IdentifyOptions
-from palpate.identification.paper import paper_target
+from palpate.identification.data.rows import paper_target
 from palpate.recording import sample_force, sample_recording
 
 

@@ -99,13 +99,12 @@ struct SchemeChoices {
     }
 };
 
-/// Returns the default play radius of a model that leaves it to the rendering, else 0: 1 % of the travel, but at least
-/// four encoder steps, so that the hand switches it and not the encoder's noise.
+/// Returns the default play radius of a model that leaves it to the rendering, else 0.
 [[nodiscard]] inline double default_play_radius(const ForceModel& model, double encoder_step) noexcept {
     if (model.hysteresis() == nullptr || model.play_radius()) {
         return 0.0;
     }
-    return std::max(4.0 * encoder_step, 0.01 * (model.domain().upper[0] - model.domain().lower[0]));
+    return usual_play_radius(model.domain().upper[0] - model.domain().lower[0], encoder_step);
 }
 
 /// Returns the scheme with the chosen fields, and the default ones at the model's scale elsewhere.

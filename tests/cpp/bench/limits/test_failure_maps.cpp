@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -154,6 +155,15 @@ TEST(FailureMaps, PrintNullForWhatTheoryDoesNotGive) {
     EXPECT_EQ(printed["lines"][0]["at"], (nlohmann::ordered_json{1.0, 1e5}));
     EXPECT_TRUE(printed["lines"][0]["theory"][0].is_number());
     EXPECT_EQ(printed["lines"][1]["theory"], (nlohmann::ordered_json{nullptr, nullptr}));
+}
+
+TEST(FailureMaps, ArePublishedInTheirOrder) {
+    std::ifstream file{PALPATE_SOURCE_DIR "/docs/figures/failure-maps.json"};
+    const nlohmann::ordered_json published = nlohmann::ordered_json::parse(file);
+    ASSERT_EQ(published["maps"].size(), failure_maps.size());
+    for (std::size_t k = 0; k < failure_maps.size(); ++k) {
+        EXPECT_EQ(published["maps"][k]["name"], failure_maps[k].name);
+    }
 }
 
 TEST(Guards, CostNextToNothingAndDoWhatTheyAreThereFor) {

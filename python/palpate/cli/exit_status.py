@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exit status of every verb, and the one sentence that goes with a failure."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import threading
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+import click
+
+from ..verdict import Verdict
+from .printing import OutputError, echo, end_line_on_terminal, print_line
+
+FAILED = 1
+"""The work failed, or the verdict is no."""
+BAD_INPUT = 2
+"""Bad usage or bad input."""
+INTERRUPTED = 130
+"""Ctrl-C; the output does not exist."""
+
+
+_GRACE_S = 0.05
+"""Seconds that Python gets to raise KeyboardInterrupt by itself."""
+
+
+class WorkError(Exception):
+    """The input was right, and the work still did not come to a result: one sentence."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """An exit code, and the sentence that goes with it: empty where nobody needs or is there to be told."""
+
+    code: int
+    sentence: str = ""
+    help: str = ""
+
+    def tell(self, *, as_json: bool) -> None:
+        """Print the sentence: as one object on standard output with --json, else on standard error.
+
+        A stream that cannot be written leaves the exit code alone.
+        """
+        if as_json and self.sentence:
+            with suppress(OutputError, BrokenPipeError):
+                echo(json.dumps({"error": self.sentence}))
+                return
+        if self.help:
+            echo(self.help, err=True)
+        elif self.sentence:
+            print_line(f"error: {self.sentence}", err=True)
+
+
+@contextmanager
+def terminated_as_interrupted() -> Iterator[None]:
+    """A request to terminate ends what runs here as Ctrl-C does."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def interrupted_at_once() -> Iterator[None]:
+    """End the process soon after Ctrl-C, also while a library computes.
+
+    Python raises KeyboardInterrupt between two of its own instructions, but one matrix or one file can take
+    seconds. If it was not raised soon, a thread ends the process. Results must be written inside `finishing`,
+    where Ctrl-C is ignored.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    context = click.get_current_context(silent=True)
+    as_json = context is not None and bool(context.params.get("as_json"))
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    over = threading.Event()
+
+    def watch() -> None:
+        while (number := os.read(reader, 1)) != b"\0":
+            if number[0] == signal.SIGINT and not over.wait(_GRACE_S):
+                for worker in multiprocessing.active_children():
+                    worker.terminate()
+                end_line_on_terminal()
+                ending = ending_of(KeyboardInterrupt())
+                ending.tell(as_json=as_json)
+                os._exit(ending.code)
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        over.set()
+        signal.set_wakeup_fd(before)
+        os.write(writer, b"\0")
+        watching.join()
+        os.close(reader)
+        os.close(writer)
+
+
+def ending_of(error: BaseException) -> Ending:
+    """The ending that belongs to an exception which left a verb."""
+    if isinstance(error, click.exceptions.Exit):
+        return Ending(error.exit_code)
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        return Ending(BAD_INPUT, help=error.format_message())
+    if isinstance(error, click.ClickException):
+        return Ending(BAD_INPUT, _usage_sentence(error))
+    if isinstance(error, (KeyboardInterrupt, click.Abort)):
+        return Ending(INTERRUPTED, "interrupted; nothing was written")
+    if isinstance(error, BrokenPipeError):
+        return Ending(FAILED)
+    if isinstance(error, ValueError):
+        return Ending(BAD_INPUT, _one_line(str(error)))
+    if isinstance(error, (WorkError, OutputError)):
+        return Ending(FAILED, _one_line(str(error)))
+    if isinstance(error, MemoryError):
+        return Ending(FAILED, "there is not enough memory for this recording")
+    if isinstance(error, OSError):
+        where = f" {error.filename}" if error.filename else ""
+        return Ending(FAILED, f"the operating system refuses{where}: {error.strerror or error}")
+    if isinstance(error, Exception):
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        what = f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}, line {place.lineno})"
+        return Ending(FAILED, _one_line(f"this is a defect of palpate, please report it: {what}"))
+    raise error
+
+
+def _usage_sentence(error: click.ClickException) -> str:
+    sentence = _one_line(error.format_message()).rstrip(".")
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    return f"{sentence} (see {context.command_path} --help)" if context else sentence
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def end_with(verdict: Verdict) -> None:
+    """End the verb with the exit code of its verdict.
+
+    Raises
+    ------
+    click.exceptions.Exit
+        The verdict is no: exit code 1.
+    """
+    if verdict.level == "no":
+        raise click.exceptions.Exit(FAILED)
+
+
+@contextmanager
+def finishing() -> Iterator[None]:
+    """While results are written and printed Ctrl-C is ignored: it comes before all of them, or too late."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

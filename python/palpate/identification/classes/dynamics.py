@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Velocity, mass and damping: F = m a + B v + f(x), linear in m and B once the wavelets are given.
+
+f is found from raw positions and forces. For m and B every column is filtered by one zero-phase low-pass L:
+L F is regressed on L a, L v, L 1, L x and L psi_i(x) (with hysteresis on L s, L s x, L s psi_i(x) too), which
+is exact for any f; L f(x) is not f(L x). Three time constants of L are left out at both ends of a piece.
+Samples behind L are no longer independent: they count for as many as their autocorrelation leaves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._core.model import wavelet_columns
+from ..._typing import Float1D, Float2D
+from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
+from ..data.limits import RESOLVED
+from ..data.rows import modulo
+from ..network.basis import Basis
+from ..network.separable import TINY, solve_gram
+from ..options import IdentifyOptions
+from ..search.criteria import CRITERIA, ON_HELD_OUT_ROWS
+
+FOLDS = 10
+"""Stretches of the recording that are fresh in turn."""
+
+NAMES = ("damping", "mass")
+"""What multiplies the columns v and a."""
+
+
+class FoldedRegression:
+    """Least squares of a filtered force on filtered columns, any choice of them, fold by fold.
+
+    No mean squared error below `least` counts: no sensor sees it.
+    """
+
+    def __init__(
+        self, table: Float2D, folds: Float1D, independent: float, two_sided: bool, least: float
+    ) -> None:
+        self._independent, self._least = independent, least
+        self._grams = np.array([table[folds == fold].T @ table[folds == fold] for fold in range(FOLDS)])
+        self._rows = np.bincount(folds.astype(np.int64), minlength=FOLDS)
+        n_static = table.shape[1] - 3
+        self._single = n_static // 2 if two_sided else n_static
+        self._n_static = n_static
+
+    def value(self, two_sided: bool, names: Sequence[str], criterion: str) -> float:
+        """Criterion of the regression on these columns."""
+        columns = self._columns(two_sided, names)
+        gram = self._grams.sum(axis=0)
+        rss = _rss(gram, columns, self._solution(gram, columns))
+        share = max(rss / self._rows.sum(), self._least, TINY)
+        p = min(len(columns), int(self._independent) - 2)
+        return self._independent * float(np.log(share)) + CRITERIA[criterion](self._independent, p)
+
+    def solved(self, two_sided: bool, names: Sequence[str]) -> list[float]:
+        """The coefficients of these names."""
+        columns = self._columns(two_sided, names)
+        return [float(value) for value in self._solution(self._grams.sum(axis=0), columns)[: len(names)]]
+
+    def fresh_gain(
+        self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
+    ) -> tuple[float, float]:
+        """Fall of the squared error in folds that were left out of the fit, as a share, and its error."""
+        errors = np.array(
+            [
+                [self._left_out(fold, self._columns(two_sided, names)) for fold in range(FOLDS)]
+                for names in (without, with_it)
+            ]
+        )
+        before, after = errors.mean(axis=1)
+        scatter = errors[1] - after / before * errors[0]
+        return float(1.0 - after / before), float(scatter.std(ddof=1) / before / np.sqrt(FOLDS))
+
+    def _left_out(self, fold: int, columns: list[int]) -> float:
+        kept = self._grams.sum(axis=0) - self._grams[fold]
+        return _rss(self._grams[fold], columns, self._solution(kept, columns))
+
+    def _columns(self, two_sided: bool, names: Sequence[str]) -> list[int]:
+        """Columns of the table: target, v, a, then those of f (and of s)."""
+        static = self._n_static if two_sided else self._single
+        return [1 + NAMES.index(name) for name in names] + list(range(3, 3 + static))
+
+    @staticmethod
+    def _solution(gram: Float2D, columns: list[int]) -> Float1D:
+        return solve_gram(gram[np.ix_(columns, columns)], gram[columns, 0])
+
+
+def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
+    """Residual sum of squares of a solution on the rows of a Gram matrix whose column 0 is the target."""
+    quadratic = solution @ gram[np.ix_(columns, columns)] @ solution
+    return max(float(gram[0, 0] - 2.0 * solution @ gram[columns, 0] + quadratic), 0.0)
+
+
+PER_TIME_CONSTANT = 2.0
+"""Samples kept of a filtered column in each time constant of L."""
+
+LEAST_SAMPLES = 40.0
+"""Independent samples below which nothing is said about velocity or mass."""
+
+LEAST_SPREAD = 0.19
+"""Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
+v is hardly more than its sign, and damping no other than friction."""
+
+TOO_SHORT = "velocity and mass were not tried: the motion between gaps of time is too short, or too noisy"
+
+SLOW = 0.1
+"""Speed at which the smoothed sign of the velocity is tanh(1), as a share of the RMS speed."""
+
+MOST_ROWS = 20_000
+"""Rows that are enough to see what a residual depends on."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What was found beside the force over position."""
+
+    damping: float | None
+    mass: float | None
+    hysteresis: bool
+    """Whether the force over position needs hysteresis beside them"""
+    notes: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return len(self) > 0
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Which of NAMES there are."""
+        return tuple(name for name in NAMES if getattr(self, name) is not None)
+
+    @property
+    def name(self) -> str:
+        """The rung that they are."""
+        return "velocity" if self.mass is None else "mass and damping"
+
+
+NO_TERMS = Terms(None, None, False, ())
+"""A force that does not depend on the motion."""
+
+
+class Dynamics:
+    """The motion of a recording, ready to be asked what velocity and acceleration explain.
+
+    Parameters
+    ----------
+    parts : sequence of Piece
+        Pieces between gaps of time; their rows count over all recordings.
+    lower, reach : float
+        Corner and length of the box of positions.
+    n : int
+        Rows of all recordings.
+    periodic : bool
+        Positions are taken modulo reach.
+    """
+
+    def __init__(
+        self, parts: Sequence[Piece], lower: float, reach: float, n: int, *, periodic: bool = False
+    ) -> None:
+        low_pass = quiet_low_pass(parts, order=2) if parts else None
+        self._low_pass = low_pass or LowPass(1.0)
+        self._parts = [] if low_pass is None else long_enough(parts, low_pass)
+        self._lower, self._reach, self._n, self._periodic = lower, reach, n, periodic
+        self._step = max(1, int(1.0 / (PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
+        self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
+
+    def terms(
+        self,
+        basis: Basis,
+        side: Float1D | None,
+        options: IdentifyOptions,
+        *,
+        allowed: Sequence[str] = NAMES,
+        settled: bool = False,
+    ) -> Terms:
+        """Which of damping and mass earn their place beside f on these wavelets, and their values.
+
+        Parameters
+        ----------
+        basis : Basis
+            Wavelets in the unit box.
+        side : (n,), optional
+            Hysteresis input that f may need too.
+        options : IdentifyOptions
+        allowed : sequence of str
+            Terms that are considered.
+        settled : bool
+            The allowed terms, and hysteresis with a side, are in any case: only the values are asked for.
+        """
+        regression = self._regression(basis, side)
+        if regression is None:
+            return Terms(None, None, side is not None, (TOO_SHORT,))
+        notes = []
+        if not settled and "damping" in allowed and (spread := self._spread_of_speeds()) < LEAST_SPREAD:
+            notes.append(
+                f"velocity was not tried: along the way the speed differs by {100 * spread:.2g} %, and what "
+                "moves at one speed does not tell damping from hysteresis; move slowly and fast"
+            )
+            allowed = tuple(name for name in allowed if name != "damping")
+        choices = [
+            (use, names)
+            for use in ((False, True) if side is not None else (False,))
+            for size in range(len(allowed) + 1)
+            for names in combinations(allowed, size)
+        ]
+        if settled:
+            choices = [(side is not None, tuple(allowed))]
+        criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+        valued = {
+            (use, names): regression.value(use, names, criterion) + options.rung_evidence * (len(names) + use)
+            for use, names in choices
+        }
+        use, names = min(valued, key=lambda choice: valued[choice])
+        if settled:
+            return Terms(*_values(regression.solved(use, names), names), use, ())
+        for name in allowed:
+            with_it = tuple(other for other in allowed if other in names or other == name)
+            without = tuple(other for other in with_it if other != name)
+            falls = regression.value(use, without, criterion) - regression.value(use, with_it, criterion)
+            changes = (
+                f"{criterion} falls by {falls:.4g}" if falls > 0 else f"{criterion} rises by {-falls:.4g}"
+            )
+            if name not in names:
+                notes.append(f"{name} refused: {changes}")
+                continue
+            share, error = regression.fresh_gain(use, without, with_it)
+            found = dict(zip(with_it, regression.solved(use, with_it), strict=True))[name]
+            way = "falls" if share > 0.0 else "rises"
+            fresh = (
+                f"the squared error on fresh stretches {way} by {100 * abs(share):.3g} +- {100 * error:.2g} %"
+            )
+            if share > error and found > 0.0:
+                notes.append(f"{name} taken: {changes}, {fresh}")
+                continue
+            names = tuple(other for other in names if other != name)
+            notes.append(
+                f"{name} refused: {changes}, but {fresh if found > 0.0 else f'it would be {found:.4g}'}"
+            )
+        return Terms(*_values(regression.solved(use, names), names), use, tuple(notes))
+
+    def force_of(self, terms: Terms) -> tuple[Float1D, Float1D]:
+        """m L a + B L v at every row (n,), and 1 at the rows (n,) that have one, else 0."""
+        total, known = np.zeros(self._n), np.ones(self._n, dtype=bool)
+        for value, derive in (
+            (terms.damping, lambda part: part.velocity),
+            (terms.mass, lambda part: part.acceleration),
+        ):
+            if value is not None:
+                derived, here = at_rows(self._parts, self._low_pass, derive, self._n)
+                total, known = total + value * derived, known & here
+        return total, known.astype(float)
+
+    def velocity(self) -> tuple[Float1D, NDArray[np.bool_]]:
+        """L v at every row (n,), and the rows (n,) that have one."""
+        return at_rows(self._parts, self._low_pass, lambda part: part.velocity, self._n)
+
+    def left_to_velocity(
+        self, residual: Float1D, box: Float2D, basis: Basis, *, friction: bool = False
+    ) -> float:
+        """Share of a residual (n,) that functions of velocity and position explain.
+
+        These are v|v|, and v times 1, x and psi_i(x). With friction, the smoothed sign of v takes part as v
+        does. box (n, 1) are the positions, and the wavelets those of the force over position. The share is
+        corrected for the number of functions.
+        """
+        velocity, known = self.velocity()
+        rows = np.flatnonzero(known)[:: max(1, -(-int(known.sum()) // MOST_ROWS))]
+        v, r, x = velocity[rows, None], residual[rows], box[rows]
+        if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
+            return 0.0
+        over_x = np.concatenate([np.ones_like(x), x, wavelet_columns(x, basis.alpha, basis.beta)], 1)
+        columns = [v * np.abs(v), v * over_x]
+        if friction:
+            slow = SLOW * float(np.sqrt(np.mean(v * v)))
+            columns.append(np.tanh(v / slow) * over_x)
+        table = np.concatenate(columns, 1)
+        product = table.T @ r
+        share = float(product @ solve_gram(table.T @ table, product) / max(float(r @ r), TINY))
+        if not friction:
+            return share
+        return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
+
+    def _spread_of_speeds(self) -> float:
+        """Standard deviation of |v| over its mean, both along the way: rests and turns hardly count there."""
+        speed = np.abs(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
+        first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
+        return float(np.sqrt(max(third * first / second**2 - 1.0, 0.0)))
+
+    def _regression(self, basis: Basis, side: Float1D | None) -> FoldedRegression | None:
+        tables, folds = [], []
+        rows = sum(len(fixed) for fixed in self._fixed)
+        done = 0
+        for part, fixed in zip(self._parts, self._fixed, strict=True):
+            box = (part.position - self._lower) / self._reach
+            box = modulo(box) if self._periodic else box
+            plain = np.concatenate(
+                [
+                    np.ones((len(box), 1)),
+                    box[:, None],
+                    wavelet_columns(box, basis.alpha, basis.beta),
+                ],
+                axis=1,
+            )
+            if side is not None:
+                here = np.clip(part.on_grid(side[part.rows]), -1.0, 1.0)
+                plain = np.concatenate([plain, here[:, None] * plain], axis=1)
+            tables.append(np.concatenate([fixed, self._filtered(part, plain)], axis=1))
+            folds.append((np.arange(done, done + len(fixed)) * FOLDS) // rows)
+            done += len(fixed)
+        if not tables:
+            return None
+        independent = rows * self._step / self._correlation_time()
+        if independent < LEAST_SAMPLES + 2 * len(basis):
+            return None
+        forces = np.concatenate([part.force for part in self._parts])
+        least = (RESOLVED * float(np.ptp(forces))) ** 2
+        return FoldedRegression(
+            np.concatenate(tables), np.concatenate(folds), independent, side is not None, least
+        )
+
+    def _filtered(self, part: Piece, columns: Float2D) -> Float2D:
+        margin = self._low_pass.margin(part.period)
+        return np.column_stack(
+            [
+                self._low_pass(np.ascontiguousarray(column), part.period)[margin : -margin : self._step]
+                for column in columns.T
+            ]
+        )
+
+    def _correlation_time(self) -> float:
+        """Samples of white noise behind L that count for one: the sum of squares of their autocorrelation."""
+        period = self._parts[0].period
+        impulse = np.zeros(4 * self._low_pass.margin(period) + 1)
+        impulse[len(impulse) // 2] = 1.0
+        response = np.fft.rfft(self._low_pass(impulse, period), 2 * len(impulse))
+        correlation = np.fft.irfft(np.abs(response) ** 2)
+        return float(np.sum(correlation**2) / correlation[0] ** 2)
+
+
+def _moving(part: Piece) -> tuple[Float1D, Float1D, Float1D]:
+    return part.force, part.velocity, part.acceleration
+
+
+def _values(found: Sequence[float], names: Sequence[str]) -> tuple[float | None, float | None]:
+    by_name = dict(zip(names, found, strict=True))
+    return by_name.get("damping"), by_name.get("mass")

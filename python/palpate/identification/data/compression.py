@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compression of a recording: rows that share a position become one row with a weight.
+
+An encoder repeats its positions, and the least squares of eq. 4 needs of equal positions only their
+count, their mean force and the sum of squares within the group:
+sum_k (y_k - f(x))^2 = w (mean y - f(x))^2 + within.
+Positions that do not repeat are gathered in cells. The mean position and mean force of a cell are exact
+to second order (:func:`binning_error` is what is left), and the part of the within-sum that the slope
+across the cell explains is removed, so that what remains measures noise. With many inputs no grid of cells
+is both fine and small; then a share of the rows, evenly spread over the recording, stands for all.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._typing import Float1D, Float2D
+from .limits import NO_LIMITS, RowLimits, distinct_rows
+
+SIDE_LEVELS = 16
+"""Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
+
+POOLED_CELLS = 4
+"""Neighbouring cells that share one slope (2 per input where there are several)."""
+
+SIDE_PARTS = 8
+"""Parts of the travel in each of which the force's slope over the hysteresis input is taken to be one."""
+
+LEAST_PER_AXIS = 8
+"""Cells along each input below which gathering says too little of a force; rows are left out instead."""
+
+
+@dataclass(frozen=True)
+class Compressed:
+    """Weighted rows that stand for a recording in every least-squares problem."""
+
+    positions: Float2D
+    """(m, d)"""
+    force: Float1D
+    """(m,) mean force of a row's samples"""
+    weight: Float1D
+    """(m,) samples that a row stands for"""
+    side: Float1D | None
+    """(m,) hysteresis input s in [-1, 1], or None"""
+    spread: Float2D
+    """(m, d) variance of the positions within a row; 0 where they were equal"""
+    within: float
+    """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
+    samples: float
+    """Rows of the recording that are stood for, or the sum of their weights"""
+    limits: RowLimits = NO_LIMITS
+    """What limits the information in the samples"""
+
+    def standing_for(self, samples: float) -> Compressed:
+        """The same rows, standing for that many samples."""
+        more = samples / self.samples
+        return replace(self, weight=more * self.weight, within=more * self.within, samples=samples)
+
+
+class Compressor:
+    """Groups the rows of one recording by position, once; compresses it with or without a hysteresis input.
+
+    Parameters
+    ----------
+    positions : (n, d)
+    force : (n,)
+    max_positions : int
+        With more distinct positions than this they are gathered in that many cells of a regular grid.
+    weight : (n,), optional
+        Samples that each row stands for, >= 0; 1 without it. A row of weight 0 is no row.
+    within : float
+        Sum of squares about the rows themselves, where they stand for several samples.
+    limits : RowLimits
+        What limits the information in the samples.
+    """
+
+    def __init__(
+        self,
+        positions: Float2D,
+        force: Float1D,
+        *,
+        max_positions: int,
+        weight: Float1D | None = None,
+        within: float = 0.0,
+        limits: RowLimits = NO_LIMITS,
+    ) -> None:
+        self._within, self._limits = within, limits
+        self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
+        """The rows that stand for all."""
+        self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
+        if 0 < self._per_axis < LEAST_PER_AXIS:
+            self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
+            self._key, self._per_axis = np.arange(max_positions), 0
+        self._positions = positions[self.kept]
+        self._force = force[self.kept]
+        self._weight = np.ones(len(self._force)) if weight is None else weight[self.kept]
+
+    @property
+    def rows_used(self) -> int:
+        """How many rows of the recording stand for all."""
+        return len(self._force)
+
+    def samples(self, only: NDArray[np.bool_] | None = None) -> float:
+        """Samples that the rows stand for, or only (n,) of them."""
+        return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
+
+    def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
+        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart.
+
+        With only (n,), no more than these rows of the recording.
+        """
+        key = self._key
+        if only is not None:
+            return self._part(only[self.kept]).rows(
+                None if side is None else side[self.kept][only[self.kept]]
+            )
+        if side is not None:
+            side = side[self.kept]
+            level = np.rint((side + 1.0) * (SIDE_LEVELS / 2)).astype(np.int64)
+            key = key + (int(key.max()) + 1) * level
+        weight = self._weight
+        group, count = _ranked(key, weight)
+        x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
+        y = _mean(group, count, weight * self._force)
+        dy = self._force - y[group]
+        spread, merged_side = np.zeros_like(x), None
+        ds = np.zeros_like(dy)
+        if side is not None:
+            merged_side = _mean(group, count, weight * side)
+            ds = side - merged_side[group]
+        if self._per_axis:
+            dx = self._positions - x[group]
+            spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
+            # All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same
+            # few degrees of freedom.
+            block = self._pooled()
+            dy = _without_slopes(dy, dx, block, weight)
+            ds = _without_slopes(ds, dx, block, weight) if ds.any() else ds
+        if ds.any():
+            part, _ = _ranked(self._key * SIDE_PARTS // (int(self._key.max()) + 1), weight)
+            dy = _without_slopes(dy, ds[:, None], part, weight)
+        within = self._within + float(dy @ (weight * dy))
+        return Compressed(x, y, count, merged_side, spread, within, float(weight.sum()), self._limits)
+
+    def _part(self, rows: NDArray[np.bool_]) -> Compressor:
+        """The same cells with fewer rows."""
+        part = copy(self)
+        part.kept = np.arange(np.count_nonzero(rows))
+        part._key, part._positions = self._key[rows], self._positions[rows]
+        part._force, part._weight = self._force[rows], self._weight[rows]
+        part._within = self._within * float(part._weight.sum() / self._weight.sum())
+        return part
+
+    def _pooled(self) -> NDArray[np.int64]:
+        """(rows,) the block of neighbouring cells that a row's cell belongs to."""
+        d = self._positions.shape[1]
+        grid = (self._per_axis,) * d
+        together = max(2, round(POOLED_CELLS ** (1.0 / d)))
+        pooled = np.array(np.unravel_index(self._key, grid)) // together
+        return _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)[0]
+
+
+def binning_error(rows: Compressed, curvature: Float2D) -> float:
+    """RMS error [force] that the cells put into a fit with second derivatives curvature (m, d) at the rows.
+
+    The mean of f over a cell differs from f at its mean position by sum_j f_jj Var(x_j) / 2 to leading order.
+    """
+    bias = 0.5 * np.sum(curvature * rows.spread, axis=1)
+    return float(np.sqrt(np.average(bias * bias, weights=rows.weight)))
+
+
+def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], weight: Float1D) -> Float1D:
+    """Values (n,) less what one slope over each column of (n, d) explains of them in every block (n,)."""
+    d = over.shape[1]
+    products = [[np.bincount(block, weight * a * b) for b in (*over.T, values)] for a in over.T]
+    table = np.array(products).transpose(2, 0, 1)
+    slope = np.einsum("bij,bj->bi", np.linalg.pinv(table[:, :, :d], hermitian=True), table[:, :, d])
+    return np.asarray(values - np.einsum("nj,nj->n", slope[block], over))
+
+
+def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], int]:
+    """Group number of each row, and the cells along each axis: 0 where a group is one position only."""
+    d = positions.shape[1]
+    if d == 1:
+        distinct = np.unique(positions[:, 0])
+        if len(distinct) <= max_positions:
+            return np.searchsorted(distinct, positions[:, 0]), 0
+    elif all(len(np.unique(column)) <= max_positions for column in positions.T):
+        chosen, key, _ = distinct_rows(positions)
+        if len(chosen) <= max_positions:
+            return key, 0
+    per_axis = max(2, round(max_positions ** (1.0 / d)))
+    low, reach = positions.min(axis=0), np.ptp(positions, axis=0)
+    scale = np.divide(per_axis, reach, out=np.zeros_like(reach), where=reach > 0)
+    cell = np.minimum((positions - low) * scale, per_axis - 1).astype(np.int64)
+    return np.ravel_multi_index(tuple(cell.T), (per_axis,) * d), per_axis
+
+
+def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64], Float1D]:
+    """Group numbers without gaps (n,), and the weight of each group (groups,)."""
+    count = np.bincount(key, weight).astype(np.float64)
+    rank = np.cumsum(count > 0) - 1
+    return rank[key], np.asarray(count[count > 0], dtype=np.float64)
+
+
+def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1D:
+    return np.asarray(np.bincount(group, weighted) / count)
+
+
+SEAM = 0.02
+"""Share of the period at each end whose rows are repeated beyond the other end for the fit [-]."""
+
+
+def around_seam(rows: Compressed) -> Compressed:
+    """The rows with those near each end repeated one period further on.
+
+    A row and its copy share the weight. Wavelets near one end are then fitted to the rows of both ends.
+    """
+    x = rows.positions[:, 0]
+    first, last = np.flatnonzero(x < SEAM), np.flatnonzero(x >= 1.0 - SEAM)
+    index = np.concatenate([last, np.arange(len(x)), first])
+    shift = np.repeat([-1.0, 0.0, 1.0], [len(last), len(x), len(first)])
+    shared = np.zeros(len(x), dtype=np.bool_)
+    shared[first] = shared[last] = True
+    return replace(
+        rows,
+        positions=rows.positions[index] + shift[:, None],
+        force=rows.force[index],
+        weight=np.where(shared, 0.5, 1.0)[index] * rows.weight[index],
+        side=None if rows.side is None else rows.side[index],
+        spread=rows.spread[index],
+    )

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Limits of the information in rows: repeated rows, force steps, correlated noise, and noise of the position.
+
+A criterion that counts rows takes each of them as independent and exact. Held samples, a coarse converter and
+correlated noise break this: then structure is fitted that is not there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._typing import Float1D, Float2D
+from ..options import IdentifyOptions
+
+RESOLVED = 2.0**-16
+"""Share of the force's range below which no error counts: one step of a 16-bit converter. What was rendered
+and recorded has no noise at all, and a criterion would ask for wavelets down to the last digit of it."""
+
+REPEATED = 1.0 / 3.0
+"""Share of rows equal to the row before from which repeats count once [-]"""
+
+PROBED = 7
+"""Rows whose number of occurrences is counted first, to see if a table may hold all rows several times."""
+
+LEAST_LEVELS = 3
+"""Distinct forces below which no step is sought."""
+
+ROWS_PER_LEVEL = 2.0
+"""Rows for each distinct force from which equal steps between forces are those of a converter [-]"""
+
+SAMPLED = 8192
+"""Rows that show if a force takes few distinct values."""
+
+ON_GRID = 0.02
+"""Part of a step by which a multiple of it may be missed [-]"""
+
+STEP_ERROR = 1.0 / 3.0
+"""RMS error, in steps, below which a force in steps resolves nothing: uniform errors have 1/sqrt(12) [-]"""
+
+LEAST_CORRELATION = 0.15
+"""Correlation of neighbouring residuals below which they are taken as independent [-]"""
+
+SIGNIFICANT = 5.0
+"""Standard errors by which a correlation must differ from 0."""
+
+EVEN_RESIDUAL = 0.8
+"""Evenness of residuals (1 for normal noise) from which a correlation is that of noise: an unfitted structure
+is large in a few places and small in others [-]"""
+
+MOST_ORDERED = 50_000
+"""Rows in recorded order that are enough to see noise."""
+
+LEAST_REVERSALS = 0.1
+"""Share of the steps of position that reverse the step before, from which they show noise [-]"""
+
+ORDERED = 0.02
+"""Reversed steps above this share of the travel belong to a shuffled table and are no noise [-]"""
+
+
+@dataclass(frozen=True)
+class RowLimits:
+    """What limits the information in rows; the defaults set no limit."""
+
+    independent: float = 1.0
+    """Share of the samples that are independent (0, 1]"""
+    force_error: float = 0.0
+    """RMS error that nothing below is resolved of [force]"""
+    position_noise: float = 0.0
+    """Standard deviation of the position's noise [box]"""
+
+
+NO_LIMITS = RowLimits()
+"""Independent, exact rows."""
+
+ALL_BUT_TURNS = 0.99
+"""Share of the rows of a file joined to itself that occur equally often: a join can change a stroke [-]"""
+
+
+def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """What np.unique(table, axis=0) finds, an order of magnitude sooner: it compares whole rows as records.
+
+    Parameters
+    ----------
+    table : (n, d)
+
+    Returns
+    -------
+    chosen : (k,) int
+        One row of the table for each that differs, in the order of their columns.
+    group : (n,) int
+        Which of them each row is.
+    count : (k,) int
+        How many rows each stands for.
+    """
+    order = np.lexsort(table.T[::-1])
+    ordered = table[order]
+    first = np.ones(len(table), dtype=bool)
+    np.any(ordered[1:] != ordered[:-1], axis=1, out=first[1:])
+    group = np.empty(len(table), dtype=np.intp)
+    group[order] = np.cumsum(first) - 1
+    start = np.flatnonzero(first)
+    return order[start], group, np.diff(start, append=len(table))
+
+
+def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[NDArray[np.bool_], str]:
+    """Rows (n,) that repeat others and must not count again, and a sentence; none where repeats are few.
+
+    Held samples repeat the row before. A file that was joined to itself holds each row equally often.
+    """
+    columns = [*positions.T, force] if side is None else [*positions.T, force, side]
+    again = np.zeros(len(force), dtype=bool)
+    again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
+    if again.mean() > REPEATED:
+        return again, f"{np.count_nonzero(again)} rows that repeat the row before count once"
+    probes = np.linspace(0, len(force) - 1, PROBED).astype(np.intp)
+    if all(np.count_nonzero(force == force[row]) > 1 for row in probes):
+        chosen, _, count = distinct_rows(np.column_stack(columns))
+        usual = int(np.median(count))
+        if usual > 1 and np.mean(count == usual) > ALL_BUT_TURNS:
+            again[:] = True
+            again[chosen] = False
+            return again, f"each row occurs {usual} times in the data and counts once"
+    return np.zeros(len(force), dtype=bool), ""
+
+
+def force_step(force: Float1D) -> float:
+    """Step of a force that only takes multiples of one; 0 where it does not, or takes a value in few rows."""
+    sample = force[:: max(1, len(force) // SAMPLED)]
+    if len(np.unique(sample)) * ROWS_PER_LEVEL > len(sample):
+        return 0.0
+    levels = np.unique(force)
+    if len(levels) < LEAST_LEVELS or len(levels) * ROWS_PER_LEVEL > len(force):
+        return 0.0
+    reach = float(levels[-1] - levels[0])
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-9 * reach]
+    least = float(steps.min())
+    step = reach / max(round(reach / least), 1)
+    away = np.abs(steps / step - np.rint(steps / step))
+    return step if float(away.max()) <= ON_GRID else 0.0
+
+
+def correlation(residual: Float1D) -> float:
+    """Correlation of neighbouring residuals (n,) in recorded order; 0 where it may be chance or structure."""
+    power = float(residual @ residual)
+    if power == 0.0 or len(residual) < 2:
+        return 0.0
+    even = 1.4826 * float(np.median(np.abs(residual))) / float(np.sqrt(power / len(residual)))
+    found = float(residual[1:] @ residual[:-1]) / power
+    limit = max(LEAST_CORRELATION, SIGNIFICANT / float(np.sqrt(len(residual))))
+    return found if even >= EVEN_RESIDUAL and found > limit else 0.0
+
+
+def independent_share(rho: float) -> float:
+    """Independent samples per sample of noise with this correlation of neighbours, (1 - rho) / (1 + rho)."""
+    return (1.0 - rho) / (1.0 + rho)
+
+
+def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> float:
+    """BIC of residuals (n,) in recorded order with one correlation of neighbours; least is a mean square."""
+    n, power = len(residual), max(float(residual @ residual), np.finfo(float).tiny)
+    rho = float(residual[1:] @ residual[:-1]) / power
+    new = residual[1:] - rho * residual[:-1]
+    return n * float(np.log(max(float(new @ new) / n, least))) + n_parameters * float(np.log(n))
+
+
+def position_noise(position: Float1D) -> float:
+    """Noise of a position (n,) in recorded order: size of the steps that reverse the step before [box].
+
+    During a pause the position only moves by its noise, and a force that changes meanwhile does not depend on
+    it.
+    """
+    first = max(0, (len(position) - MOST_ORDERED) // 2)
+    steps = np.diff(position[first : first + MOST_ORDERED])
+    steps = steps[steps != 0.0]
+    if len(steps) < 2:
+        return 0.0
+    turned = steps[1:] * steps[:-1] < 0.0
+    if turned.mean() < LEAST_REVERSALS:
+        return 0.0
+    size = float(np.median(np.minimum(np.abs(steps[1:]), np.abs(steps[:-1]))[turned]))
+    return size if size < ORDERED else 0.0
+
+
+FAR = 1e3
+"""Ratio of the mean force to the force's range above which the mean is subtracted before fitting [-]"""
+
+ORDINARY_EXPONENT = 50
+"""A force range from 2^-50 to 2^50 is not scaled [-]"""
+
+
+@dataclass(frozen=True)
+class ForceScale:
+    """The fit sees (force - offset) * factor."""
+
+    offset: float = 0.0
+    factor: float = 1.0
+
+    @classmethod
+    def of(cls, force: Float1D, options: IdentifyOptions) -> ForceScale:
+        """The scale that a force (n,) needs; the identity for ordinary numbers.
+
+        The perceptual criterion compares errors with the force itself, so that its offset stays.
+        """
+        reach = float(np.ptp(force))
+        mean = float(np.mean(force)) if reach > 0.0 and options.criterion != "perceptual" else 0.0
+        offset = mean if abs(mean) > FAR * reach else 0.0
+        size = reach if offset else float(np.abs(force).max())
+        if size == 0.0:
+            return cls()
+        exponent = math.frexp(size)[1]
+        return cls(offset, 1.0 if abs(exponent) <= ORDINARY_EXPONENT else 2.0**-exponent)
+
+    def __bool__(self) -> bool:
+        return self.offset != 0.0 or self.factor != 1.0
+
+    def scaled(self, force: Float1D) -> Float1D:
+        """What the fit sees of a force (n,)."""
+        return (force - self.offset) * self.factor
+
+    def scaled_options(self, options: IdentifyOptions) -> IdentifyOptions:
+        """The options, with those that hold a force or a slope in the scale of the fit."""
+        factor = self.factor
+        slopes, fixed, coupling = options.slope_bounds, options.fixed_force, options.coupling_stiffness
+        return replace(
+            options,
+            slope_bounds=None if slopes is None else (slopes[0] * factor, slopes[1] * factor),
+            fixed_force=None if fixed is None else (fixed[0], (fixed[1] - self.offset) * factor),
+            coupling_stiffness=None if coupling is None else coupling * factor,
+        )

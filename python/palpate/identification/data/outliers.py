@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wrong readings: isolated rows are left out before the fit, rows far from the model are weighed down in it.
+
+One position at 10^6 times the travel moves all other rows into one cell, and nothing can be resolved there. A
+row is isolated if few rows lie beyond a gap many times larger than the range of all others, in short runs of
+the recording. A force may rise that much at a wall that is touched briefly; so a force is isolated only where
+rows of ordinary force lie at smaller and at larger positions.
+
+Huber's loss is quadratic up to k standard deviations of the residual and linear beyond (Huber 1964). It is
+minimised by least squares with weights min(1, k s / |residual|), which are computed again after each fit; s
+comes from the median absolute residual, which outliers do not move. A linear loss still lets one row of 10^4
+standard deviations decide. So the first fit leaves out every row that is far from the median of its
+neighbours, and later fits leave out those of them that are also far from the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..._typing import Float1D, Float2D
+from ...errors import InputError
+from ...recording import Recording
+from ...verdict import Finding, no, usable
+from .limits import RESOLVED
+
+FEW = 0.01
+"""Largest share of the rows that may be isolated [-]"""
+
+LEAST_ROWS = 100
+"""Rows below which only one row may be isolated, by a larger gap: sparse tables may be spaced by factors."""
+
+GAP = 10.0
+"""Ratio of the gap to the range of the other rows above which rows are dropped [-]"""
+
+SPARSE_GAP = 1000.0
+"""The same for a recording of few rows [-]"""
+
+STRETCHED = 0.2
+"""Ratio of a gap that is reported, to one at which rows are dropped [-]"""
+
+LONGEST_RUN = 3
+"""Rows in succession that a wrong reading may last."""
+
+LEAST_OTHERS = 3
+"""Distinct values that the other rows must have."""
+
+SAMPLED = 10_000
+"""Rows, evenly spread, that show the range of most values."""
+
+NAMED = 3
+"""Rows that a finding names."""
+
+
+@np.errstate(over="ignore", invalid="ignore")  # a range may exceed the largest number; it is refused later
+def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Finding]]:
+    """The recordings without isolated rows, and findings on these rows."""
+    counts = [len(recording) for recording in recordings]
+    position = np.concatenate([recording.position for recording in recordings])
+    force = np.concatenate([recording.force for recording in recordings])
+    columns = [("position", position)]
+    for index, name in enumerate(recordings[0].input_names):
+        columns.append((name, np.concatenate([recording.inputs[:, index] for recording in recordings])))
+    dropped = np.zeros(len(position), dtype=bool)
+    findings: list[Finding] = []
+    for name, values in columns:
+        dropped |= _judged(name, values, ~dropped, None, findings)
+    dropped |= _judged("force", force, ~dropped, position, findings)
+    if not dropped.any():
+        return list(recordings), findings
+    apart = np.split(dropped, np.cumsum(counts)[:-1])
+    return [
+        recording.without(rows) if rows.any() else recording
+        for recording, rows in zip(recordings, apart, strict=True)
+    ], findings
+
+
+def isolated(
+    values: Float1D, gap: float, most: float, count: Float1D | None = None, width: float = 0.0
+) -> NDArray[np.bool_]:
+    """At most so many rows (n,) beyond a gap so many times larger than the range of the others.
+
+    Each value stands for count (n,) rows that spread over a width.
+    """
+    far = np.abs(values - _median(values, count))
+    order = np.argsort(far, kind="stable")
+    outside = np.cumsum(np.ones(len(values)) if count is None else count[order][::-1])
+    first = max(len(values) - 1 - int(np.searchsorted(outside, most, side="right")), 0)
+    ranges = np.maximum.accumulate(values[order]) - np.minimum.accumulate(values[order])
+    others = np.maximum(ranges[first:-1], width)
+    beyond = np.flatnonzero((np.diff(far[order])[first:] > gap * others) & (others > 0.0))
+    found = np.zeros(len(values), dtype=bool)
+    if len(beyond):
+        found[order[first + int(beyond[0]) + 1 :]] = True
+        if count is None and len(np.unique(values[~found])) < LEAST_OTHERS:
+            found[:] = False
+    return found
+
+
+def refuse_isolated(position: Float1D, count: Float1D, width: float) -> None:
+    """Refuse sums over cells (m,) of a width, each of count rows, if few rows stretch the range of all.
+
+    Raises
+    ------
+    InputError
+        Names the positions of these rows.
+    """
+    total = float(count.sum())
+    apart = isolated(position, GAP, FEW * total, count, width)
+    if not apart.any():
+        return
+    low, high = float(position[~apart].min()) - width, float(position[~apart].max()) + width
+    named = ", ".join(f"{value:.4g}" for value in position[apart][:NAMED])
+    raise InputError(
+        f"{int(count[apart].sum())} of {int(total)} rows have a position ({named}) far outside the "
+        f"others' range, {low:.4g} to {high:.4g}. They are likely wrong readings: remove them, or "
+        "identify in memory, which leaves them out"
+    )
+
+
+def _median(values: Float1D, count: Float1D | None) -> float:
+    """Median of values (n,) that each stand for count (n,) rows."""
+    if count is None:
+        return float(np.median(values))
+    order = np.argsort(values, kind="stable")
+    return float(values[order[np.searchsorted(np.cumsum(count[order]), 0.5 * count.sum())]])
+
+
+def _judged(
+    name: str, values: Float1D, given: NDArray[np.bool_], position: Float1D | None, findings: list[Finding]
+) -> NDArray[np.bool_]:
+    """Rows (n,) to be dropped for their values, among the given ones; adds findings."""
+    found = np.zeros(len(values), dtype=bool)
+    if not _stretched(values):
+        return found
+    rows = np.flatnonzero(given)
+    sparse = len(rows) < LEAST_ROWS
+    gap, most = (SPARSE_GAP, 1) if sparse else (GAP, int(FEW * len(rows)))
+    if len(rows) <= LEAST_OTHERS + 1:
+        return found
+    for limit, drop in ((gap, True), (STRETCHED * gap, False)):
+        apart = isolated(values[rows], limit, most)
+        if position is not None:
+            apart &= _bracketed(position[rows], apart)
+        if not apart.any():
+            continue
+        here, others = rows[apart], values[rows[~apart]]
+        count, ratio = len(here), _gap(values[here], others)
+        drop = drop and _longest_run(apart) <= LONGEST_RUN
+        found[here] = drop
+        named = ", ".join(f"row {row} at {values[row]:.4g}" for row in here[:NAMED])
+        more = ", ..." if count > NAMED else ""
+        result = (
+            "They were left out as wrong readings"
+            if drop
+            else f"They stretch the range of {name}. If they are wrong readings, remove them"
+        )
+        findings.append(
+            usable(
+                f"{count} of {len(rows)} rows ({named}{more}) have a {name} outside the others' range, "
+                f"{others.min():.4g} to {others.max():.4g}, by {ratio:.3g} times its width. {result}"
+            )
+        )
+        break
+    return found
+
+
+def _stretched(values: Float1D) -> bool:
+    """True if the range is so much larger than that of most values (n,) that rows may be isolated."""
+    low, high = np.quantile(values[:: max(1, len(values) // SAMPLED)], (FEW, 1.0 - FEW))
+    return len(values) < LEAST_ROWS or float(np.ptp(values)) > STRETCHED * GAP * float(high - low)
+
+
+def _gap(values: Float1D, others: Float1D) -> float:
+    """Largest distance of values from the range of the others, in widths of that range."""
+    low, high = float(others.min()), float(others.max())
+    return float(np.maximum(values - high, low - values).max()) / (high - low)
+
+
+def _bracketed(position: Float1D, apart: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows (n,) that have others, not apart, at smaller and at larger positions."""
+    others = position[~apart]
+    return np.asarray((position > others.min()) & (position < others.max()))
+
+
+def _longest_run(rows: NDArray[np.bool_]) -> int:
+    """Rows in succession, at most."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+BEND = 2.0
+"""k: on data without outliers 99 % of the efficiency of least squares is kept."""
+
+FAR = 8.0
+"""Standard deviations from the neighbours, and from the model, beyond which a row is left out [-]"""
+
+NEIGHBOURS = 3
+"""Rows before a row, and after it, whose median it is compared with."""
+
+ROUNDS = 4
+"""Fits with ever better weights."""
+
+SETTLED = 1e-3
+"""Mean change of the weights below which they are good."""
+
+MOST_LEFT_OUT = 0.2
+"""Share of the rows left out above which they are no outliers, and the model is unfit."""
+
+
+def standard_deviation(residual: Float1D) -> float:
+    """Standard deviation of normal residuals (n,), from the median of their absolute values."""
+    return 1.4826 * float(np.median(np.abs(residual)))
+
+
+def from_neighbours(
+    box: Float2D, force: Float1D, side: Float1D | None, trusted: NDArray[np.bool_]
+) -> Float1D:
+    """Force less the median of its trusted neighbours (n,).
+
+    Neighbours are those in recorded order, or those in position, on the same stroke where side (n,) says it.
+    The closer ones of the two are taken: a recorded motion may go through hysteresis, and a table may be
+    shuffled. Of the three rows before and the three rows after, those with the closer median count: a step is
+    no outlier.
+    """
+    known = np.flatnonzero(trusted)
+    if box.shape[1] > 1:
+        near = known[np.asarray(cKDTree(box[known]).query(box, k=2 * NEIGHBOURS + 1)[1])[:, 1:]]
+        return np.asarray(force - np.median(force[near], axis=1))
+    keys = (box[:, 0],) if side is None else (box[:, 0], side)
+    found = []
+    for order in (np.arange(len(force)), np.lexsort(keys)):
+        place = np.empty(len(force), dtype=np.intp)
+        place[order] = np.arange(len(force))
+        sequence = order[trusted[order]]
+        before = np.searchsorted(place[sequence], place, side="left")
+        after = np.searchsorted(place[sequence], place, side="right")
+        apart = [
+            force - np.median(force[sequence[np.clip(first[:, None] + step, 0, len(sequence) - 1)]], axis=1)
+            for first, step in ((before, -np.arange(1, NEIGHBOURS + 1)), (after, np.arange(NEIGHBOURS)))
+        ]
+        found.append(np.where(np.abs(apart[0]) < np.abs(apart[1]), *apart))
+    return min(found, key=standard_deviation)
+
+
+def suspects(box: Float2D, force: Float1D, side: Float1D | None, weight: Float1D | None) -> NDArray[np.bool_]:
+    """Rows (n,) far from the median of their neighbours; rows of weight 0 are no neighbours."""
+    given = np.ones(len(force), dtype=bool) if weight is None else weight > 0.0
+    low, high = np.quantile(force[given], (0.05, 0.95))
+    found = np.zeros(len(force), dtype=bool)
+    for _ in range(ROUNDS):
+        trusted, before = given & ~found, found
+        if np.count_nonzero(trusted) <= 2 * NEIGHBOURS + 1:
+            break
+        apart = from_neighbours(box, force, side, trusted)
+        scale = max(standard_deviation(apart[trusted]), RESOLVED * float(high - low))
+        found = given & (np.abs(apart) > FAR * scale)
+        if np.array_equal(found, before):
+            break
+    return found
+
+
+@dataclass(frozen=True)
+class Robust:
+    """Weights of the rows, and which rows count in the error."""
+
+    weight: Float1D
+    """(n,) for the last fit"""
+    outliers: NDArray[np.bool_]
+    """(n,) rows that were left out"""
+    note: str
+
+    def findings(self, residual: Float1D) -> list[Finding]:
+        """A finding on the rows that were left out, with their residuals (n,) among all."""
+        count = int(np.count_nonzero(self.outliers))
+        if not count:
+            return []
+        share = count / len(self.outliers)
+        judge = no if share > MOST_LEFT_OUT else usable
+        largest = float(np.abs(residual[self.outliers]).max())
+        return [
+            judge(
+                f"{count} rows ({share:.2g} of all) lie more than {FAR:g} standard deviations from the "
+                f"model and from their neighbours, the farthest by {largest:.3g}: they were left out as "
+                "wrong readings, and the error is that of the other rows"
+            )
+        ]
+
+
+def robust_weights(
+    fit: Callable[[Float1D], Float1D],
+    first: Float1D,
+    force: Float1D,
+    weight: Float1D | None,
+    suspect: NDArray[np.bool_],
+) -> Robust:
+    """Weights of the rows for a last fit.
+
+    Parameters
+    ----------
+    fit : callable
+        The modelled force (n,) for given weights.
+    first : (n,)
+        The modelled force without the rows that are suspect.
+    force, weight
+        Forces (n,), samples that each row stands for (n,) or None.
+    suspect : (n,)
+        Rows that may be left out.
+    """
+    given = np.ones(len(force)) if weight is None else weight
+    modelled, share = first, np.where(suspect, 0.0, 1.0)
+    for _ in range(ROUNDS):
+        residual = np.abs(force - modelled)
+        scale = standard_deviation(residual[given > 0.0])
+        before = share
+        share = np.minimum(1.0, BEND * scale / np.maximum(residual, np.finfo(float).tiny))
+        share[suspect & (residual > FAR * scale)] = 0.0
+        if scale == 0.0 or np.abs(share - before).mean() <= SETTLED:
+            break
+        modelled = fit(given * share)
+    outliers = (share == 0.0) & (given > 0.0)
+    far = int(np.count_nonzero(share < 0.5))
+    note = (
+        f"{far} rows farther than {2 * BEND:g} standard deviations were weighed down, "
+        f"{np.count_nonzero(outliers)} of them left out"
+    )
+    return Robust(given * share, outliers, note)

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of an identification: which data are usable, what the force depends on, positions modulo a period."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._core.dynamics import environment_filters, paper_sample_time_s
+from ..._typing import Float1D, Float2D
+from ...errors import InputError
+from ...recording import Recording
+from ...recording.motion import Piece, pieces, velocity
+from ...verdict import Finding, no, usable
+from ..options import IdentifyOptions
+from .strokes import strokes_of
+
+LEAST_ROWS = 10
+"""Rows below which nothing is identified."""
+
+LEAST_POSITIONS = 3
+"""Distinct positions below which nothing is identified."""
+
+LARGEST = 1e100
+"""Largest absolute value, and the inverse of the smallest travel and force, that is identified."""
+
+
+def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> None:
+    """Refuse what cannot be identified.
+
+    Raises
+    ------
+    InputError
+        Too few rows or distinct positions, a value that is not finite, an input that never changes.
+    """
+    if positions.ndim != 2 or force.shape != (len(positions),):
+        raise InputError(
+            f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
+        )
+    if len(force) < LEAST_ROWS:
+        raise InputError(f"the recording has {len(force)} rows; {LEAST_ROWS} or more are needed")
+    for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            raise InputError(
+                f"{name} in row {bad[0]} is {column[bad[0]]}; every value must be a finite number"
+            )
+    for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
+        require_in_range(name, column)
+    if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST:
+        raise InputError(
+            f"the largest force is {largest:.3g}; the least is {1.0 / LARGEST:g}, or 0. Use another unit"
+        )
+    for name, column in zip(names, positions.T, strict=True):
+        if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST:
+            raise InputError(f"{name} spans {travel:.3g}; the least is {1.0 / LARGEST:g}. Use another unit")
+        if column.min() == column.max():
+            raise InputError(f"every {name} is {column[0]:g}; identifying needs one that moves")
+        if len(np.unique(column)) < LEAST_POSITIONS:
+            raise InputError(
+                f"{name} takes only {len(np.unique(column))} distinct values; "
+                f"{LEAST_POSITIONS} or more are needed"
+            )
+
+
+def require_in_range(name: str, values: Float1D) -> None:
+    """Refuse values (n,), n >= 1, whose squares would overflow.
+
+    Raises
+    ------
+    InputError
+        Names the largest value and the limit.
+    """
+    if (largest := float(np.abs(values).max())) > LARGEST:
+        raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Rows of all recordings, one under the other."""
+
+    names: tuple[str, ...]
+    """Of the columns of X; the first is position"""
+    X: Float2D
+    """(n, d)"""
+    force: Float1D
+    """(n,)"""
+    side: Float1D | None
+    """(n,) direction of the stroke: stated by every recording, or taken from the order of its rows"""
+    starts: tuple[int, ...] | None
+    """Rows at which a recording begins, where every one has time"""
+    parts: tuple[Piece, ...]
+    """The motion between gaps of time, where every recording has time; rows count over all recordings"""
+    notes: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
+    """Reservations for the verdict"""
+
+
+def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> Observations:
+    """The rows that the options ask for.
+
+    Raises
+    ------
+    InputError
+        An input is not in a recording; hysteresis together with further inputs.
+    """
+    names = _input_names(recordings[0], options)
+    found = [input_columns(recording, names) for recording in recordings]
+    kept = [rows for _, rows in found]
+    columns = [X[rows] for X, rows in found]
+    lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
+    notes: tuple[str, ...] = (
+        (f"{lost} rows at the ends and at gaps of time have no velocity",) if lost else ()
+    )
+    side, starts = None, None
+    if all(part.direction is not None for part in recordings):
+        sides = [np.asarray(part.direction, dtype=float) for part in recordings]
+        side = np.concatenate([each[rows] for each, rows in zip(sides, kept, strict=True)])
+    parts: tuple[Piece, ...] = ()
+    if len(names) == 1 and all(part.time is not None for part in recordings):
+        first = np.cumsum([0, *(len(part) for part in recordings)])
+        parts = tuple(
+            replace(piece, rows=slice(start + piece.rows.start, start + piece.rows.stop))
+            for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
+            for piece in pieces(recording)
+        )
+    findings: tuple[Finding, ...] = ()
+    if side is None and all(part.time is not None for part in recordings):
+        starts = _starts(recordings, kept)
+    elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
+        strokes = strokes_of(recordings, named=options.inputs != "auto")
+        side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
+    if options.filters == "matched":
+        forces = [part.force for part in recordings]
+    else:
+        forces, parts = [paper_target(part, options) for part in recordings], ()
+    force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
+    return Observations(names, np.concatenate(columns), force, side, starts, parts, notes, findings)
+
+
+def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
+    """Rows, of those that are kept, at which a recording or a piece between gaps of time begins."""
+    starts, before = [], 0
+    for recording, rows in zip(recordings, kept, strict=True):
+        starts += [before + int(np.count_nonzero(rows[: piece.rows.start])) for piece in pieces(recording)]
+        before += int(np.count_nonzero(rows))
+    return tuple(dict.fromkeys(start for start in starts if start < before))
+
+
+def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
+    """Inputs (n, d) by their names in the recording or its file, and the rows (n,) that have them all.
+
+    A velocity that is no column of the recording is derived from its time.
+
+    Raises
+    ------
+    InputError
+        The recording has no such input.
+    """
+    columns, rows = [], np.ones(len(recording), dtype=np.bool_)
+    for name in names:
+        if name == "velocity" and name not in recording.input_names:
+            derived, known = velocity(recording)
+            columns.append(derived)
+            rows &= known
+        else:
+            columns.append(_column(recording, name))
+    return np.column_stack(columns), rows
+
+
+def _column(recording: Recording, name: str) -> Float1D:
+    if name == "position":
+        return recording.position
+    for index, known in enumerate(recording.input_names):
+        if name in (known, recording.source.columns.get(known)):
+            return recording.inputs[:, index]
+    known_inputs = ", ".join(("position", *recording.input_names))
+    raise InputError(
+        f"the recording has no input {name}, only {known_inputs}; read the recording with inputs=({name!r},)"
+    )
+
+
+def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, ...]:
+    if options.inputs == "auto":
+        return ("position", *recording.input_names)
+    further = [name for name in options.inputs if name not in ("position", "hysteresis")]
+    if further and "hysteresis" in options.inputs:
+        raise InputError(
+            f"inputs names hysteresis and {', '.join(further)}; hysteresis is identified over position alone"
+        )
+    by_file_name = {recording.source.columns.get(known): known for known in recording.input_names}
+    return ("position", *(by_file_name.get(name, name) for name in further))
+
+
+PERIOD_TOLERANCE = 0.01
+"""How far, as a share, the sample period may be from the one that the filters are made for."""
+
+
+def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
+    """What the network is fitted to (n,): the force less those of the assumed mass and damping.
+
+    Raises
+    ------
+    InputError
+        The recording has no time, or is not sampled every millisecond.
+    """
+    period = recording.sample_period
+    if recording.time is None or period is None:
+        raise InputError("the paper's filters need time: the recording has none (--time NAME)")
+    steps = np.diff(recording.time)
+    if np.abs(steps / paper_sample_time_s - 1.0).max() > PERIOD_TOLERANCE:
+        raise InputError(
+            f"the paper's filters are made for steps of {paper_sample_time_s:g} s; the recording's are from "
+            f"{steps.min():g} to {steps.max():g} s"
+        )
+    filters = environment_filters(options.filters.removeprefix("paper-"), "paper")
+    velocity = filters.g2.filter(recording.position - recording.position[0])
+    target = recording.force - options.assumed_mass * filters.g1.filter(velocity)
+    if options.filters == "paper-explicit":
+        target = target - options.assumed_damping * velocity
+    return np.asarray(target)
+
+
+USABLE_GAP = 0.05
+"""Share of the period without a position above which the model is usable with a reservation [-]."""
+
+UNFIT_GAP = 0.5
+"""Share of the period without a position above which the model is unfit [-]."""
+
+
+def require_one_input(names: tuple[str, ...]) -> None:
+    """Refuse a period for a force over several inputs."""
+    if len(names) > 1:
+        raise InputError(f"period is for a force over position alone, not over {', '.join(names)}")
+
+
+def period_notes(position: Float1D, period: float) -> tuple[str, list[Finding]]:
+    """The note and the findings on positions (n,) and a period."""
+    lower, travel = float(position.min()), float(np.ptp(position))
+    note = (
+        f"the positions span {travel / period:.4g} periods of {period:.6g}: they are taken modulo the period"
+    )
+    if travel <= period:
+        gap = period - travel
+        note = (
+            f"the gap of {gap:.4g} between the last and the first position, {100 * gap / period:.2g} % of "
+            f"the period of {period:.6g}, is closed"
+        )
+    box = np.sort(modulo((position - lower) / period))
+    steps = np.diff(np.append(box, box[0] + 1.0))
+    widest = int(np.argmax(steps))
+    share = float(steps[widest])
+    if share <= USABLE_GAP:
+        return note, []
+    start = lower + period * float(box[widest])
+    judge = no if share > UNFIT_GAP else usable
+    sentence = (
+        f"no position lies between {start:.6g} and {start + share * period:.6g}, {100 * share:.3g} % of the "
+        f"period of {period:.6g}; record a whole period, or check the unit of --period"
+    )
+    return note, [judge(sentence)]
+
+
+def modulo(box: Float1D) -> Float1D:
+    """Positions in periods (n,), each in [0, 1)."""
+    return np.asarray(box - np.floor(box))

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Direction of the strokes of recordings that do not state it: from the order of rows, or from the force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import _core
+from ..._typing import Float1D, Int8Vector
+from ...recording import Recording
+from ...recording.strokes import ordered_strokes, turns_of
+from ...verdict import Finding, usable
+
+CELLS = 32
+"""Cells of the travel in which the strokes are compared."""
+
+SIGNIFICANT = 4.0
+"""Standard errors by which the strokes must differ: fewer cannot earn the model class hysteresis [-]."""
+
+CONSISTENT = 0.9
+"""Share of the cells in which one stroke's force must be the higher, to be taken for the press [-]."""
+
+APART = 0.05
+"""Mean difference that two strokes must have then, as a share of the force's standard deviation: repeated
+measurements of one stroke differ by 0.02 or less [-]."""
+
+WINDOW = 16
+"""Neighbouring rows, in order of position, that are parted in two groups of force."""
+
+LEAST_WINDOWS = 5
+"""Fewer windows show nothing."""
+
+TWO_BRANCHES = 0.85
+"""Share of a window's variance between its two groups: 0.68 for noise, 1 for two separate forces [-]."""
+
+SPREAD_SHARE = 0.02
+"""Spread at one position, as a share of the force's range, from which rows in no order are reported [-]."""
+
+CURE = (
+    "keep the rows in the order of the recording, or add a column direction with the words press and release"
+)
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Directions of all rows of all recordings, where they are known."""
+
+    side: Float1D | None
+    """(n,) +1 into the object, -1 out of it, 0 neither; None where hysteresis cannot be tested"""
+    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+
+def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
+    """Takes the strokes of recordings from their order of rows, where they do not state them.
+
+    Recordings of one stroke each that all run the same way are parted by their force: a passive object
+    presses back harder than it lets go. Where press and release do not differ there is no hysteresis to test.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    named : bool
+        Hysteresis is named as an input: strokes that do not differ are returned, too.
+    """
+    found = [
+        recording.direction if recording.direction is not None else ordered_strokes(recording)
+        for recording in recordings
+    ]
+    position = np.concatenate([recording.position for recording in recordings])
+    force = np.concatenate([recording.force for recording in recordings])
+    known = [direction for direction in found if direction is not None]
+    unit = recordings[0].units["force"] and f" {recordings[0].units['force']}"
+    if len(known) < len(found):
+        missing = _names(recordings, [direction is None for direction in found])
+        return _untested(position, force, unit, f"{missing} has no direction, and its rows are in no order")
+    findings: tuple[Finding, ...] = ()
+    turns = sum(map(turns_of, known))
+    side = np.concatenate(known).astype(np.float64)
+    note = f"direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}"
+    if len(recordings) > 1:
+        note += f" in {len(recordings)} recordings, " + _ways(recordings, known)
+    if not ((side > 0).any() and (side < 0).any()):
+        press = _press(recordings)
+        if press is None:
+            return _untested(position, force, unit, None)
+        side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
+        harder, softer = _names(recordings, press > 0), _names(recordings, press < 0)
+        difference = float(np.nanmean(_Cells.of(position, force, side).difference))
+        note = f"{harder} is taken as press, {softer} as release, because its force is higher"
+        findings = (
+            usable(
+                f"{note} by {difference:.3g}{unit} on average; no direction is stated, and all positions run "
+                f"the same way. If these are two objects, identify them one by one; if they are repetitions "
+                f"of one stroke, give --inputs position; else {CURE}"
+            ),
+        )
+    elif not named and not _Cells.of(position, force, side).differ:
+        return Strokes(None, (f"{note}; press and release do not differ",))
+    return Strokes(side, (note,), findings)
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """Press less release in cells of the travel that hold both."""
+
+    difference: Float1D
+    """(m,) mean force of press less release, at one position"""
+    error: Float1D
+    """(m,) its standard error"""
+
+    @classmethod
+    def of(cls, position: Float1D, force: Float1D, side: Float1D) -> _Cells:
+        press, release = side > 0, side < 0
+        lower = max(position[press].min(), position[release].min())
+        upper = min(position[press].max(), position[release].max())
+        rows = (side != 0) & (position >= lower) & (position <= upper)
+        if not upper > lower:
+            return cls(np.empty(0), np.empty(0))
+        x, f = (position[rows] - lower) / (upper - lower), force[rows] - force[rows].mean()
+        cell = np.minimum((x * CELLS).astype(np.int64), CELLS - 1)
+        group = 2 * cell + press[rows]
+        count, f_sum, x_sum, xx, xf, ff = (
+            np.bincount(group, values, 2 * CELLS).reshape(CELLS, 2)
+            for values in (None, f, x, x * x, x * f, f * f)
+        )
+        mean_x, mean_f = (total / np.maximum(count, 1) for total in (x_sum, f_sum))
+        # One slope for both strokes of a cell, about their means.
+        xx, xf, ff = (
+            np.sum(square - count * one * other, axis=1)
+            for square, one, other in ((xx, mean_x, mean_x), (xf, mean_x, mean_f), (ff, mean_f, mean_f))
+        )
+        slope = np.divide(xf, xx, out=np.zeros(CELLS), where=xx > 0)
+        difference = mean_f[:, 1] - mean_f[:, 0] - slope * (mean_x[:, 1] - mean_x[:, 0])
+        n_out, n_in = count.T
+        used = (n_in >= 2) & (n_out >= 2) & (n_in + n_out > 4)
+        # Rounding errors are the least noise.
+        floor = (1e-7 * float(np.ptp(f))) ** 2
+        variance = np.maximum(ff - slope * xf, 0.0)[used] / (n_in + n_out - 3.0)[used] + floor
+        return cls(difference[used], np.sqrt(variance * (1.0 / n_in[used] + 1.0 / n_out[used])))
+
+    @property
+    def differ(self) -> bool:
+        """Press and release differ on average, or somewhere."""
+        if not len(self.difference) or not self.error.all():  # the force is constant
+            return False
+        weight = self.error**-2.0
+        mean = float(weight @ self.difference / np.sqrt(weight.sum()))
+        squares = float(np.sum((self.difference / self.error) ** 2))
+        m = len(self.difference)
+        return abs(mean) > SIGNIFICANT or squares > m + SIGNIFICANT * np.sqrt(2.0 * m)
+
+
+def _press(recordings: Sequence[Recording]) -> Float1D | None:
+    """+1 for the recordings with the higher force, -1 for the others; None where they are not two curves."""
+    if len(recordings) < 2 or any(recording.direction is not None for recording in recordings):
+        return None
+
+    def above(one: Recording, other: Recording) -> int:
+        """+1, -1: the force of one is higher, lower throughout; 0: they are not apart."""
+        position = np.concatenate([one.position, other.position])
+        force = np.concatenate([one.force, other.force])
+        side = np.repeat([1.0, -1.0], [len(one), len(other)])
+        apart = _Cells.of(position, force, side).difference
+        if len(apart) < CELLS // 2 or abs(apart.mean()) < APART * force.std():
+            return 0
+        sign = int(np.sign(apart.mean()))
+        return sign if np.mean(np.sign(apart) == sign) >= CONSISTENT else 0
+
+    first = np.array([above(recording, recordings[0]) for recording in recordings])
+    if not first.any() or ((first > 0).any() and (first < 0).any()):
+        return None
+    high = first >= 0 if (first < 0).any() else first > 0
+    harder = [recording for recording, up in zip(recordings, high, strict=True) if up]
+    softer = [recording for recording, up in zip(recordings, high, strict=True) if not up]
+    if not all(above(one, other) > 0 for one, other in product(harder, softer)):
+        return None
+    return np.where(high, 1.0, -1.0)
+
+
+def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> Strokes:
+    """Hysteresis cannot be tested; reports by how much the strokes may differ, where the rows show it."""
+    seen = f"hysteresis was not tested: {why or 'the position never turns back in the order of rows'}"
+    # Repetitions of a row would be groups of one force.
+    rows = np.unique(position + 1j * force)
+    if len(rows) < LEAST_WINDOWS * WINDOW:
+        return Strokes(None, (seen,))
+    reach = float(np.ptp(force)) or 1.0
+    shares, gaps, spreads = _two_groups(rows.real, rows.imag)
+    gap, most, spread = float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(np.median(spreads))
+    levels = np.diff(np.unique(force))
+    step = float(levels[levels > 1e-9 * reach].min(initial=reach))
+    if np.median(shares) > TWO_BRANCHES and gap > max(SPREAD_SHARE / 2 * reach, 1.5 * step):
+        told = (
+            f"The force has two values at the same position, typically {gap:.3g}{unit} apart, up to "
+            f"{most:.3g}{unit} ({gap / reach:.1%} and {most / reach:.1%} of its range), as press and release "
+            "have. The model lies between them"
+        )
+    elif why is not None and spread > SPREAD_SHARE * reach:
+        told = (
+            f"At the same position the force has a standard deviation of {spread:.3g}{unit} "
+            f"({spread / reach:.1%} of its range), from noise or from a difference between press and release"
+        )
+    else:
+        return Strokes(None, (seen,))
+    return Strokes(None, findings=(usable(f"{seen}. {told}. Cure: {CURE}"),))
+
+
+def _two_groups(x: Float1D, f: Float1D) -> tuple[Float1D, Float1D, Float1D]:
+    """For windows of rows in order of position: the share of the variance between two groups of force, the
+    distance of their means, and the standard deviation, each (windows,).
+    """
+    rows = len(x) // WINDOW * WINDOW
+    x, f = x[:rows].reshape(-1, WINDOW), f[:rows].reshape(-1, WINDOW)
+    dx, df = x - x.mean(axis=1, keepdims=True), f - f.mean(axis=1, keepdims=True)
+    xx = np.sum(dx * dx, axis=1)
+    slope = np.divide(np.sum(dx * df, axis=1), xx, out=np.zeros(len(xx)), where=xx > 0)
+    rest = np.sort(df - slope[:, None] * dx, axis=1)
+    total = np.maximum(np.sum(rest * rest, axis=1), 1e-30)
+    low = np.arange(1, WINDOW)
+    sums = np.cumsum(rest, axis=1)[:, :-1]
+    parted = sums**2 * (1.0 / low + 1.0 / (WINDOW - low))
+    best = np.argmax(parted, axis=1)
+    at = np.arange(len(best)), best
+    gap = -sums[at] * (1.0 / low[best] + 1.0 / (WINDOW - low[best]))
+    return parted[at] / total, gap, np.sqrt(total / (WINDOW - 2))
+
+
+def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.bool_]) -> str:
+    """Files of some of the recordings, or their numbers."""
+    if len(recordings) == 1:
+        return ", ".join(recordings[0].source.files) or "the recording"
+    return ", ".join(
+        ", ".join(recording.source.files) or f"recording {number}"
+        for number, (recording, wanted) in enumerate(zip(recordings, which, strict=True), 1)
+        if wanted
+    )
+
+
+def _ways(recordings: Sequence[Recording], directions: Sequence[Int8Vector]) -> str:
+    """How many of the recordings are strokes into the object, out of it, and both."""
+    ways = [(bool((each > 0).any()), bool((each < 0).any())) for each in directions]
+    words = {"press": (True, False), "release": (False, True), "both": (True, True)}
+    return ", ".join(f"{ways.count(way)} {word}" for word, way in words.items() if ways.count(way))
+
+
+@dataclass(frozen=True)
+class HysteresisInput:
+    """s of every row of a recording."""
+
+    side: Float1D
+    """(n,) in [-1, 1]"""
+    known: NDArray[np.bool_]
+    """(n,) rows whose s does not depend on what happened before the recording"""
+    play_radius: float | None = None
+    """[box]"""
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether the known rows hold strokes into the object and out of it."""
+        side = self.side[self.known]
+        return bool((side > 0.0).any() and (side < 0.0).any())
+
+    @classmethod
+    def of_strokes(cls, side: Float1D) -> HysteresisInput:
+        """+1, -1: the stroke of each row (n,)."""
+        return cls(side, np.ones(len(side), dtype=bool))
+
+    @classmethod
+    def of_play(
+        cls, motions: Sequence[Float1D], radius: float, first: Sequence[float] | None = None
+    ) -> HysteresisInput:
+        """The play operator along motions that each begin with a history of their own: at s = 0, or first.
+
+        Once a motion has covered the slot's width 2 r its history is forgotten: whatever the state was, it
+        has been pushed by one edge of the slot past where the other edge could have held it. Where no motion
+        is that long, none of the rows is known better than another, and all count.
+        """
+        side, known = [], []
+        for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):
+            play = _core.model.play(motion, radius, start=motion[0] - s * radius)
+            side.append(np.clip((motion - play) / radius, -1.0, 1.0))
+            covered = np.maximum.accumulate(motion) - np.minimum.accumulate(motion)
+            known.append(covered >= 2.0 * radius)
+        all_known = np.concatenate(known)
+        return cls(np.concatenate(side), all_known if all_known.any() else ~all_known, radius)

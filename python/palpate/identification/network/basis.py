@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wavelets without weights: how finely data resolve them, and the frames that a selection starts from.
+
+The members of a frame (paper section 2.4) are a0^(-m/2) psi_v(a0^(-m) x - k b0) over all integers m and k,
+with V voices psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the same step b0.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..._typing import Float1D, Float2D
+from ...arguments import number_of
+from ...errors import InputError
+from ..data.limits import distinct_rows
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Wavelets without their weights: dilations alpha (N, d) > 0 and translations beta (N, d)."""
+
+    alpha: Float2D
+    beta: Float2D
+
+    @staticmethod
+    def empty(dimension: int) -> "Basis":
+        return Basis(np.zeros((0, dimension)), np.zeros((0, dimension)))
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    def joined(self, other: "Basis") -> "Basis":
+        return Basis(np.concatenate([self.alpha, other.alpha]), np.concatenate([self.beta, other.beta]))
+
+    def without(self, index: int) -> "Basis":
+        return Basis(np.delete(self.alpha, index, axis=0), np.delete(self.beta, index, axis=0))
+
+
+class Resolution:
+    """Distances from any place to the distinct ones of some positions (m, d)."""
+
+    def __init__(self, positions: Float2D) -> None:
+        distinct = positions[distinct_rows(positions)[0]]
+        self._sorted = distinct[:, 0] if distinct.shape[1] == 1 else None
+        self._tree = cKDTree(distinct) if self._sorted is None else None
+        self._size = len(distinct)
+
+    def __len__(self) -> int:
+        return self._size
+
+    def reach(self, places: Float2D, count: int) -> Float1D:
+        """(N,) distance from each place (N, d) within which there are count positions, 1 <= count <= len."""
+        if self._tree is not None:
+            return np.asarray(self._tree.query(places, k=[count])[0])[:, 0]
+        # On a line the nearest ones are neighbours: the best of the windows of count positions around it.
+        assert self._sorted is not None
+        last = self._size - count
+        first = np.searchsorted(self._sorted, places[:, 0])[:, None] - np.arange(count + 1)
+        first = np.clip(first, 0, last)
+        left, right = self._sorted[first], self._sorted[first + count - 1]
+        return np.asarray(np.maximum(places - left, right - places).min(axis=1))
+
+
+COARSEST_CANDIDATE = 1.0
+"""Dilation of the frame's coarsest level [1/box]."""
+
+LIBRARY_ENTRIES = 2**23
+"""Numbers that a library may hold: with many rows it has fewer candidates."""
+
+NEGLIGIBLE = 1e-14
+"""Spectral products below this share of the first one cannot change a printed digit of the bounds."""
+
+
+def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
+    """Daubechies' estimate of the frame bounds of the unit-norm Mexican hat (Daubechies 1990, section II.C).
+
+    A, B = (2 pi / b0) (inf, sup over 1 <= |xi| <= a0 of sum_v sum_m |psi_v^(a0^m xi)|^2
+    -/+ sum_v sum_(k != 0) [beta_v(2 pi k / b0) beta_v(-2 pi k / b0)]^(1/2)), with
+    beta_v(s) = sup over xi of sum_m |psi_v^(a0^m xi)| |psi_v^(a0^m xi + s)|.
+
+    Parameters
+    ----------
+    a0 : float
+        Ratio of neighbouring dilations, above 1.
+    b0 : float
+        Translation step, above 0, the same for every voice.
+    voices : int
+        Dilations per octave.
+
+    Returns
+    -------
+    (A, B) : tuple of float
+        The closer B/A is to 1, the tighter the frame; with A <= 0 the estimate cannot show that it is one.
+
+    Raises
+    ------
+    palpate.InputError
+        Naming the argument that is out of its range.
+    """
+    a0, b0, whole = number_of("a0", a0), number_of("b0", b0), number_of("voices", voices)
+    if not a0 > 1.0:
+        raise InputError(f"a0 is {a0!r}; the ratio of neighbouring dilations must be a finite number above 1")
+    if not b0 > 0.0:
+        raise InputError(f"b0 is {b0!r}; the translation step must be a finite number above 0")
+    if int(whole) != whole or whole < 1:
+        raise InputError(f"voices is {voices!r}; it must be a whole number of 1 or more")
+    # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, whatever the voice
+    levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)
+    frequency = np.linspace(1.0, a0, 1001)[:, None] * a0**levels
+    diagonal, cross = np.zeros(len(frequency)), 0.0
+    for stretch in 2.0 ** (-np.arange(voices) / voices):
+        here = _spectrum(frequency / stretch)
+        diagonal += (here * here).sum(axis=1)
+        shift, first = 1, 0.0
+        while True:
+            step = 2.0 * np.pi * shift / b0
+            # psi^ is even: the supremum over -xi at +s is the one over xi at -s, so both factors are this one
+            overlap = max(
+                float((here * _spectrum((frequency + sign * step) / stretch)).sum(axis=1).max())
+                for sign in (1, -1)
+            )
+            cross += 2.0 * overlap
+            first = max(first, overlap)
+            if overlap <= NEGLIGIBLE * first or overlap < np.finfo(float).tiny:
+                break
+            shift += 1
+    unit = 2.0 * np.pi / b0
+    return float(unit * (diagonal.min() - cross)), float(unit * (diagonal.max() + cross))
+
+
+def _spectrum(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fourier transform (unitary) of the unit-norm Mexican hat, without its sign."""
+    return np.asarray(2.0 / np.sqrt(3.0) * np.pi**-0.25 * frequency**2 * np.exp(-0.5 * frequency**2))
+
+
+def truncated_frame(
+    positions: Float2D,
+    *,
+    coarsest: float,
+    finest: float,
+    frame_scale: float,
+    frame_step: float,
+    max_candidates: int,
+) -> Basis:
+    """Members of the single-scaling frame that have data within them, from coarsest to finest.
+
+    Each level's translations are found by walking from the data to the lattice points around it, so that the
+    full grid, whose size grows exponentially with the inputs, is never built. From the first level that would
+    bring more than max_candidates members on, only those at lattice points that most data are nearest to are
+    taken, and finer levels are left out: refinement reaches what is finer.
+
+    positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
+    """
+    d = positions.shape[1]
+    # around a lattice point stand 3^d others: beyond three inputs only those along an input are walked to
+    around = product((-1, 0, 1), repeat=d) if d <= 3 else (*np.eye(d), *-np.eye(d), np.zeros(d))
+    offsets = np.array(list(around), dtype=np.int64)
+    alpha: list[Float2D] = []
+    beta: list[Float2D] = []
+    left, dilation = max_candidates, coarsest
+    while dilation <= finest and left > 0:
+        step = frame_step / dilation
+        nearest = np.rint(positions / step).astype(np.int64)
+        chosen, _, count = distinct_rows(nearest)
+        nearest = nearest[chosen]
+        if len(nearest) <= left:
+            lattice = (nearest[:, None, :] + offsets).reshape(-1, d)
+            lattice = lattice[distinct_rows(lattice)[0]]
+            if len(lattice) > left:
+                lattice = nearest
+        else:
+            lattice = nearest[np.argsort(-count, kind="stable")[:left]]
+        beta.append(np.asarray(lattice * step))
+        alpha.append(np.full((len(lattice), d), dilation))
+        left -= len(lattice)
+        dilation *= frame_scale
+    if not alpha:
+        return Basis.empty(d)
+    return Basis(np.concatenate(alpha), np.concatenate(beta))

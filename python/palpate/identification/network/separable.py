@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The separable least-squares problem: linear in weights, slope and bias once the wavelets are given.
+
+A network f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c.x + b (paper eq. 4) is fitted to weighted rows.
+With hysteresis, f = g(x) + s h(x), where g and h share their wavelets and each wavelet has two weights.
+If s is only ever +1 or -1 the strokes are two independent least squares over the same wavelets, in the
+coordinates g + h and g - h: two blocks of one channel each. For s in between it is one block of two
+channels, 1 and s.
+
+Positions stand in the unit box of the data here, so that dilations and translations compare.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
+
+from ..._core.model import wavelet_columns, wavelet_steps
+from ..._typing import Float1D, Float2D
+from ..data.compression import Compressed
+from ..data.held_out import HeldOutRows
+from ..data.limits import NO_LIMITS, RESOLVED, RowLimits
+from .basis import Basis, Resolution
+
+RIDGE = 1e-11
+"""Relative ridge on unit-norm columns: keeps a nearly dependent basis solvable, far below any noise."""
+
+
+def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve a positive semidefinite system by Cholesky on unit-norm columns."""
+    factor, norm = factored(gram)
+    columns = right.reshape(len(gram), -1) / norm[:, None]
+    solved, _ = dpotrs(factor, columns, lower=1)
+    return np.asarray(solved / norm[:, None]).reshape(right.shape)
+
+
+def half_solved(gram: Float2D, right: Float2D) -> Float2D:
+    """M right with M' M the inverse of the system: products of what it returns are those of projections."""
+    factor, norm = factored(gram)
+    solved, _ = dtrtrs(factor, right / norm[:, None], lower=1)
+    return np.asarray(solved)
+
+
+def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
+    """(L, norm) with gram = D L L' D, D = diag(norm); only the lower triangle of L counts.
+
+    The ridge is raised until the factorisation succeeds.
+    """
+    norm = np.sqrt(np.diag(gram))
+    norm = np.where(norm > 0.0, norm, 1.0)
+    scaled = gram / (norm[:, None] * norm)
+    diagonal = np.einsum("ii->i", scaled)
+    unit, ridge = diagonal.copy(), RIDGE
+    while True:
+        diagonal[:] = unit + ridge
+        factor, failed = dpotrf(scaled, lower=1)
+        if not failed:
+            return factor, norm
+        ridge *= 100.0
+
+
+CORE = float(np.sqrt(3.0))
+"""|u| of a wavelet's side lobe: what lies within is the core that data must resolve."""
+
+NOISE_WIDTHS = 5.0
+"""Standard deviations of the position's noise that half of a wavelet's core holds at least [-]"""
+
+STRUCTURED = 3.0
+"""Standard errors of the correlation of neighbouring residuals above which they are no noise."""
+
+SLIDES = 0.9
+"""Hysteresis input s beyond which a row belongs to its stroke [-]"""
+
+TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Weighted rows and their channels: force = sum_k channel_k * (network k at the row's position)."""
+
+    positions: Float2D
+    """(m, d) in the unit box"""
+    target: Float1D
+    """(m,) sqrt(weight) * force"""
+    channels: Float2D
+    """(m, channels) sqrt(weight) * channel"""
+
+    @staticmethod
+    def weighted(positions: Float2D, force: Float1D, weight: Float1D, channels: Float2D) -> Block:
+        root = np.sqrt(weight)
+        return Block(np.ascontiguousarray(positions), root * force, root[:, None] * channels)
+
+    @property
+    def n_channels(self) -> int:
+        return int(self.channels.shape[1])
+
+    def strokes(self) -> list[Float2D]:
+        """Positions of the rows of each stroke: of those that slide, where a play lies between the strokes.
+
+        A wavelet that only one stroke resolves would leave its two weights undetermined.
+        """
+        if self.n_channels == 1:
+            return [self.positions]
+        side = self.channels[:, 1] / self.channels[:, 0]
+        sliding = [self.positions[sign * side > SLIDES] for sign in (1.0, -1.0)]
+        return [rows if len(rows) else self.positions for rows in sliding]
+
+    def design(self, wavelets: Float2D) -> Float2D:
+        """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
+        first, n = 1 + self.positions.shape[1], wavelets.shape[1]
+        design = np.empty((self.n_channels, first + n, len(wavelets)))
+        for columns, channel in zip(design, self.channels.T, strict=True):
+            columns[0] = channel
+            np.multiply(self.positions.T, channel, out=columns[1:first])
+            np.multiply(wavelets.T, channel, out=columns[first:])
+        return design.reshape(-1, len(wavelets)).T
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Least squares at a fixed basis."""
+
+    basis: Basis
+    coefficients: Float2D
+    """(channels, 1 + d + N), the channels of all blocks one under the other: bias, linear, weights"""
+    rss: float
+    """Residual sum of squares about the rows' mean forces"""
+    objective: float
+    """rss plus the price of the weights' prior: what refinement lowers"""
+    designs: tuple[Float2D, ...]
+    grams: tuple[Float2D, ...]
+    """design' design of every block, plus the prior on the weights"""
+    residuals: tuple[Float1D, ...]
+
+
+@dataclass(frozen=True)
+class SeparableProblem:
+    """Rows, channels, and the prior that makes every basis solvable."""
+
+    blocks: tuple[Block, ...]
+    readout: Float2D
+    """(1, channels) or (2, channels): g (and h) as combinations of the channels' networks"""
+    samples: float
+    """Samples of the compressed recording"""
+    within: float
+    """Sum of squares inside its rows [force^2]"""
+    force_range: float
+    """Largest less smallest force, above 0"""
+    resolved_by: int
+    """Distinct positions of every block that a wavelet's core must hold; at most as many as there are"""
+    held_out: HeldOutRows | None = None
+    """Rows held out, for the criteria that judge on them"""
+    limits: RowLimits = NO_LIMITS
+    """What limits the information in the samples"""
+    prior: float = 0.0
+    """Price of a squared weight; see :meth:`with_prior`"""
+    resolutions: tuple[Resolution, ...] = ()
+    """Of the strokes of all blocks; computed where not given"""
+
+    def __post_init__(self) -> None:
+        known = self.resolutions or tuple(
+            Resolution(rows) for block in self.blocks for rows in block.strokes()
+        )
+        object.__setattr__(self, "resolutions", known)
+        object.__setattr__(self, "resolved_by", min(self.resolved_by, *map(len, known)))
+
+    @property
+    def dimension(self) -> int:
+        """Inputs of the force."""
+        return int(self.blocks[0].positions.shape[1])
+
+    @property
+    def n_channels(self) -> int:
+        """Channels of all blocks."""
+        return sum(block.n_channels for block in self.blocks)
+
+    def n_parameters(self, n_wavelets: int) -> int:
+        """Fitted numbers: d dilations, d translations and a weight a channel; a slope and bias a channel."""
+        return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
+
+    def total(self, rss: float) -> float:
+        """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
+        least = max(RESOLVED * self.force_range, self.limits.force_error)
+        return max(rss + self.within, least**2 * self.samples, TINY)
+
+    @property
+    def independent(self) -> float:
+        """Independent samples, of all samples."""
+        return self.limits.independent * self.samples
+
+    def rmse(self, solution: Solution) -> float:
+        """Root mean square error over all samples [force]."""
+        return float(np.sqrt((solution.rss + self.within) / self.samples))
+
+    def resolved_rmse(self, solution: Solution) -> float:
+        """The same, but never less than a sensor resolves: what other errors are measured by."""
+        return float(np.sqrt(self.total(solution.rss) / self.samples))
+
+    def evenness(self, solution: Solution) -> float:
+        """Median over RMS of the residuals, 1 for normal noise; small where a few places hold the error."""
+        residual = np.abs(np.concatenate(solution.residuals))
+        return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
+
+    def likeness(self, solution: Solution) -> float:
+        """Correlation of what is left at neighbouring positions, in standard errors; one channel, d = 1."""
+        if self.dimension > 1 or self.n_channels > 1:
+            return 0.0
+        (residual,) = solution.residuals
+        alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
+        return alike * float(np.sqrt(len(residual)))
+
+    def structured(self, solution: Solution) -> bool:
+        """True if what is left at neighbouring rows of some block is correlated."""
+        return any(
+            float(left[1:] @ left[:-1]) * float(np.sqrt(len(left))) > STRUCTURED * float(left @ left)
+            for left in solution.residuals
+        )
+
+    def errors(self, solution: Solution, rows: HeldOutRows) -> Float1D:
+        """Force less the solution's at rows that the problem was not made of."""
+        return rows.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
+
+    def with_prior(self, rss: float) -> SeparableProblem:
+        """The problem with a price on large weights: each is expected within the force range.
+
+        The price is as firm as one sample at this noise level, from the residual sum of squares.
+
+        Without it, a stroke that has no data where the other one does could give a wavelet there any weight.
+        """
+        return replace(self, prior=self.total(rss) / self.samples / self.force_range**2)
+
+    def finest(self, beta: Float2D) -> Float2D:
+        """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
+        reach = np.max([each.reach(beta, self.resolved_by) for each in self.resolutions], axis=0)
+        least = max(NOISE_WIDTHS * self.limits.position_noise, 1e-9)
+        return np.asarray(CORE / np.maximum(reach, least))[:, None]
+
+    def solve(self, basis: Basis) -> Solution:
+        """Weights, slopes and biases of all channels for this basis."""
+        tables, designs, grams = [], [], []
+        for block in self.blocks:
+            design = block.design(wavelet_columns(block.positions, basis.alpha, basis.beta))
+            gram = self._gram(block, design)
+            found = solve_gram(gram, design.T @ block.target)
+            tables.append(found.reshape(block.n_channels, -1))
+            designs.append(design)
+            grams.append(gram)
+        return self._solution(basis, np.concatenate(tables), tuple(designs), tuple(grams))
+
+    def with_coefficients(self, solution: Solution, coefficients: Float2D) -> Solution:
+        """Other coefficients (channels, 1 + d + N) on the wavelets of a solution, with the errors they leave.
+
+        The solution may be that of another problem with the same positions.
+        """
+        return self._solution(solution.basis, coefficients, solution.designs, solution.grams)
+
+    def _solution(
+        self,
+        basis: Basis,
+        coefficients: Float2D,
+        designs: tuple[Float2D, ...],
+        grams: tuple[Float2D, ...],
+    ) -> Solution:
+        residuals = tuple(
+            block.target - design @ table.ravel()
+            for block, design, table in zip(self.blocks, designs, self._tables(coefficients), strict=True)
+        )
+        rss = float(sum(residual @ residual for residual in residuals))
+        price = self.prior * float((coefficients[:, 1 + self.dimension :] ** 2).sum())
+        return Solution(basis, coefficients, rss, rss + price, designs, grams, residuals)
+
+    def _tables(self, coefficients: Float2D) -> list[Float2D]:
+        """The coefficients of each block."""
+        ends = np.cumsum([block.n_channels for block in self.blocks])
+        return np.split(coefficients, ends[:-1])
+
+    def normal_equations(self, at: Solution) -> tuple[Float2D, Float1D]:
+        """Gauss-Newton matrix and descent direction of variable projection at a solved basis.
+
+        With the linear unknowns eliminated the residual is P y, P the projector off the design's columns,
+        and its Jacobian in Kaufman's form is -P (d design/d theta) coefficients (Golub & Pereyra 1973,
+        Kaufman 1975). Steps are dimensionless, d log(alpha) and alpha d(beta), ordered (quantity, input,
+        wavelet).
+        """
+        basis = at.basis
+        size = 2 * self.dimension * len(basis)
+        matrix, gradient = np.zeros((size, size)), np.zeros(size)
+        for block, design, gram, table, residual in zip(
+            self.blocks, at.designs, at.grams, self._tables(at.coefficients), at.residuals, strict=True
+        ):
+            jacobian = wavelet_steps(block.positions, basis.alpha, basis.beta)
+            slope = (table[:, 1 + self.dimension :].T @ block.channels.T)[None]
+            by_step = jacobian.T.reshape(2 * self.dimension, *slope.shape[1:])
+            np.multiply(by_step, slope, out=by_step)
+            cross = design.T @ jacobian
+            spanned = half_solved(gram, cross)
+            matrix += jacobian.T @ jacobian - spanned.T @ spanned
+            gradient += jacobian.T @ residual
+        return matrix, gradient
+
+    def removal_costs(self, solution: Solution) -> Float1D:
+        """Growth of the objective (N,) if one wavelet left and the linear unknowns were solved again."""
+        n, first = len(solution.basis), 1 + self.dimension
+        cost = np.zeros(n)
+        for block, gram, table in zip(
+            self.blocks, solution.grams, self._tables(solution.coefficients), strict=True
+        ):
+            inverse = solve_gram(gram, np.eye(len(gram)))
+            weights = table[:, first:].T
+            columns = np.arange(block.n_channels) * (first + n) + first + np.arange(n)[:, None]
+            minors = inverse[columns[:, :, None], columns[:, None, :]]
+            cost += np.einsum("nk,nk->n", weights, np.linalg.solve(minors, weights[:, :, None])[:, :, 0])
+        return cost
+
+    def _gram(self, block: Block, design: Float2D) -> Float2D:
+        gram = design.T @ design
+        of_weights = np.einsum("ii->i", gram).reshape(block.n_channels, -1)[:, 1 + self.dimension :]
+        of_weights += self.prior
+        return np.asarray(gram)
+
+
+def problem_of(
+    rows: Compressed, *, resolved_by: int, held_out: HeldOutRows | None = None
+) -> SeparableProblem:
+    """The problem of compressed rows (positions in the unit box): one channel, two strokes, or 1 and s."""
+    if rows.side is None:
+        blocks = [Block.weighted(rows.positions, rows.force, rows.weight, np.ones((len(rows.force), 1)))]
+        readout = np.array([[1.0]])
+    elif np.all(np.abs(rows.side) == 1.0) and np.unique(rows.side).size == 2:
+        blocks = [
+            Block.weighted(rows.positions[on], rows.force[on], rows.weight[on], np.ones((int(on.sum()), 1)))
+            for on in (rows.side > 0, rows.side < 0)
+        ]
+        readout = np.array([[0.5, 0.5], [0.5, -0.5]])
+    else:
+        channels = np.column_stack([np.ones_like(rows.side), rows.side])
+        blocks = [Block.weighted(rows.positions, rows.force, rows.weight, channels)]
+        readout = np.eye(2)
+    return SeparableProblem(
+        tuple(blocks),
+        readout,
+        samples=rows.samples,
+        within=rows.within,
+        force_range=float(np.ptp(rows.force)) or float(np.abs(rows.force).max()) or 1.0,
+        resolved_by=resolved_by,
+        held_out=held_out,
+        limits=rows.limits,
+    )

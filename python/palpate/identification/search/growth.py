@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How many wavelets? Grow one, refine all, and when the criterion stops growth, prune and refine again.
+
+Growth takes the best frame member by one step of forward orthogonal selection against the refined network, so
+it sees what is still missing. Pruning removes what refinement made superfluous, coincident wavelets first of
+all, since of two that coincide one costs nothing to remove. N is thus decided again on the refined network.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._typing import Float1D
+from ..data.limits import RESOLVED
+from ..network.basis import COARSEST_CANDIDATE, LIBRARY_ENTRIES, Basis, truncated_frame
+from ..network.fitted import PathPoint
+from ..network.refinement import refine, refine_all
+from ..network.separable import SeparableProblem, Solution
+from ..options import IdentifyOptions
+from .criteria import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
+from .selection import Library, orthogonal_gains, residual_gains, select_backward
+
+PRUNE_CANDIDATES = 3
+"""Wavelets tried for removal before pruning gives up."""
+
+PRUNE_HOPE = 6.0
+"""A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
+
+WITHOUT_NOISE = 5
+"""Positions that a wavelet's core must hold where there is hardly any noise to be taken for structure."""
+
+LEAST_EVENNESS = 0.5
+"""Evenness of what a network leaves from which it is noise, and no finer wavelet is tried."""
+
+WORTH_FINER = 4.0
+"""How many times smaller the error must become by wavelets finer than noise would allow."""
+
+SIGNIFICANT_CORRELATION = 3.0
+"""Standard errors of the correlation of what is left at neighbouring positions from which it is no noise."""
+
+SMOOTH = 0.25
+"""Share of the positions that a core holds at least while a force over several inputs is tried as smooth."""
+
+STRETCHED = 64
+"""Members of the frame that are tried stretched along each input, where there are several."""
+
+STARTS = 5
+"""Of these, candidates that are refined before one is taken."""
+
+FIRST_STEPS = 4
+"""Refinement steps that they are judged by."""
+
+GROWING_TOLERANCE = 0.4
+"""While the size is open, refinement ends at steps that lower the deviance by less."""
+
+FINAL_TOLERANCE = 0.04
+"""The same for the accepted network."""
+
+
+@dataclass(frozen=True)
+class Grown:
+    """The network that growth settled on."""
+
+    problem: SeparableProblem
+    """Which the solution solves, with the prior and the resolution that growth ended with"""
+    solution: Solution
+    criterion: float
+    stop_reason: str
+    path: tuple[PathPoint, ...]
+
+
+class Growth:
+    """Grows networks by the search settings of an identification.
+
+    Parameters
+    ----------
+    options : IdentifyOptions
+    single : bool
+        The force is known to be single-valued: two strokes that a motion samples at different places look
+        like one force that needs ever more wavelets.
+    """
+
+    def __init__(self, options: IdentifyOptions, *, single: bool = True) -> None:
+        self._options, self._single = options, single
+        self._refine = refine_all if options.refinement == "quasi-newton" else refine
+
+    def grow(
+        self,
+        problem: SeparableProblem,
+        start: Basis,
+        model_class: str,
+        *,
+        most: int | None = None,
+        library: Library | None = None,
+    ) -> Grown:
+        """Grows from the wavelets of start to `most` wavelets at most.
+
+        If the residual is still structured, it continues with narrower wavelets than noise would allow. Noise
+        is as large everywhere, and differs from each position to the next. Finer wavelets are taken where
+        they leave a fraction of the error, or where neighbouring residuals are correlated and the criterion
+        falls as for a model class. This holds for a single-valued force alone, not for wavelets that stay on
+        the frame, nor where held-out rows judge. A smooth force over several inputs is left to wide wavelets.
+        Correlated noise, and the steps of a force, look like structure and are not.
+        """
+        options = self._options
+        most = options.max_wavelets if most is None else most
+        coarse = not options.refine or options.selection == "backward"
+        free = self._single and not coarse and problem.n_channels == 1
+        free = free and options.criterion not in ON_HELD_OUT_ROWS
+        wide = free and problem.dimension > 1
+        library = library or self.library(problem)
+        found = self._grown(problem, library, start, model_class, most, wide=wide)
+        problem = found.problem
+        settled = wide and _little(problem, problem.rmse(found.solution))
+        if not free or settled or len(found.solution.basis) == 0:
+            return found
+        limits = problem.limits
+        if limits.independent < 1.0 or problem.rmse(found.solution) <= WORTH_FINER * limits.force_error:
+            return found
+        alike = problem.likeness(found.solution) > SIGNIFICANT_CORRELATION
+        even = problem.evenness(found.solution) >= LEAST_EVENNESS
+        if problem.resolved_by <= WITHOUT_NOISE or (even and not alike):
+            return found
+        fine = replace(problem, resolved_by=WITHOUT_NOISE)
+        finer = self._grown(fine, self.library(fine), found.solution.basis, model_class, most)
+        earned = alike and finer.criterion + options.rung_evidence < found.criterion
+        if earned or problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
+            return replace(finer, path=(*found.path[:-1], finer.path[-1]))
+        return replace(found, problem=problem.with_prior(found.solution.rss))
+
+    def library(self, problem: SeparableProblem) -> Library:
+        """The truncated frame over the rows of a problem, down to what they resolve."""
+        options = self._options
+        positions = np.concatenate([block.positions for block in problem.blocks])
+        frame = truncated_frame(
+            positions,
+            coarsest=COARSEST_CANDIDATE,
+            finest=float(problem.finest(positions).max()),
+            frame_scale=options.frame_scale,
+            frame_step=options.frame_step,
+            max_candidates=max(1, min(options.max_candidates, LIBRARY_ENTRIES // len(positions))),
+        )
+        return Library(problem, frame)
+
+    def prune(self, problem: SeparableProblem, start: Solution) -> tuple[SeparableProblem, Solution]:
+        """Removes wavelets, the cheapest first, while the refined remainder has a smaller criterion.
+
+        The prior of the problem that is returned is that of the last trial.
+        """
+        current, value = start, self._judged(problem, start)
+        removed = True
+        while removed and len(current.basis):
+            removed = False
+            costs = problem.removal_costs(current)
+            for index in np.argsort(costs)[:PRUNE_CANDIDATES]:
+                rest = problem.solve(current.basis.without(int(index)))
+                if self._judged(problem, rest) > value + PRUNE_HOPE * self._price(problem, current):
+                    break
+                problem, trial = self._improved(problem, rest, self._options.refine_steps)
+                if self._judged(problem, trial) < value:
+                    current, value, removed = trial, self._judged(problem, trial), True
+                    break
+        return problem, current
+
+    def _grown(
+        self,
+        problem: SeparableProblem,
+        library: Library,
+        start: Basis,
+        model_class: str,
+        most: int,
+        *,
+        starts: int = STARTS,
+        wide: bool = False,
+    ) -> Grown:
+        """Grows from the wavelets of start until the criterion stops it, prunes, refines to the end.
+
+        Growth continues for `patience` wavelets past the best size, and pruning starts from there: a few
+        wavelets too many let refinement find a better arrangement of the others. Where held-out rows judge,
+        they choose the size and nothing is pruned. With wide, wide wavelets alone have one try, once the
+        error is half way, in digits, from the force's range to what a sensor resolves.
+        """
+        options = self._options
+        criterion = options.criterion
+        problem = problem.with_prior(problem.solve(start).rss)
+        if options.selection == "backward":
+            selected = select_backward(problem, library, max_wavelets=most, criterion=criterion)
+            start = start.joined(library.members(selected.order[: selected.best]))
+        problem, current = self._improved(problem, problem.solve(start), options.refine_steps)
+        path, grown = [self._point(problem, current, model_class)], [current]
+        best, since, stop_reason = path[0].criterion, 0, "max_wavelets"
+        while len(current.basis) < most:
+            report(model_class, len(current.basis))
+            if enough(criterion, path[-1].criterion) or options.selection == "backward":
+                stop_reason = criterion
+                break
+            if wide and problem.rmse(current) <= np.sqrt(RESOLVED) * problem.force_range:
+                wide = False
+                if (smooth := self._smooth(problem, start, model_class, most)) is not None:
+                    return smooth
+            added = self._with_candidate(problem, library, current, starts)
+            if added is None:
+                stop_reason = "data"
+                break
+            problem, current = self._improved(problem, added, options.refine_steps)
+            path.append(self._point(problem, current, model_class))
+            grown.append(current)
+            since = 0 if path[-1].criterion < best else since + 1
+            best = min(best, path[-1].criterion)
+            if since >= options.patience * problem.dimension:
+                stop_reason = criterion
+                break
+        if problem.held_out is not None and criterion in ON_HELD_OUT_ROWS:
+            values = [point.criterion for point in path]
+            pruned = grown[choice(criterion, values, len(problem.held_out.force))]
+        else:
+            problem, pruned = self.prune(problem, current)
+        problem, final = self._improved(problem, pruned, options.final_steps, FINAL_TOLERANCE)
+        path.append(self._point(problem, final, model_class))
+        if len(final.basis) < most and stop_reason == "max_wavelets":
+            stop_reason = criterion
+        return Grown(problem, final, path[-1].criterion, stop_reason, tuple(path))
+
+    def _smooth(self, problem: SeparableProblem, start: Basis, model_class: str, most: int) -> Grown | None:
+        """A network of wide wavelets, if its error is small.
+
+        The best candidates are mostly narrow: each corrects a few rows, and rows are far apart over several
+        inputs, so that a network of them fits the rows well and errs between and beside them. Wide ones
+        cannot. Where rows of one cell differ by more there is no need to try.
+        """
+        if not _little(problem, np.sqrt(problem.within / problem.samples)):
+            return None
+        held = max(problem.resolved_by, int(SMOOTH * len(problem.blocks[0].positions)))
+        smooth = replace(problem, resolved_by=held)
+        found = self._grown(smooth, self.library(smooth), start, model_class, most, starts=1)
+        if not _little(problem, problem.rmse(found.solution)):
+            return None
+        return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
+
+    def _price(self, problem: SeparableProblem, solution: Solution) -> float:
+        """What the criterion charges for one of the solution's wavelets."""
+        price, n = CRITERIA[self._options.criterion], len(solution.basis)
+        return price(problem.independent, problem.n_parameters(n)) - price(
+            problem.independent, problem.n_parameters(n - 1)
+        )
+
+    def _with_candidate(
+        self, problem: SeparableProblem, library: Library, current: Solution, starts: int
+    ) -> Solution | None:
+        """The network with the frame member that helps most, or None where data allow no further wavelet.
+
+        The frame has one dilation for all inputs. Where there are several, members are tried stretched along
+        each of them as well, and a few that differ are refined a little before one is taken: what fits best
+        unrefined often ends in a worse minimum.
+        """
+        options = self._options
+        if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.independent:
+            return None
+        measured = residual_gains if options.selection == "residual" else orthogonal_gains
+        gains = measured(library, current)
+        several = problem.dimension > 1 and options.refine
+        if several:
+            library = library.stretched(problem, _falling(gains)[:STRETCHED])
+            gains = measured(library, current)
+        chosen = library.unlike(_falling(gains), starts if several else 1)
+        tried = [problem.solve(current.basis.joined(library.members([index]))) for index in chosen]
+        if len(tried) > 1:
+            tried = [
+                self._refine(problem, each, steps=FIRST_STEPS, tolerance=GROWING_TOLERANCE) for each in tried
+            ]
+        return min(tried, key=lambda solution: solution.objective, default=None)
+
+    def _improved(
+        self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
+    ) -> tuple[SeparableProblem, Solution]:
+        """Refines, then lets the prior on the weights follow the noise level that is left."""
+        if self._options.refine:
+            solution = self._refine(problem, solution, steps=steps, tolerance=tolerance)
+        problem = problem.with_prior(solution.rss)
+        return problem, problem.solve(solution.basis)
+
+    def _judged(self, problem: SeparableProblem, solution: Solution) -> float:
+        return criterion_of(problem, solution, self._options.criterion)
+
+    def _point(self, problem: SeparableProblem, solution: Solution, model_class: str) -> PathPoint:
+        return PathPoint(
+            model_class, len(solution.basis), problem.rmse(solution), self._judged(problem, solution)
+        )
+
+
+def _little(problem: SeparableProblem, error: float) -> bool:
+    """True if an error is so near to what a sensor resolves that finer wavelets are not worth trying."""
+    return bool(error <= WORTH_FINER * RESOLVED * problem.force_range)
+
+
+def _falling(gains: Float1D) -> NDArray[np.intp]:
+    """The numbers of the candidates that gain anything, the best first."""
+    return np.argsort(-gains, kind="stable")[: np.count_nonzero(gains > 0.0)]

@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Selection from a library: forward orthogonal, residual-based, backward elimination (Zhang 1997).
+
+Forward orthogonal least squares (Chen, Billings & Luo 1989) asks what a candidate adds to those before it.
+
+Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates
+the projections of all others by one product with its orthonormalised columns. Linear and bias columns are
+always in. A candidate that the design already spans is never taken, so the factors stay well conditioned.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._core.model import wavelet_columns
+from ..._typing import Float1D, Float2D
+from ..network.basis import Basis
+from ..network.refinement import COARSEST
+from ..network.separable import SeparableProblem, Solution, half_solved
+from .criteria import deviance
+
+DEPENDENT = 1e-5
+"""Share of a candidate's squared norm that must stand outside the design for it to be a new direction: more
+than the rounding of seven digits."""
+
+AT_ONCE = 64
+"""Candidates whose columns are computed at a time: as many as a processor's cache holds."""
+
+UNLIKE = 1.0
+"""Distance in units of a wavelet, or difference of log(alpha), from which two may end in different minima."""
+
+STRETCHES = (0.25, 0.5, 2.0, 4.0)
+"""What the dilation of a candidate along one input is multiplied by."""
+
+
+class Library:
+    """Candidate wavelets with their weighted columns on every block, computed once.
+
+    Seven digits are enough to rank candidates and take half the memory, which is what a library costs.
+    """
+
+    def __init__(self, problem: SeparableProblem, candidates: Basis) -> None:
+        resolved = np.all(candidates.alpha <= problem.finest(candidates.beta), axis=1)
+        self.basis = Basis(candidates.alpha[resolved], candidates.beta[resolved])
+        self.columns: list[NDArray[np.float32]] = []
+        """(channels, candidates, m) of every block"""
+        self.grams: list[Float2D] = []
+        """(channels, channels, candidates) products of a candidate's columns"""
+        for block in problem.blocks:
+            self.columns.append(np.empty((block.n_channels, len(self), len(block.target)), np.float32))
+            self.grams.append(np.empty((block.n_channels, block.n_channels, len(self))))
+            for first in range(0, len(self), AT_ONCE):
+                part = slice(first, first + AT_ONCE)
+                wavelets = wavelet_columns(block.positions, self.basis.alpha[part], self.basis.beta[part])
+                weighted = wavelets.T * block.channels.T[:, None]
+                self.columns[-1][:, part] = weighted
+                self.grams[-1][:, :, part] = np.einsum("knm,lnm->kln", weighted, weighted)
+
+    def __len__(self) -> int:
+        return len(self.basis)
+
+    def members(self, order: Sequence[int] | NDArray[np.intp]) -> Basis:
+        """The candidates of these numbers."""
+        chosen = np.asarray(order, dtype=np.intp)
+        return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
+
+    def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
+        """The candidates of these numbers, and each with its dilation along one input changed."""
+        chosen, d = self.members(order), problem.dimension
+        combinations = [(factor, k) for k in range(d) for factor in STRETCHES]
+        factors = np.ones((1 + len(combinations), 1, d))
+        for place, (factor, k) in enumerate(combinations, start=1):
+            factors[place, :, k] = factor
+        alpha = np.maximum(chosen.alpha * factors, COARSEST).reshape(-1, d)
+        return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
+
+    def unlike(self, order: NDArray[np.intp], count: int) -> list[int]:
+        """The first of these numbers, so many at most, that stand apart or differ in a dilation."""
+        chosen: list[int] = []
+        while len(order) and len(chosen) < count:
+            chosen.append(int(order[0]))
+            one, others = self.members(order[:1]), self.members(order)
+            shift = np.abs(one.beta - others.beta) * np.sqrt(one.alpha * others.alpha)
+            stretch = np.abs(np.log(one.alpha / others.alpha))
+            order = order[np.maximum(shift, stretch).max(axis=1) > UNLIKE]
+        return chosen
+
+
+class OrthogonalSelection:
+    """One forward selection: start from a solved basis, ask for gains, take candidates.
+
+    For each block a candidate's columns (one a channel) have a projected Gram matrix S and a product z with
+    the residual; the residual sum of squares falls by z' S^-1 z, summed over the blocks.
+    """
+
+    def __init__(self, library: Library, start: Solution) -> None:
+        self._library = library
+        self._factors = [np.linalg.qr(design)[0] for design in start.designs]
+        self._residuals = list(start.residuals)
+        self._grams, self._products = [], []
+        for columns, gram, factor, residual in zip(
+            library.columns, library.grams, self._factors, self._residuals, strict=True
+        ):
+            products = _products(np.vstack([factor.T, residual]), columns)
+            self._grams.append(gram - _projected_gram(products[:, :-1]))
+            self._products.append(products[:, -1])
+
+    def gains(self) -> Float1D:
+        """(candidates,) fall of the residual sum of squares if that candidate were taken next."""
+        total = np.zeros(len(self._library))
+        for gram, left, product in zip(self._library.grams, self._grams, self._products, strict=True):
+            total += _falls(gram, left, product)
+        return total
+
+    def take(self, index: int) -> float:
+        """Add a candidate; returns the residual sum of squares over all blocks."""
+        rss = 0.0
+        for b, columns in enumerate(self._library.columns):
+            factor = self._factors[b]
+            fresh = columns[:, index].T.astype(np.float64)
+            norm = np.linalg.norm(fresh, axis=0)
+            for _ in range(2):  # twice is enough (Kahan): orthogonal to rounding
+                fresh = fresh - factor @ (factor.T @ fresh)
+            basis, triangle = np.linalg.qr(fresh)
+            basis = basis[
+                :, np.abs(np.diag(triangle)) > np.sqrt(DEPENDENT) * np.maximum(norm, np.finfo(float).tiny)
+            ]
+            shadows = _products(basis.T, columns)
+            along = basis.T @ self._residuals[b]
+            self._grams[b] = self._grams[b] - _projected_gram(shadows)
+            self._products[b] = self._products[b] - along @ shadows
+            self._residuals[b] = self._residuals[b] - basis @ along
+            self._factors[b] = np.concatenate([factor, basis], axis=1)
+            rss += float(self._residuals[b] @ self._residuals[b])
+        return rss
+
+
+def _falls(gram: Float2D, left: Float2D, product: Float2D) -> Float1D:
+    """z' S^-1 z of every candidate (n,): gram, S (channels, channels, n), z (channels, n).
+
+    Directions in which a candidate does not stand outside the design do not count.
+    """
+    if len(product) == 1:
+        new = left[0, 0] > DEPENDENT * gram[0, 0]
+        return np.asarray(np.where(new, product[0] ** 2 / np.where(new, left[0, 0], 1.0), 0.0))
+    own = np.maximum(np.einsum("kkn->nk", gram), np.finfo(float).tiny)
+    root = np.sqrt(own)
+    value, vector = np.linalg.eigh(left.transpose(2, 0, 1) / (root[:, :, None] * root[:, None, :]))
+    along = np.einsum("nkj,nk->nj", vector, product.T / root)
+    new = value > DEPENDENT
+    return np.asarray(np.sum(np.where(new, along**2 / np.where(new, value, 1.0), 0.0), axis=1))
+
+
+def orthogonal_gains(library: Library, current: Solution) -> Float1D:
+    """(candidates,) fall of the residual sum of squares if a candidate were added to a solved basis.
+
+    What a selection's gains are at its start, from the solution's own Gram matrix.
+    """
+    total = np.zeros(len(library))
+    for columns, gram, design, own, residual in zip(
+        library.columns, library.grams, current.designs, current.grams, current.residuals, strict=True
+    ):
+        products = _products(np.vstack([half_solved(own, design.T), residual]), columns)
+        total += _falls(gram, gram - _projected_gram(products[:, :-1]), products[:, -1])
+    return total
+
+
+def residual_gains(library: Library, current: Solution) -> Float1D:
+    """(candidates,) fall of the residual sum of squares if a candidate were fitted to the residual alone.
+
+    What the candidate shares with the network is not taken out of it first: cheaper, and less sharp.
+    """
+    total = np.zeros(len(library))
+    for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
+        along = _products(residual[None], columns)[:, 0]
+        inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=DEPENDENT, hermitian=True)
+        total += np.einsum("kn,nkj,jn->n", along, inverse, along)
+    return total
+
+
+@dataclass(frozen=True)
+class SelectionPath:
+    """A whole selection: candidates in their order, and the error and criterion of the first 0, 1, ..."""
+
+    order: tuple[int, ...]
+    rss: tuple[float, ...]
+    """[force^2] with 0, 1, 2 ... wavelets, the within-group part included"""
+    criterion: tuple[float, ...]
+    best: int
+    """Number of wavelets with the smallest criterion"""
+
+    @staticmethod
+    def judged(
+        problem: SeparableProblem, order: Sequence[int], rss: Sequence[float], criterion: str
+    ) -> "SelectionPath":
+        share = problem.limits.independent
+        values = [
+            deviance(criterion, share * total, problem.independent, problem.n_parameters(n))
+            for n, total in enumerate(rss)
+        ]
+        return SelectionPath(tuple(order), tuple(rss), tuple(values), int(np.argmin(values)))
+
+
+def select_forward(
+    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
+) -> SelectionPath:
+    """Forward orthogonal: at every step the wavelet that lowers the error most, up to max_wavelets."""
+    start = problem.solve(Basis.empty(problem.dimension))
+    selection = OrthogonalSelection(library, start)
+    order: list[int] = []
+    errors = [problem.total(start.rss)]
+    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
+        gains = selection.gains()
+        if len(gains) == 0 or gains.max() <= 0.0:
+            break
+        order.append(int(np.argmax(gains)))
+        errors.append(problem.total(selection.take(order[-1])))
+    return SelectionPath.judged(problem, order, errors, criterion)
+
+
+def select_by_residual(
+    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
+) -> SelectionPath:
+    """Residual-based: at every step the wavelet that fits what is left best; then all weights anew."""
+    current = problem.solve(Basis.empty(problem.dimension))
+    order: list[int] = []
+    errors = [problem.total(current.rss)]
+    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
+        gains = residual_gains(library, current)
+        gains[order] = 0.0
+        if len(gains) == 0 or gains.max() <= 0.0:
+            break
+        order.append(int(np.argmax(gains)))
+        current = problem.solve(library.members(order))
+        errors.append(problem.total(current.rss))
+    return SelectionPath.judged(problem, order, errors, criterion)
+
+
+def select_backward(
+    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
+) -> SelectionPath:
+    """Backward elimination: from max_wavelets down, always the wavelet whose loss costs least.
+
+    A whole library has more members than data can tell apart, so it starts from what forward selection takes.
+    """
+    forward = select_forward(problem, library, max_wavelets=max_wavelets, criterion=criterion)
+    left = list(forward.order)
+    current = problem.solve(library.members(left))
+    order: list[int] = []
+    errors = [problem.total(current.rss)]
+    while left:
+        order.append(left.pop(int(np.argmin(problem.removal_costs(current)))))
+        current = problem.solve(library.members(left))
+        errors.append(problem.total(current.rss))
+    return SelectionPath.judged(problem, order[::-1], errors[::-1], criterion)
+
+
+def _products(rows: Float2D, columns: NDArray[np.float32]) -> Float2D:
+    """(channels, k, candidates) products of rows (k, m) with columns (channels, candidates, m)."""
+    products = columns @ np.ascontiguousarray(rows.T, dtype=np.float32)
+    return products.transpose(0, 2, 1).astype(np.float64, order="C")
+
+
+def _projected_gram(shadows: Float2D) -> Float2D:
+    """(channels, channels, candidates) products of the candidates' shadows (channels, k, candidates)."""
+    return np.asarray(np.einsum("kpn,lpn->kln", shadows, shadows))
