@@ -20,7 +20,7 @@ from sklearn.linear_model import OrthogonalMatchingPursuit, Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransformer
 
-from palpate import WaveletNetworkRegressor
+from palpate import SearchOptions, WaveletNetworkRegressor
 from palpate._core.model import wavelet_columns
 from palpate.identification.network.basis import truncated_frame
 
@@ -66,7 +66,7 @@ def palpate_regressor(X: Array, y: Array) -> Fitted:
 def palpate_selection_alone(X: Array, y: Array) -> Fitted:
     """Ours without refinement: dilations and translations stay on the frame."""
     start = time.perf_counter()
-    network = WaveletNetworkRegressor(refine=False).fit(X, y)
+    network = WaveletNetworkRegressor(search=SearchOptions(refine=False)).fit(X, y)
     seconds = time.perf_counter() - start
     return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 
@@ -74,7 +74,7 @@ def palpate_selection_alone(X: Array, y: Array) -> Fitted:
 def palpate_quasi_newton(X: Array, y: Array) -> Fitted:
     """Ours refined as published: all parameters at once, by quasi-Newton."""
     start = time.perf_counter()
-    network = WaveletNetworkRegressor(refinement="quasi-newton").fit(X, y)
+    network = WaveletNetworkRegressor(search=SearchOptions(refinement="quasi-newton")).fit(X, y)
     seconds = time.perf_counter() - start
     return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
 

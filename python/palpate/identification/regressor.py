@@ -37,25 +37,12 @@ except ImportError as missing:
         "WaveletNetworkRegressor needs scikit-learn 1.6 or later: pip install palpate[sklearn] brings it"
     ) from missing
 
-OF_RECORDINGS = {
-    "inputs",
-    "hysteresis_nonnegative",
-    "slope_bounds",
-    "monotone",
-    "fixed_force",
-    "filters",
-    "assumed_mass",
-    "assumed_damping",
-    "coupling_stiffness",
-    "play_radius",
-    "contact_share",
-    "period",
+SETTINGS = {
+    each.name: None if each.name == "search" else each.default
+    for each in fields(IdentifyOptions)
+    if each.name in ("max_wavelets", "criterion", "loss", "search")
 }
-"""Settings that only a recording gives a meaning to: strokes, contact, motion, a position with its slope."""
-
-SETTINGS = {each.name: each.default for each in fields(IdentifyOptions) if each.name not in OF_RECORDINGS}
-"""Those of :class:`IdentifyOptions` that the regressor takes, with their defaults."""
-
+"""Those of :class:`IdentifyOptions` that need no recording, with defaults; search None: its own."""
 
 NARROWEST = 1e-12
 """A column whose range is below this share of its largest value is constant but for rounding."""
@@ -77,8 +64,8 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     Parameters
     ----------
     **settings
-        Fields of :class:`palpate.IdentifyOptions` that do not need a recording, with the same defaults:
-        max_wavelets, criterion, patience, refine and others, which ``get_params()`` lists.
+        max_wavelets, criterion, loss and search of :class:`palpate.IdentifyOptions`, with the same defaults.
+        The settings of search that describe motion and contact have no effect.
 
     Attributes
     ----------

@@ -165,7 +165,7 @@ def test_every_setting_of_the_identification_is_an_option_with_its_default() -> 
 def test_settings_reach_the_identification(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sample_recording(3, 5.0).write(here / "a.csv")
     arguments = ["identify", "a.csv", "-o", "m.json", "--max-wavelets", "2", "--inputs", "position"]
-    assert main([*arguments, "--slope-bounds", "-5", "30", "--no-refine"]) == 0
+    assert main([*arguments, "--slope-bounds", "-5", "30", "--search", "refine=false"]) == 0
     model = load_model(here / "m.json")
     assert model.n_wavelets <= 2
     assert model.slope(np.linspace(-0.2, 0.469, 2001)).max() <= 30.0 * (1 + 1e-6)
@@ -184,7 +184,9 @@ def test_settings_reach_the_identification(here: Path, capsys: pytest.CaptureFix
         (["--units", "position_rad=parsec"], "parsec"),
         (["--rows", "10"], "must be START:STOP"),
         (["--position", "depth"], "no column 'depth'"),
-        (["--play-radius", "wide"], "must be numbers joined by commas"),
+        (["--search", "play_radius=wide"], "play_radius is 'wide'; it must be numbers joined by commas"),
+        (["--search", "luck=1"], "search has no setting 'luck'"),
+        (["--search", "patience"], "must be NAME=VALUE"),
         (["--plot", "m.doc"], "is no figure file"),
         (["--plot", "m.json"], "is no figure file"),
         (["--plot", "nowhere/m.png"], "there is no folder nowhere"),

@@ -8,7 +8,7 @@ import pytest
 
 from palpate import identify
 from palpate._core.model import wavelet_columns
-from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
 from palpate.identification.data.held_out import BLOCKS, HeldOutRows, gain, held_out_rows, inside
 from palpate.identification.search.criteria import choice, enough, standard_error
 from palpate.identification.search.evidence import Samples
@@ -131,7 +131,9 @@ def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:
 @pytest.mark.parametrize("refine", [True, False], ids=["refined", "frame-only"])
 def test_every_selection_finds_a_wall(selection: str, refine: bool) -> None:
     x, _, y = wall(3000, 1)
-    network = fit_environment(x[:, None], y, None, IdentifyOptions(selection=selection, refine=refine))
+    network = fit_environment(
+        x[:, None], y, None, IdentifyOptions(search=SearchOptions(selection=selection, refine=refine))
+    )
     assert network.rmse == pytest.approx(0.02, rel=0.1)
     assert len(network.weight) <= (12 if refine else 30)
 

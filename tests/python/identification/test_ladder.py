@@ -6,9 +6,10 @@ import os
 import numpy as np
 import pytest
 
+import palpate
 from palpate import InputError
 from palpate._core.model import wavelet_columns
-from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
 from palpate.identification.network.fitted import FittedNetwork
 from palpate.identification.search.evidence import Samples
 
@@ -262,11 +263,10 @@ def test_named_inputs_decide_the_rung() -> None:
         ({"criterion": "aic"}, "criterion is 'aic'; it must be one of bic"),
         ({"max_wavelets": -1}, "max_wavelets is -1"),
         ({"max_wavelets": 2.5}, "max_wavelets is 2.5"),
-        ({"frame_scale": 1.0}, "frame_scale is 1.0"),
+        ({"search": {"frame_scale": 1.0}}, "search is"),
         ({"coupling_stiffness": -5.0}, "coupling_stiffness is -5.0"),
         ({"slope_bounds": (3.0, 1.0)}, r"slope_bounds is \(3.0, 1.0\)"),
         ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allow no more than 90"),
-        ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
         ({"period": float("nan")}, "period is nan"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
@@ -274,6 +274,26 @@ def test_named_inputs_decide_the_rung() -> None:
 def test_a_bad_option_is_refused_by_name_and_value(options: dict[str, object], told: str) -> None:
     with pytest.raises(InputError, match=told):
         IdentifyOptions(**options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"frame_scale": 1.0}, "frame_scale is 1.0"),
+        ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
+        ({"selection": "luck"}, "selection is 'luck'; it must be one of orthogonal"),
+        ({"patience": 0}, "patience is 0; it must be a whole number of 1 or more"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_a_bad_search_setting_is_refused_by_name_and_value(setting: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        SearchOptions(**setting)  # type: ignore[arg-type]
+
+
+def test_a_search_setting_given_as_an_option_names_the_cure() -> None:
+    with pytest.raises(InputError, match=r"no option 'patience'; give search=SearchOptions\(patience="):
+        palpate.identify(np.arange(20.0), np.arange(20.0), patience=5)
 
 
 def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() -> None:
