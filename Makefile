@@ -5,7 +5,8 @@
 #   make test         build, C++ tests, Python tests, lint                        (minutes)
 #   make control      build palpate-control, the real-time program: build/control/palpate-control
 #   make test-full    the same tests with long counts, under the sanitizers, and as installed  (an hour)
-#   make bench        all benchmarks, JSON in build/bench/
+#   make bench        all studies, JSON and figures in build/bench/
+#   make figures      the same studies, figures and generated pages in docs/
 #   make lint | format | stubs | output | clean
 #
 # Paths are relative on purpose: the folder may have a space in its name.
@@ -22,7 +23,7 @@ PYTHON ?= python3
 # The sanitizers slow a program ten times and get a tenth of the cases.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full test-full-native: export PALPATE_TEST_SCALE ?= 100
-bench: export PALPATE_BENCH_SCALE ?= 1
+bench figures: export PALPATE_BENCH_SCALE ?= 1
 
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 # Nothing outside this folder is touched: no download cache and no font cache in the home directory.
@@ -38,7 +39,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree hold absolute paths: in a folder that was moved, start again.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python bench lint lint-python lint-cpp lint-stubs format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python bench figures lint lint-python lint-cpp lint-stubs format stubs output \
         setup clean moved
 
 help:
@@ -101,6 +102,9 @@ test-full-native: setup control
 
 bench: setup
 	tools/bench.sh
+
+figures: setup
+	tools/bench.sh docs
 
 # ------------------------------------------------------------------------------------------------------------ lint
 

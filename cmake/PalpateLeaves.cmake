@@ -4,13 +4,10 @@
 palpate_find_or_fetch(nlohmann_json v3.11.2 https://github.com/nlohmann/json.git 3.9)
 if(PALPATE_BUILD_CONTROL)
   palpate_find_or_fetch(CLI11 v2.1.2 https://github.com/CLIUtils/CLI11.git 2.1)
-  # Boost.Beast speaks WebSocket with an Inverse3 (Debian: libboost-dev); done without where it is not there.
-  find_package(Boost 1.74 QUIET CONFIG)
 endif()
 
-# What is done without where it is not there: the USB device (Debian: libusb-1.0-0-dev) and its emulation below libusb
-# (Debian: libumockdev-dev).
-include(cmake/PalpateUsb.cmake)
+# Optional: the emulation of a USB device below libusb (Debian: libumockdev-dev).
+find_package(PkgConfig QUIET)
 if(PkgConfig_FOUND)
   pkg_check_modules(umockdev QUIET IMPORTED_TARGET umockdev-1.0>=0.17)
 endif()

@@ -52,15 +52,15 @@ int main(int count, char** words) {
                 largest_fall(release));
 
     // 2. A knob that suits it, and a hand that presses for a second. Simulated.
-    const Bench bench = bench_for(click, true, DeviceProfile{}.period_s);
+    const TestRig rig = rig_for(click, true, DeviceProfile{}.period_s);
 
     // 3. Is the click still there when the knob renders it? An inertia behind the coupling rings.
     for (const StructureKind structure :
          {StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit}) {
         SchemeChoices chosen;
         chosen.structure = structure;
-        const Scheme scheme = bench.scheme(click, chosen);
-        const Trace felt = simulate(click, scheme, bench.device, bench.hand, 1000, 20, lower);
+        const Scheme scheme = rig.scheme(click, chosen);
+        const Trace felt = simulate(click, scheme, rig.device, rig.hand, 1000, 20, lower);
         const auto turn = std::max_element(felt.position.begin(), felt.position.end());
         const std::vector<double> pressed(felt.applied.begin(),
                                           felt.applied.begin() + (turn - felt.position.begin()) + 1);

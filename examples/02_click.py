@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import palpate
-from palpate.planning import bench_for
+from palpate.planning import rig_for
 
 
 def largest_fall(force: Iterable[float]) -> float:
@@ -35,11 +35,11 @@ falls = largest_fall(press), largest_fall(release)
 print(f"the switch: the press falls by {falls[0]:.3f} N*m, the release by {falls[1]:.3f} N*m")
 
 # 2. A knob that suits it, and a hand that presses for a second. Simulated.
-bench = bench_for(switch)
+rig = rig_for(switch)
 
 # 3. Is the click still there when the knob renders it? An inertia behind the coupling rings.
 for structure in ("direct", "massless", "implicit"):
-    plan = palpate.Plan(switch, bench.scheme(switch, structure=structure))
-    felt = palpate.simulate(plan, bench.device, bench.hand, 1.0)
+    plan = palpate.Plan(switch, rig.scheme(switch, structure=structure))
+    felt = palpate.simulate(plan, rig.device, rig.hand, 1.0)
     pressed = felt.force[: np.argmax(felt.position) + 1]
     print(f"{structure}: the press falls by {largest_fall(pressed):.3f} N*m")

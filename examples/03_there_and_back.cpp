@@ -78,10 +78,10 @@ int main(int count, char** words) {
     // 1. Obtain data: the switch of story 2 is pressed and let go four times, slowly, under a 16-bit encoder.
     const ForceModel click = load_model_file(count > 1 ? words[1] : "examples/02_click.json").model;
     const double period_s = DeviceProfile{}.period_s;
-    Bench bench = bench_for(click, true, period_s);
+    TestRig rig = rig_for(click, true, period_s);
     const double lower = click.domain().lower[0];
     const double travel = click.domain().upper[0] - lower;
-    const double step = bench.device.encoder_step;
+    const double step = rig.device.encoder_step;
     SchemeChoices direct;
     direct.structure = StructureKind::Direct;
     std::vector<double> position;
@@ -90,7 +90,7 @@ int main(int count, char** words) {
         position.push_back(step * std::floor(pressed / step + 0.5));
     }
     std::vector<double> force;
-    for (const Rendered& felt : motion_driven(click, bench.scheme(click, direct), position, period_s)) {
+    for (const Rendered& felt : motion_driven(click, rig.scheme(click, direct), position, period_s)) {
         force.push_back(felt.force);
     }
     write(folder / "real.csv", position, force, period_s);
@@ -101,10 +101,9 @@ int main(int count, char** words) {
                 real.hysteresis() != nullptr ? "press and release differ" : "one stroke");
 
     // 3. Implement: rendered by a knob with nothing on it, in a hand that sweeps. The coupling softens the click.
-    bench = bench_for(real, true, period_s);
+    rig = rig_for(real, true, period_s);
     const double start = std::clamp(0.0, real.domain().lower[0], real.domain().upper[0]);
-    const Trace rendered =
-        simulate(real, bench.scheme(real), bench.device, bench.hand, position.size(), 20, start);
+    const Trace rendered = simulate(real, rig.scheme(real), rig.device, rig.hand, position.size(), 20, start);
     write(folder / "rendered.csv", rendered.position, rendered.applied, period_s);
 
     // 4. Once more, from what was felt. 5. Compare: the largest difference, stroke by stroke.

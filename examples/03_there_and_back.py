@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import palpate
-from palpate.planning import bench_for, force_at
+from palpate.planning import force_at, rig_for
 from palpate.verification import compare
 
 folder = tempfile.TemporaryDirectory()
@@ -27,12 +27,12 @@ real_csv, rendered_csv = (Path(folder.name) / name for name in ("real.csv", "ren
 
 # 1. Obtain data: the switch of story 2 is pressed and let go four times, slowly, under a 16-bit encoder.
 switch = palpate.load_model(Path(__file__).with_name("02_click.json"))
-bench = bench_for(switch)
-time = np.arange(8000) * bench.device.period_s
-travel, step = switch.upper[0] - switch.lower[0], bench.device.encoder_step
+rig = rig_for(switch)
+time = np.arange(8000) * rig.device.period_s
+travel, step = switch.upper[0] - switch.lower[0], rig.device.encoder_step
 pressed = switch.lower[0] + travel * (0.5 - 0.5 * np.cos(np.pi * time))
 position = step * np.floor(pressed / step + 0.5)
-exact = palpate.Plan(switch, bench.scheme(switch, structure="direct"))
+exact = palpate.Plan(switch, rig.scheme(switch, structure="direct"))
 force = np.round(force_at(exact, position), 4)  # the transducer reads steps of 0.1 mN*m
 palpate.Recording.from_arrays(position, force, time, units={"position": "rad", "force": "N*m"}).write(
     real_csv
@@ -44,8 +44,8 @@ strokes = "press and release differ" if real.hysteretic else "one stroke"
 print(f"identified: {real.fit.n_wavelets} wavelets, {strokes}")
 
 # 3. Implement: rendered by a knob with nothing on it, in a hand that sweeps. The coupling softens the click.
-bench = bench_for(real)
-rendered = palpate.simulate(palpate.Plan(real, bench.scheme(real)), bench.device, bench.hand, 8.0)
+rig = rig_for(real)
+rendered = palpate.simulate(palpate.Plan(real, rig.scheme(real)), rig.device, rig.hand, 8.0)
 replace(rendered, force=np.round(rendered.force, 4)).write(rendered_csv)
 
 # 4. Once more, from what was felt.

@@ -1,7 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Builds and runs every benchmark; one JSON file each in build/bench/. A benchmark whose answer is wrong fails.
+# Builds and runs every study: tools/bench.sh [FOLDER]. One JSON file each in build/bench/; figures and tables of the
+# pages go to FOLDER, build/bench by default. A benchmark whose answer is wrong fails.
 set -euo pipefail
+
+to=${1:-build/bench}
 
 scale=${PALPATE_BENCH_SCALE:-1}
 seconds=$(awk -v scale="$scale" 'BEGIN { print 0.1 * scale }')
@@ -18,7 +21,7 @@ processor=$(awk -F': ' '/^model name/ { print $2; exit }' /proc/cpuinfo 2>/dev/n
 compiler=$(awk -F= '/^CMAKE_CXX_COMPILER:/ { print $2 }' build/release/CMakeCache.txt)
 flags=$(awk -F= '/^CMAKE_CXX_FLAGS_RELEASE:/ { print $2 }' build/release/CMakeCache.txt)
 
-for source in bench/bench_*.cpp; do
+for source in bench/solvers/bench_*.cpp; do
     name=$(basename "$source" .cpp)
     "build/release/bench/$name" \
         --benchmark_min_time="$seconds" --benchmark_repetitions="$repetitions" \
@@ -32,18 +35,25 @@ for source in bench/bench_*.cpp; do
         exit 1
     fi
 done
-"build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 100 * scale) }')" |
-    tee build/bench/certificate_search.txt
-.venv/bin/python bench/python_calls.py build/bench/bench_python_calls.json
-.venv/bin/python bench/model_error.py build/bench/bench_model_error.json
-.venv/bin/python bench/ratios.py build/bench
-.venv/bin/palpate chart speed build/bench --to build/bench/figures
-.venv/bin/palpate chart prediction --to build/bench
-for name in identification filters parsimony real_data dynamic; do
-    echo && .venv/bin/python "bench/$name.py" --json "build/bench/$name.json"
+study() {
+    echo
+    .venv/bin/python "bench/$1.py" "${@:2}"
+}
+study solvers/python_calls build/bench/bench_python_calls.json
+study solvers/model_error build/bench/bench_model_error.json
+study solvers/ratios build/bench
+study solvers/speed build/bench --to "$to/figures"
+for name in compare_methods filters parsimony real_data dynamic; do
+    study "identification/$name" --json "build/bench/$name.json"
 done
-.venv/bin/palpate chart identification build/bench --to build/bench
-echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark."
+study identification/figures build/bench --to "$to"
+"build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 63 * scale) }')" |
+    tee build/bench/certificate_search.txt
+study limits/certificate_table build/bench/certificate_search.txt --to "$to"
+study limits/failure_maps --to "$to" --points "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')"
+study limits/prediction --to "$to"
+study plans/plan_against_trial --to "$to" --grid "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')"
+echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark. Figures: $to/figures"
 
 echo "Lateness of the real-time loop beside cyclictest"
 cmake --preset control >/dev/null

@@ -11,11 +11,11 @@ void bind_model(pybind11::module_& module);
 void bind_wavelet(pybind11::module_& module);
 void bind_dynamics(pybind11::module_& module);
 void bind_device(pybind11::module_& module);
+void bind_wire(pybind11::module_& module);
 void bind_rendering(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
+void bind_io(pybind11::module_& module);
 void bind_simulation(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
-void bind_measure(pybind11::module_& module);
-void bind_failure(pybind11::module_& module);
 
 }  // namespace palpate::bindings

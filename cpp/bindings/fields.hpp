@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <initializer_list>
+#include <cstddef>
 #include <string>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate::bindings {
 
 /// Defines pickling, copying, comparison, hash and repr of a class by one list of names: the keyword arguments of its
-/// constructor, which are also its attributes. `with_repr` is false for a class with a shorter repr. A Python subclass with the same constructor is kept.
+/// constructor, which are also its attributes. `with_repr` is false for a class with a shorter repr. A Python subclass
+/// with the same constructor is kept.
 template <class T>
-void define_by_fields(pybind11::class_<T>& type, std::initializer_list<const char*> names,
+void define_by_fields(pybind11::class_<T>& type, const std::vector<std::string>& fields,
                       bool with_repr = true) {
     namespace py = pybind11;
-    const std::vector<std::string> fields(names.begin(), names.end());
     const auto values = [fields](const py::object& self) {
         py::dict given;
         for (const std::string& name : fields) {
@@ -56,6 +62,85 @@ void define_by_fields(pybind11::class_<T>& type, std::initializer_list<const cha
         }
         return text + ")";
     });
+}
+
+/// A field of an enumeration is a str in Python.
+template <class V>
+using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
+
+template <class V>
+PythonType<V> to_python(const V& value) {
+    if constexpr (HasWords<V>) {
+        return std::string(name_of(value));
+    } else {
+        return value;
+    }
+}
+
+template <class T, std::size_t k>
+using FieldType = std::remove_cvref_t<decltype(std::get<k>(fields_of<T>).of(std::declval<T&>()))>;
+
+template <class T, std::size_t k>
+void set_field(T& object, PythonType<FieldType<T, k>>&& value) {
+    const auto& field = std::get<k>(fields_of<T>);
+    if constexpr (HasWords<FieldType<T, k>>) {
+        field.of(object) = named<FieldType<T, k>>(value, field.name);
+    } else {
+        field.of(object) = std::move(value);
+    }
+}
+
+/// The first `required` fields have no default.
+template <class T, std::size_t k, std::size_t required>
+auto argument_of(const T& standard) {
+    const auto& field = std::get<k>(fields_of<T>);
+    if constexpr (k < required) {
+        return pybind11::arg(field.name);
+    } else {
+        return pybind11::arg(field.name) = to_python(field.of(standard));
+    }
+}
+
+/// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, and all of `define_by_fields`.
+/// `check` throws if the fields do not fit together.
+template <class T, std::size_t required = 0, class Check>
+void bind_fields(pybind11::class_<T>& type, Check check, bool with_repr = true) {
+    namespace py = pybind11;
+    constexpr std::size_t n = std::tuple_size_v<std::remove_cvref_t<decltype(fields_of<T>)>>;
+    const T standard{};
+    [&]<std::size_t... k>(std::index_sequence<k...>) {
+        type.def(py::init([check](PythonType<FieldType<T, k>>... value) {
+                     T made;
+                     (set_field<T, k>(made, std::move(value)), ...);
+                     check(made);
+                     return made;
+                 }),
+                 py::kw_only(), argument_of<T, k, required>(standard)...);
+    }(std::make_index_sequence<n>{});
+    std::vector<std::string> names;
+    for_each_field<T>([&](const auto& field) {
+        names.emplace_back(field.name);
+        type.def_property_readonly(
+            field.name, [field](const T& object) { return to_python(field.of(object)); }, field.doc);
+    });
+    type.def(
+        "to_dict",
+        [](const T& object) {
+            py::dict values;
+            for_each_field<T>([&](const auto& field) {
+                if (field.stored) {
+                    values[field.name] = to_python(field.of(object));
+                }
+            });
+            return values;
+        },
+        "The fields that are written to a file, by name.");
+    define_by_fields(type, names, with_repr);
+}
+
+template <class T, std::size_t required = 0>
+void bind_fields(pybind11::class_<T>& type, bool with_repr = true) {
+    bind_fields<T, required>(type, [](const T&) {}, with_repr);
 }
 
 }  // namespace palpate::bindings

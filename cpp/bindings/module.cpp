@@ -37,17 +37,17 @@ PYBIND11_MODULE(_core, module) {
     bind_model(model);
     auto dynamics = submodule("dynamics", "Transfer functions and the filters of the paper.");
     bind_dynamics(dynamics);
-    auto device = submodule("device", "Profiles of haptic devices.");
+    auto device = submodule("device", "Profiles of haptic devices, and the packets of USB devices.");
     bind_device(device);
+    bind_wire(device);
     auto rendering = submodule("rendering", "Structures between a model and a device.");
     bind_rendering(rendering);
     auto stability = submodule("stability", "Certificates and the inequalities they consist of.");
     bind_stability(stability);
+    auto io = submodule("io", "Model files.");
+    bind_io(io);
     auto simulation = submodule("simulation", "Rendering in virtual time on a simulated device.");
     bind_simulation(simulation);
     auto run = submodule("run", "Rendering and measuring in real time.");
     bind_run(run);
-    bind_measure(run);
-    auto failure = submodule("failure", "Limits at which each method fails.");
-    bind_failure(failure);
 }

@@ -2,12 +2,14 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <pybind11/stl.h>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "fields.hpp"
+#include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
 
 namespace palpate::bindings {
@@ -16,38 +18,19 @@ namespace py = pybind11;
 using namespace py::literals;
 
 void bind_rendering(py::module_& module) {
-    const Scheme scheme;
-    const std::string structure{structure_names[static_cast<std::size_t>(scheme.structure)]};
-    py::list names;
-    for (const std::string_view name : structure_names) {
-        names.append(std::string(name));
-    }
-    module.attr("structure_names") = py::tuple(names);
+    module.attr("structure_names") =
+        py::tuple(py::cast(std::vector<std::string>(structure_names.begin(), structure_names.end())));
     module.attr("most_prediction_taps") = most_prediction_taps;
+    module.attr("compensated_share") = compensated_share;
     py::class_<Scheme> type(module, "Scheme",
                             "How a model is rendered: the structure and its numbers, SI units.");
-    type.def(py::init([](const std::string& name, double coupling_stiffness, double coupling_damping,
-                         double mass, double damping, bool compensated, double play_radius, int predict) {
-                 return Scheme{structure_named(name), {coupling_stiffness, coupling_damping},
-                               {mass, damping},       compensated,
-                               play_radius,           predict};
-             }),
-             py::kw_only(), "structure"_a = structure, "coupling_stiffness"_a = scheme.coupling.stiffness,
-             "coupling_damping"_a = scheme.coupling.damping, "mass"_a = scheme.inertia.mass,
-             "damping"_a = scheme.inertia.damping, "compensated"_a = scheme.compensated,
-             "play_radius"_a = scheme.play_radius, "predict"_a = scheme.predict)
-        .def_property_readonly("structure",
-                               [](const Scheme& s) {
-                                   return std::string(structure_names[static_cast<std::size_t>(s.structure)]);
-                               })
-        .def_property_readonly("coupling_stiffness", [](const Scheme& s) { return s.coupling.stiffness; })
-        .def_property_readonly("coupling_damping", [](const Scheme& s) { return s.coupling.damping; })
-        .def_property_readonly("mass", [](const Scheme& s) { return s.inertia.mass; })
-        .def_property_readonly("damping", [](const Scheme& s) { return s.inertia.damping; })
-        .def_readonly("compensated", &Scheme::compensated)
-        .def_readonly("play_radius", &Scheme::play_radius)
-        .def_readonly("predict", &Scheme::predict,
-                      "m: samples used to predict the position half a sample ahead; 0 = none.")
+    bind_fields(type);
+    type.def_property_readonly(
+            "has_coupling", [](const Scheme& s) { return has_coupling(s.structure); },
+            "True if the object stands behind a virtual coupling.")
+        .def_property_readonly(
+            "has_mass", [](const Scheme& s) { return has_mass(s.structure); },
+            "True if the object has mass and damping.")
         .def(
             "validate",
             [](const Scheme& s, const ForceModel& model, std::optional<double> period_s) {
@@ -63,8 +46,6 @@ void bind_rendering(py::module_& module) {
             "Largest slope of the model that the structure meets, never below 0; h / r is part of it while "
             "a\n"
             "hysteresis model sticks.");
-    define_by_fields(type, {"structure", "coupling_stiffness", "coupling_damping", "mass", "damping",
-                            "compensated", "play_radius", "predict"});
 
     module.def(
         "explicit_slope_limit",
@@ -75,7 +56,21 @@ void bind_rendering(py::module_& module) {
         },
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
         "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
-        "driven by a force: (4 m - 2 (B_o + B_c) T) / T^2 - K_c, with K_c = B_c = 0 when not coupled.");
+        "driven by a force.");
+
+    module.def(
+        "explicit_object",
+        [](double limit, double coupling_stiffness, double coupling_damping, double ratio, double period_s) {
+            const Inertia object =
+                explicit_object(limit, {coupling_stiffness, coupling_damping}, ratio, period_s);
+            return std::pair{object.mass, object.damping};
+        },
+        "limit"_a, py::kw_only(), "coupling_stiffness"_a, "coupling_damping"_a, "ratio"_a, "period_s"_a,
+        "(mass, damping) of the object with this slope limit in the explicit structure, with a damping of\n"
+        "ratio * mass / period_s: the inverse of explicit_slope_limit.");
+    module.def("default_play_radius", &default_play_radius, "model"_a, "encoder_step"_a,
+               "Play radius of a model that leaves it to the rendering, else 0.");
+    module.attr("fewest_encoder_steps_in_play") = fewest_encoder_steps_in_play;
 
     module.def(
         "solver_name",

@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/run/session.hpp"
-
 #include <atomic>
 #include <cmath>
-#include <cstdint>
+#include <exception>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
-#include "palpate/run/session_text.hpp"
-#include "palpate/simulation/simulated_device.hpp"
-#include "palpate/simulation/test_rig.hpp"
-#include "summary.hpp"
+#include "palpate/run/measure.hpp"
+#include "palpate/run/render.hpp"
+#include "palpate/run/summary.hpp"
+#include "palpate/simulation/open_device.hpp"
+#include "settings.hpp"
 
 namespace palpate::bindings {
 
@@ -23,89 +26,238 @@ using namespace py::literals;
 
 namespace {
 
-/// What energy a rendering gave; None where no bound is known.
-py::dict energy_of(const LoopReport& loop) {
-    const py::object stored =
-        std::isfinite(loop.most_stored) ? py::object(py::float_(loop.most_stored)) : py::none();
-    return py::dict("given_in_ramp_J"_a = loop.given_in_ramp, "given_J"_a = loop.given,
-                    "most_stored_J"_a = stored, "sentence"_a = energy_text(loop));
+/// Calls Python while a session runs without the interpreter's lock: its signal handlers, and ten times a second
+/// `progress(ticks, position, force, lost)`. What they raise ends the session and is raised again afterwards; Ctrl-C
+/// only ends the session.
+class Watcher {
+  public:
+    Watcher(const std::optional<py::function>& progress, std::atomic<double> LoopProgress::* force)
+        : progress_{progress}, force_{force} {}
+
+    void operator()(const SessionView& view) {
+        const py::gil_scoped_acquire locked;
+        if (PyErr_CheckSignals() != 0) {
+            PyErr_Clear();
+            stop_requested.store(true, std::memory_order_relaxed);
+        }
+        if (!progress_ || error_ || views_++ % views_a_call != 0) {
+            return;
+        }
+        try {
+            (*progress_)(view.progress.ticks.load(std::memory_order_relaxed),
+                         view.progress.position.load(std::memory_order_relaxed),
+                         (view.progress.*force_).load(std::memory_order_relaxed),
+                         view.progress.lost.load(std::memory_order_relaxed));
+        } catch (const py::error_already_set&) {
+            error_ = std::current_exception();
+            stop_requested.store(true, std::memory_order_relaxed);
+        }
+    }
+
+    void rethrow() const {
+        if (error_) {
+            std::rethrow_exception(error_);
+        }
+    }
+
+    std::atomic<bool> stop_requested{false};
+
+  private:
+    static constexpr int views_a_call = 5;
+    const std::optional<py::function>& progress_;
+    std::atomic<double> LoopProgress::* force_;
+    std::exception_ptr error_;
+    int views_ = 0;
+};
+
+py::object python_of(const Fields& fields);
+
+template <class T>
+py::object python_of(const std::vector<T>& values) {
+    py::list list;
+    for (const T& value : values) {
+        if constexpr (std::is_same_v<T, Fields>) {
+            list.append(python_of(value));
+        } else {
+            list.append(value);
+        }
+    }
+    return list;
 }
 
-py::dict render_in_python(const ForceModel& model, const Scheme& scheme, const std::string& position_unit,
-                          const std::string& force_unit, double rate_hz, double duration_s,
-                          std::string record, bool force, const std::string& model_name,
-                          std::optional<std::uint16_t> telemetry_port, double telemetry_hz, int priority,
-                          int cpu, double lowest_rate_share, const std::optional<py::function>& progress) {
-    SessionSettings settings;
-    settings.loop.rate_hz = rate_hz;
-    settings.loop.duration_s = duration_s;
-    settings.loop.lowest_rate_share = lowest_rate_share;
-    settings.real_time = {priority, cpu};
-    validate(settings.loop);
-    const double period_s = 1.0 / rate_hz;
-    const Bench bench = bench_for(model, position_unit == "rad", period_s);
-    const GuardSettings guards = bench.guards();
-    const RecordUnits units{position_unit, force_unit == "N*m" ? "Nm" : force_unit};
-    const Metadata metadata = flight_metadata(std::string("palpate ") + PALPATE_VERSION,
-                                              simulated_metadata(bench), model_name, scheme, guards, rate_hz);
-    validate(scheme, model, period_s);
-    SimulatedDevice device{bench.device, bench.hand, simulated_substeps(period_s)};
-    RecordSinks sinks;
-    if (telemetry_port) {
-        const std::string reason = sinks.telemetry.open(*telemetry_port, telemetry_hz, units);
-        detail::require(reason.empty(), reason);
-    }
-    if (!record.empty()) {
-        const std::string reason = sinks.file.open(record, units, metadata, force);
-        detail::require(reason.empty(), reason);
-    }
-    const Opened opened = device.open();
-    detail::require(static_cast<bool>(opened), opened.reason);
+py::object python_of(std::monostate /*nothing*/) {
+    return py::none();
+}
 
-    SessionReport report;
-    std::atomic<bool> asked{false};
-    Watcher watcher{progress, &LoopProgress::force, asked};
-    {
-        const py::gil_scoped_release unlocked;
-        report = render_live(model, scheme, device, guards, settings, sinks, asked,
-                             [&](const SessionView& view) { watcher(view); });
+py::object python_of(double value) {
+    return std::isfinite(value) ? py::object(py::float_(value)) : py::none();
+}
+
+template <class T>
+py::object python_of(const T& value) {
+    return py::cast(value);
+}
+
+py::object python_of(const Fields& fields) {
+    py::dict dict;
+    for (const Field& field : fields) {
+        dict[py::str(field.name)] =
+            std::visit([](const auto& value) { return python_of(value); }, field.value);
     }
-    const Domain& domain = model.domain();
-    SessionExpectation expected{
-        false, guards.encoder_step, {domain.lower[0], domain.upper[0]}, units.position};
-    const std::vector<std::string> notes =
-        close_record(sinks, report, settings.loop, units, metadata, record, force, expected);
+    return dict;
+}
+
+template <class Value>
+py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord::* field) {
+    py::array_t<Value> values(static_cast<py::ssize_t>(ticks.size()));
+    auto* out = values.mutable_data();
+    for (const TickRecord& tick : ticks) {
+        *out++ = tick.*field;
+    }
+    return values;
+}
+
+template <class T>
+Setters<T> run_setters() {
+    return {{"device", setter<T>(&RunOptions::device)},
+            {"wait_s", setter<T>(&RunOptions::wait_s)},
+            {"rate_hz", setter<T>(&RunOptions::loop, &LoopSettings::rate_hz)},
+            {"duration_s", setter<T>(&RunOptions::loop, &LoopSettings::duration_s)},
+            {"lowest_rate_share", setter<T>(&RunOptions::loop, &LoopSettings::lowest_rate_share)},
+            {"priority", setter<T>(&RunOptions::real_time, &RealTimeOptions::priority)},
+            {"cpu", setter<T>(&RunOptions::real_time, &RealTimeOptions::cpu)},
+            {"record", setter<T>(&RunOptions::record)},
+            {"force", setter<T>(&RunOptions::force)},
+            {"telemetry_port", setter<T>(&RunOptions::telemetry_port)},
+            {"telemetry_hz", setter<T>(&RunOptions::telemetry_hz)}};
+}
+
+/// Sets the options from keywords; checks what no other function checks.
+template <class T>
+void set_options(T& options, const py::kwargs& given, const Setters<T>& setters) {
+    set_fields(options, given, setters);
+    options.created_by = std::string("palpate ") + PALPATE_VERSION;
+    detail::require(!options.wait_s || (*options.wait_s > 0.0 && *options.wait_s <= 10.0),
+                    "wait_s is " + readable(options.wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
+}
+
+py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& plan,
+                          const std::optional<ForceModel>& limited,
+                          const std::optional<Certificate>& certificate, const std::string& position_unit,
+                          const std::string& force_unit, const std::string& model_name,
+                          const std::optional<py::function>& progress, const py::kwargs& given) {
+    static const auto setters = [] {
+        auto all = run_setters<RenderOptions>();
+        add_scheme_choices(all, &RenderOptions::scheme);
+        all["force_limit"] = setter<RenderOptions>(&RenderOptions::force_limit);
+        all["uncertified"] = setter<RenderOptions>(&RenderOptions::uncertified);
+        all["faults"] = setter<RenderOptions>(&RenderOptions::faults);
+        return all;
+    }();
+    RenderOptions options;
+    set_options(options, given, setters);
+    options.rate_given = given.contains("rate_hz") && !given["rate_hz"].is_none();
+    const PlannedModel planned{model_name, model, position_unit, force_unit, plan, limited, certificate};
+    const auto device = open_device(options, planned);
+    const RenderJob job = settle(options, planned, *device);
+    Watcher watcher{progress, &LoopProgress::force};
+    const auto summary = [&] {
+        const py::gil_scoped_release unlocked;
+        return render(options, planned, job, *device, watcher.stop_requested, std::ref(watcher));
+    }();
     watcher.rethrow();
-    py::dict summary = summary_of(report, settings.loop, sinks, record, notes, expected);
-    summary["energy"] = energy_of(report.loop);
-    return summary;
+    py::dict result = python_of(fields(summary));
+    result["lines"] = lines(summary);
+    return result;
+}
+
+py::dict measure_in_python(const std::optional<ForceModel>& object, const std::string& position_unit,
+                           const std::string& force_unit, const std::optional<py::function>& progress,
+                           const py::kwargs& given) {
+    using Options = MeasureOptions;
+    static const auto setters = [] {
+        auto all = run_setters<Options>();
+        all.insert({{"probe", setter<Options>(&Options::probe)},
+                    {"lower", setter<Options>(&Options::lower)},
+                    {"upper", setter<Options>(&Options::upper)},
+                    {"speed", setter<Options>(&Options::speed)},
+                    {"stiffness", setter<Options>(&Options::stiffness)},
+                    {"force_limit", setter<Options>(&Options::force_limit)},
+                    {"push", setter<Options>(&Options::push)},
+                    {"keep", setter<Options>(&Options::keep)},
+                    {"transducer", setter<Options>(&Options::transducer)},
+                    {"friction_share", setter<Options>(&Options::friction_share)}});
+        return all;
+    }();
+    Options options;
+    set_options(options, given, setters);
+    options.units = {position_unit, force_unit == "N*m" ? "Nm" : force_unit};
+    const auto device = device_to_measure(options, object);
+    Watcher watcher{progress, &LoopProgress::object_force};
+    const auto summary = [&] {
+        const py::gil_scoped_release unlocked;
+        return measure(options, *device, watcher.stop_requested, std::ref(watcher));
+    }();
+    watcher.rethrow();
+    py::dict result = python_of(fields(summary));
+    result["encoder_step"] = device->profile.encoder_step;
+    result["force_limit"] = device->profile.force_limit;
+    result["transducer"] = device->transducer;
+    if (result.contains("usb")) {
+        result.attr("update")(result.attr("pop")("usb"));
+    }
+    if (options.keep) {
+        const std::vector<TickRecord>& ticks = summary.kept;
+        result["profile"] = device->profile;
+        result["kept"] = py::dict(
+            "time"_a = column(ticks, &TickRecord::time), "position"_a = column(ticks, &TickRecord::position),
+            "velocity"_a = column(ticks, &TickRecord::velocity),
+            "force"_a = column(ticks, &TickRecord::force), "applied"_a = column(ticks, &TickRecord::applied),
+            "measured"_a = column(ticks, &TickRecord::measured),
+            "device_time"_a = column(ticks, &TickRecord::device_time),
+            "sequence"_a = column(ticks, &TickRecord::sequence));
+    }
+    return result;
 }
 
 }  // namespace
 
 void bind_run(py::module_& module) {
-    const LoopSettings loop;
-    const RealTimeOptions real_time;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
-    py::class_<LoopSettings>(module, "LoopSettings",
-                             "When a rendering ticks, and when it ends: the defaults.")
+    py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and limits of a session.")
         .def(py::init<>())
         .def_readonly("rate_hz", &LoopSettings::rate_hz)
         .def_readonly("duration_s", &LoopSettings::duration_s)
         .def_readonly("lowest_rate_share", &LoopSettings::lowest_rate_share);
     module.def(
-        "render", &render_in_python, "model"_a, "scheme"_a, py::kw_only(), "position_unit"_a = "rad",
-        "force_unit"_a = "N*m", "rate_hz"_a = loop.rate_hz, "duration_s"_a = loop.duration_s, "record"_a = "",
-        "force"_a = false, "model_name"_a = "", "telemetry_port"_a = py::none(),
-        "telemetry_hz"_a = Telemetry::usual_hz, "priority"_a = real_time.priority, "cpu"_a = real_time.cpu,
-        "lowest_rate_share"_a = loop.lowest_rate_share, "progress"_a = py::none(),
-        "The model rendered in real time on a simulated device: the loop of palpate-control.\n\n"
-        "Blocks for `duration_s` (inf: until Ctrl-C) without holding the interpreter. `record` names the\n"
-        "recording, which grows as record.part; an existing one is refused, or replaced with `force`. A\n"
-        "`telemetry_port` of this machine gets JSON lines over UDP.\n"
-        "`progress(ticks, position, force, lost)` is called ten times a second.\n"
-        "A rate below `lowest_rate_share` of `rate_hz` for half a second ends it, 0: never.\n"
-        "Returns the summary by name; ValueError where it is refused before anything moves.");
+        "render", &render_in_python, "model"_a, "plan"_a = py::none(), py::kw_only(),
+        "limited"_a = py::none(), "certificate"_a = py::none(), "position_unit"_a = "rad",
+        "force_unit"_a = "N*m", "model_name"_a = "", "progress"_a = py::none(),
+        "Renders a model in real time on a device: the loop of palpate-control.\n\n"
+        "`plan`, `limited` and `certificate` are those of the model; without a plan the scheme is the "
+        "default\n"
+        "one. Options by keyword, None for the default: device (simulated, usb[:SERIAL] or\n"
+        "inverse3[:AXIS[@PORT]]), uncertified, wait_s, rate_hz, duration_s (inf: until Ctrl-C), record,\n"
+        "force, telemetry_port, telemetry_hz, priority, cpu, lowest_rate_share, force_limit, faults, and "
+        "the\n"
+        "fields of a scheme. `record` names the recording, which grows as record.part; an existing one is\n"
+        "refused, or replaced with `force`. Calls progress(ticks, position, force, lost) ten times a "
+        "second.\n\n"
+        "Returns the summary by name, its lines for a person under `lines`. InputError where it is refused\n"
+        "before anything moves.");
+    module.def(
+        "measure", &measure_in_python, py::kw_only(), "object"_a = py::none(), "position_unit"_a = "rad",
+        "force_unit"_a = "N*m", "progress"_a = py::none(),
+        "Measures a real object in real time; on the simulated device the model `object` is mounted.\n\n"
+        "A hand moves the handle; with `probe` the device moves it slowly between `lower` and `upper`; with\n"
+        "`push` it gives short pushes of that force to either side. Options by keyword, None for the\n"
+        "default: device (simulated or usb[:SERIAL]), wait_s, rate_hz, duration_s (inf: until Ctrl-C),\n"
+        "record, force, priority, cpu, lowest_rate_share, probe, lower, upper, speed, stiffness, "
+        "force_limit,\n"
+        "push, keep, transducer, friction_share (Coulomb friction of the simulated device over its force\n"
+        "limit). Calls progress(ticks, position, force, lost) ten times a second.\n\n"
+        "Returns the summary by name; with `keep` it holds the ticks. InputError where it is refused before\n"
+        "anything moves.");
 }
 
 }  // namespace palpate::bindings

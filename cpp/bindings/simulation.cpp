@@ -11,10 +11,11 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "fields.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/test_rig.hpp"
-#include "palpate/simulation/virtual_time.hpp"
+#include "settings.hpp"
 #include "signals.hpp"
 
 namespace palpate::bindings {
@@ -93,44 +94,46 @@ void bind_simulation(py::module_& module) {
         .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]");
     define_by_fields(simulated_hand, {"stiffness", "damping", "lower", "upper", "frequency_hz"});
 
-    py::class_<Bench> bench(
-        module, "Bench",
-        "A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.");
-    bench
-        .def(py::init([](const DeviceProfile& device, const Hand& hand, double length, double stiffness) {
-                 return Bench{device, hand, length, stiffness};
-             }),
-             py::kw_only(), "device"_a, "hand"_a, "length"_a = 1.0, "stiffness"_a = 1.0)
-        .def_readonly("device", &Bench::device)
-        .def_readonly("hand", &Bench::hand)
-        .def_readonly("length", &Bench::length, "Positions, over those of the default knob.")
-        .def_readonly("stiffness", &Bench::stiffness, "Force per position, over that of the default knob.")
+    py::class_<TestRig> rig(module, "TestRig", "Simulated device and hand scaled to a model.");
+    rig.def(py::init([](const DeviceProfile& device, const Hand& hand, double length, double force) {
+                return TestRig{device, hand, {length, force}};
+            }),
+            py::kw_only(), "device"_a, "hand"_a, "length"_a = 1.0, "force"_a = 1.0)
+        .def_readonly("device", &TestRig::device)
+        .def_readonly("hand", &TestRig::hand)
+        .def_property_readonly(
+            "length", [](const TestRig& self) { return self.scale.length; },
+            "Positions, relative to those of the default knob.")
+        .def_property_readonly(
+            "force", [](const TestRig& self) { return self.scale.force; },
+            "Forces, relative to those of the default knob.")
         .def(
             "scheme",
-            [](const Bench& self, const ForceModel& model, const std::optional<std::string>& structure,
-               std::optional<bool> compensated, std::optional<double> coupling_stiffness,
-               std::optional<double> coupling_damping, std::optional<double> mass,
-               std::optional<double> damping, std::optional<double> play_radius, std::optional<int> predict) {
-                SchemeChoices chosen{std::nullopt, compensated, coupling_stiffness, coupling_damping,
-                                     mass,         damping,     play_radius,        predict};
-                if (structure) {
-                    chosen.structure = structure_named(*structure);
-                }
+            [](const TestRig& self, const ForceModel& model, const py::kwargs& fields) {
+                static const auto setters = [] {
+                    Setters<SchemeChoices> all;
+                    add_scheme_choices(all);
+                    return all;
+                }();
+                SchemeChoices chosen;
+                set_fields(chosen, fields, setters);
                 return self.scheme(model, chosen);
             },
-            "model"_a, py::kw_only(), "structure"_a = py::none(), "compensated"_a = py::none(),
-            "coupling_stiffness"_a = py::none(), "coupling_damping"_a = py::none(), "mass"_a = py::none(),
-            "damping"_a = py::none(), "play_radius"_a = py::none(), "predict"_a = py::none(),
-            "What is given, in the model's own units; what is None follows the model in this bench's scale.");
-    define_by_fields(bench, {"device", "hand", "length", "stiffness"});
+            "model"_a,
+            "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at "
+            "the "
+            "model's "
+            "scale.");
+    define_by_fields(rig, {"device", "hand", "length", "force"});
     module.def(
-        "bench_for", &bench_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
-        "The bench on which a model of one position is tried. An angle is tried on the default knob;\n"
-        "for any other unit it is the same knob as a scale model: lengths and forces are multiplied so\n"
-        "that travel and largest force stand to the device as in the knob's own scene.");
+        "rig_for", &rig_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
+        "Returns the test rig for a model of position, or of position and velocity. An angle is rendered on\n"
+        "the default knob; for any other unit its lengths and forces are scaled to the travel and the "
+        "largest\n"
+        "force of the model.");
 
     module.def("simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-               "substeps"_a = 20, "start_position"_a = 0.0, "progress"_a = py::none(),
+               "substeps"_a = usual_substeps, "start_position"_a = 0.0, "progress"_a = py::none(),
                "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
                "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
                "Ctrl-C\n"

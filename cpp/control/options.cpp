@@ -9,12 +9,12 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
-#include "usb.hpp"
 
 namespace palpate::control {
 
@@ -59,7 +59,7 @@ CLI::Validator structure_word() {
     validator.operation([](std::string& text) -> std::string {
         const bool known =
             std::find(structure_names.begin(), structure_names.end(), text) != structure_names.end();
-        return known ? "" : "must be direct, massless, implicit or explicit, not " + text;
+        return known ? "" : "must be one of " + either(structure_names) + ", not " + text;
     });
     return validator;
 }
@@ -90,14 +90,19 @@ class Help : public CLI::Formatter {
     static constexpr std::size_t options_width = 34;
 };
 
-void add_rendering(CLI::App& app, Options& options) {
+void add_rendering(CLI::App& app, RenderOptions& options) {
     const auto group = [](CLI::Option* option) { return option->group("Rendering"); };
     SchemeChoices& scheme = options.scheme;
     const Scheme usual;
     const auto scaled = [](double value, const char* unit) {
         return " [" + readable(value) + " " + unit + ", scaled]";
     };
-    group(app.add_option("--structure", options.structure, "direct, massless, implicit or explicit"))
+    group(app.add_option_function<std::string>(
+              "--structure",
+              [&scheme](const std::string& name) {
+                  scheme.structure = named<StructureKind>(name, "structure");
+              },
+              "One of " + either(structure_names)))
         ->check(structure_word())
         ->type_name("NAME")
         ->default_str(std::string(name_of(Scheme{}.structure)));
@@ -124,7 +129,7 @@ void add_rendering(CLI::App& app, Options& options) {
         ->default_str(std::to_string(usual.predict));
 }
 
-void add_guards(CLI::App& app, Options& options) {
+void add_guards(CLI::App& app, RenderOptions& options) {
     const auto group = [](CLI::Option* option) { return option->group("Guards"); };
     group(app.add_option("--force-limit", options.force_limit,
                          "In the model's unit [the device's: " + readable(DeviceProfile{}.force_limit) +
@@ -145,7 +150,7 @@ void add_guards(CLI::App& app, Options& options) {
               "A position that stands this long out of full motion is an encoder that died, 0 = never"))
         ->check(not_negative())
         ->capture_default_str();
-    group(app.add_flag("--no-energy-tank", options.no_energy_tank,
+    group(app.add_flag("!--no-energy-tank", options.energy_tank,
                        "Let the rendering give more energy than the model can hold"));
     group(app.add_option("--tolerated-samples", options.tolerated,
                          "Ticks in a row without a sound sample before the run ends"))
@@ -157,12 +162,14 @@ void add_guards(CLI::App& app, Options& options) {
         ->capture_default_str();
 }
 
-void add_running(CLI::App& app, Options& options) {
+void add_running(CLI::App& app, RenderOptions& options) {
     app.add_option("--device", options.device,
-                   has_usb()
-                       ? "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z"
-                       : "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built "
-                         "without libusb: no usb[:SERIAL]")
+#ifdef PALPATE_HAS_USB
+                   "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z")
+#else
+                   "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built without "
+                   "libusb: no usb[:SERIAL]")
+#endif
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
@@ -184,8 +191,9 @@ void add_running(CLI::App& app, Options& options) {
         "--uncertified", options.uncertified,
         "Render without the certificate's limits, on a USB device without any: nothing proves that it "
         "stays stable");
-    app.add_option("--wait-ms", options.wait_ms,
-                   "How long to wait for a device [5 for a packet of USB, 20 for an Inverse3's answer]")
+    app.add_option_function<double>(
+           "--wait-ms", [&options](double wait_ms) { options.wait_s = 1e-3 * wait_ms; },
+           "How long to wait for a device [5 for a packet of USB, 20 for an Inverse3's answer]")
         ->check(number_between(0.1, 10'000.0));
     app.add_option("--priority", options.real_time.priority, "Of SCHED_FIFO, 0 = ordinary scheduling")
         ->check(number_between(0, 99))
@@ -193,7 +201,6 @@ void add_running(CLI::App& app, Options& options) {
     app.add_option("--cpu", options.real_time.cpu, "Core of the loop, -1 = the last allowed, -2 = any")
         ->check(number_between(-2, 1023))
         ->capture_default_str();
-    app.add_flag("--json", options.as_json, "Print the summary as one JSON object");
     app.add_option(
            "--fault", options.faults,
            "For tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES of late, lost, repeated, nan, "
@@ -231,17 +238,18 @@ std::optional<int> read_options(int count, char** words, Options& options) {
     app.add_option("MODEL.json", options.model, "A model file, from palpate identify")
         ->type_name("FILE")
         ->required();
-    add_running(app, options);
-    add_rendering(app, options);
-    add_guards(app, options);
+    add_running(app, options.render);
+    app.add_flag("--json", options.as_json, "Print the summary as one JSON object");
+    add_rendering(app, options.render);
+    add_guards(app, options.render);
     if (count == 1) {
         std::cerr << app.help();
         return 2;
     }
     try {
         app.parse(count, words);
-        options.rate_given = app.count("--rate-hz") > 0;
-        options.loop.tolerated = options.tolerated.value_or(options.loop.tolerated);
+        options.render.rate_given = app.count("--rate-hz") > 0;
+        options.render.created_by = std::string("palpate-control ") + PALPATE_VERSION;
     } catch (const CLI::CallForHelp&) {
         std::cout << app.help();
         return 0;
@@ -253,17 +261,6 @@ std::optional<int> read_options(int count, char** words, Options& options) {
         return 2;
     }
     return std::nullopt;
-}
-
-bool chooses_scheme(const Options& options) {
-    const SchemeChoices& scheme = options.scheme;
-    // The parser writes a flag that was not given, too.
-    return options.structure || scheme.compensated.value_or(false) || scheme.coupling_stiffness ||
-           scheme.coupling_damping || scheme.mass || scheme.damping || scheme.play_radius || scheme.predict;
-}
-
-bool chooses_rendering(const Options& options) {
-    return chooses_scheme(options) || options.force_limit || options.slew_s || options.tolerated;
 }
 
 }  // namespace palpate::control

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .identification.regressor import WaveletNetworkRegressor
     from .model import Model, load_model
     from .planning import DeviceProfile, Hand, Plan, Scheme, simulate
-    from .planning.ladder import plan
+    from .planning.search import plan
     from .recording import Recording, read_recording
     from .verdict import Finding, Verdict
     from .verification import Verification, verify
@@ -41,7 +41,7 @@ _HOME = {
     "Model": "model",
     "load_model": "model",
     "Plan": "planning",
-    "plan": "planning.ladder",
+    "plan": "planning.search",
     "simulate": "planning",
     "Recording": "recording",
     "read_recording": "recording",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict on a result: good, usable with reservations, or no."""
+"""Verdict on a result (good, usable, no), and the force difference that a hand notices."""
 
 from __future__ import annotations
 
@@ -80,6 +80,16 @@ class Verdict:
 
 
 GOOD = Verdict()
+
+FORCE_JND = 0.07
+"""Share of a force by which another must differ to be felt as different (Jones 1989: about 7 %)."""
+
+FORCE_FLOOR = 0.01
+"""Least force difference that is felt, as a share of the largest |force| of the recording.
+
+A share of a force near zero would ask for more than any sensor or finger resolves. The floor goes with the
+recording because recordings reach from nanonewtons to kilograms, scaled before they are felt.
+"""
 
 
 def usable(sentence: str) -> Finding:

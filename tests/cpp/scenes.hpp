@@ -11,7 +11,7 @@
 #include "palpate/model/energy.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/simulation/closed_loop.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "support.hpp"
 

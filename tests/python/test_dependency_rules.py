@@ -19,7 +19,7 @@ COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 ROOMS = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
 # Leaves may import any room but cli; they are imported by cli and the report only.
-LEAVES = {"plotting", "analysis", "baselines"}
+LEAVES = {"plotting", "baselines"}
 
 # Folder of the headers -> what it may include, besides itself, status.hpp and fields.
 INCLUDES = {
@@ -27,9 +27,9 @@ INCLUDES = {
     "model": set(),
     "dynamics": {"model"},
     "solver": {"dynamics", "model"},
-    "rendering": {"solver", "dynamics", "model"},
+    "rendering": {"solver", "dynamics", "model", "device"},
     "stability": {"rendering", "solver", "dynamics", "model", "device"},
-    "guard": {"rendering", "solver", "dynamics", "model"},
+    "guard": {"rendering", "solver", "dynamics", "model", "device"},
     "device": {"realtime"},
     "realtime": set(),
     "io": {"model", "device", "realtime", "rendering", "stability"},
@@ -43,20 +43,8 @@ INCLUDES = {
         "device",
         "realtime",
         "io",
-        "simulation",
     },
-    "simulation": {"run", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
-    "failure": {
-        "simulation",
-        "run",
-        "guard",
-        "stability",
-        "rendering",
-        "solver",
-        "dynamics",
-        "model",
-        "device",
-    },
+    "simulation": {"run", "io", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
 
 # Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
@@ -70,6 +58,9 @@ LEAF_HEADERS = {
     "io/json_text.hpp",
     "io/model_file.hpp",
     "io/plan_file.hpp",
+    "run/open_inverse3.hpp",
+    "run/open_usb.hpp",
+    "simulation/open_device.hpp",
 }
 
 # What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory

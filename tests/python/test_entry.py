@@ -97,7 +97,7 @@ def test_inputs_named_as_columns_are_read_from_files_and_frames(tmp_path: Path) 
         (lambda t: t.drop(columns="depth_mm"), r'no column name has a unit of position.*position="operator"'),
         (lambda t: t.rename(columns={"operator": "force_mN"}), "several columns called force_mN"),
         (lambda t: t.rename(columns={"operator": 7}), "a column called 7"),
-        (lambda t: t.iloc[:0], "has 0 usable rows .* needs at least 10 rows"),
+        (lambda t: t.iloc[:0], "has 0 usable rows; .* needs at least 10"),
     ],
     ids=["nan", "text", "complex", "direction", "no_position", "twice", "number", "no_rows"],
 )

@@ -69,9 +69,9 @@ def main() -> dict[str, Any]:
 
     with open_usb() as device:
         told["name"] = device.name
-        told["watchdog before"] = device.identify().watchdog_ms
+        told["watchdog before"] = device.identify()["watchdog_ms"]
         device.set_watchdog(137)
-        told["watchdog after"] = device.identify().watchdog_ms
+        told["watchdog after"] = device.identify()["watchdog_ms"]
         told["watchdog out of range"] = refusal(lambda: device.set_watchdog(1))
 
         wait_until(lambda: state()["position_rad"] > 0.2)

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from palpate._core.rendering import Scheme
-from palpate._core.simulation import Hand
 
 import guest
 from palpate import load_model
+from palpate._core.rendering import Scheme
+from palpate._core.simulation import Hand
 from palpate.planning import DeviceProfile, Plan, force_at, simulate
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,10 +9,10 @@ from . import dynamics
 from . import device
 from . import rendering
 from . import stability
+from . import io
 from . import simulation
 from . import run
-from . import failure
-__all__: list[str] = ['Status', 'device', 'dynamics', 'failure', 'model', 'rendering', 'run', 'simulation', 'stability', 'status_meanings']
+__all__: list[str] = ['Status', 'device', 'dynamics', 'io', 'model', 'rendering', 'run', 'simulation', 'stability', 'status_meanings']
 class Status:
     """
     Why a step ended as it did; the same words in C++ and in records.

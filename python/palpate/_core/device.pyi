@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Profiles of haptic devices.
+Profiles of haptic devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['DeviceProfile', 'longest_delay_s']
+__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_delay_s', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class DeviceProfile:
     """
     What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
@@ -92,7 +92,79 @@ class DeviceProfile:
         """
         n: number of whole samples in the delay.
         """
+class UsbRequest:
+    """
+    bRequest of a control transfer.
+    
+    Members:
+    
+      GetInfo
+    
+      Enable
+    
+      Zero
+    
+      Watchdog
+    
+      Clear
+    """
+    Clear: typing.ClassVar[UsbRequest]
+    Enable: typing.ClassVar[UsbRequest]
+    GetInfo: typing.ClassVar[UsbRequest]
+    Watchdog: typing.ClassVar[UsbRequest]
+    Zero: typing.ClassVar[UsbRequest]
+    __members__: typing.ClassVar[dict[str, UsbRequest]]
+    @typing.overload
+    def __eq__(self, other: UsbRequest) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: UsbRequest) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+def decode_info(data: bytes) -> dict:
+    """
+    Identity of a USB device from its answer to GET_INFO. InputError names the wrong field.
+    
+    firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, transducer,
+    measures_velocity, uid.
+    """
 def longest_delay_s(period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Longest delay of a profile [s]: 16 periods.
     """
+longest_watchdog_ms: int = 1000
+shortest_watchdog_ms: int = 2
+usb_interface: int = 0
+usb_interface_kind: tuple = (255, 1, 1)
+usb_largest_packet: int = 64
+usb_product: int = 1
+usb_to_device: int = 65
+usb_to_host: int = 193
+usb_vendor: int = 4617

@@ -10,7 +10,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Bench', 'Hand', 'bench_for', 'force_driven', 'force_error', 'most_simulated_ticks', 'motion_driven', 'simulate']
+__all__: list[str] = ['Hand', 'TestRig', 'force_driven', 'force_error', 'most_simulated_ticks', 'motion_driven', 'rig_for', 'simulate']
 class Hand:
     """
     A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.
@@ -50,15 +50,15 @@ class Hand:
         """
         [m or rad]
         """
-class Bench:
+class TestRig:
     """
-    A simulated device with a hand on it that suits a model, and the rendering's numbers in its scale.
+    Simulated device and hand scaled to a model.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, device: palpate._core.device.DeviceProfile, hand: Hand, length: typing.SupportsFloat | typing.SupportsIndex = 1.0, stiffness: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+    def __init__(self, *, device: palpate._core.device.DeviceProfile, hand: Hand, length: typing.SupportsFloat | typing.SupportsIndex = 1.0, force: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -66,30 +66,24 @@ class Bench:
         ...
     def scheme(self, model: palpate._core.model.ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, predict: typing.SupportsInt | typing.SupportsIndex | None = None) -> palpate._core.rendering.Scheme:
         """
-        What is given, in the model's own units; what is None follows the model in this bench's scale.
+        Returns the scheme with the given fields, in the model's units. None: the default at the model's scale.
         """
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
         ...
+    @property
+    def force(self) -> float:
+        """
+        Forces, relative to those of the default knob.
+        """
     @property
     def hand(self) -> Hand:
         ...
     @property
     def length(self) -> float:
         """
-        Positions, over those of the default knob.
+        Positions, relative to those of the default knob.
         """
-    @property
-    def stiffness(self) -> float:
-        """
-        Force per position, over that of the default knob.
-        """
-def bench_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> Bench:
-    """
-    The bench on which a model of one position is tried. An angle is tried on the default knob;
-    for any other unit it is the same knob as a scale model: lengths and forces are multiplied so
-    that travel and largest force stand to the device as in the knob's own scene.
-    """
 def force_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
     The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
@@ -105,6 +99,12 @@ def motion_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.r
     """
     The force that would have been rendered while a recorded motion (n,) moves the device.
     Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def rig_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> TestRig:
+    """
+    Returns the test rig for a model of position, or of position and velocity. An angle is rendered on
+    the default knob; for any other unit its lengths and forces are scaled to the travel and the largest
+    force of the model.
     """
 def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
     """

@@ -25,53 +25,59 @@ class ForceBounds:
         ...
     def __repr__(self) -> str:
         ...
+    def to_dict(self) -> dict:
+        """
+        The fields that are written to a file, by name.
+        """
     @property
     def drag(self) -> float:
         """
-        B_v = max |f(x, v) - f(x, 0)| / |v|.
+        B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone.
         """
     @property
     def hysteresis(self) -> bool:
-        ...
+        """
+        True if the model has hysteresis.
+        """
     @property
     def loss_max(self) -> float:
         """
-        Largest h.
+        Largest h; 0 without hysteresis.
         """
     @property
     def loss_min(self) -> float:
         """
-        Smallest h.
+        Smallest h; 0 without hysteresis.
         """
     @property
     def loss_per_play(self) -> float:
         """
-        max h / r
+        max h/r
         """
     @property
     def mean_force(self) -> float:
         """
-        How much a limited force that repeats pushes on average, beyond its loss.
+        Mean of a limited force that repeats over its period, beyond its loss.
         """
     @property
     def sliding(self) -> float:
         """
-        max |f'|, or max(|g'| + |h'|).
+        max |f'|, or max(|g'| + |h'|); of all velocities.
         """
     @property
     def slope_max(self) -> float:
         """
-        Of every path.
+        Of every path: max f', or max(g' + |h'| + h/r).
         """
     @property
     def slope_min(self) -> float:
         """
-        Of every path.
+        Of every path: min f', or min(g' - |h'|).
         """
     @property
     def steepest(self) -> float:
         """
-        L = max |f'|, or max(|g'| + |h'| + h / r).
+        L = max |f'|, or max(|g'| + |h'| + h/r).
         """
 class Inequality:
     """
@@ -87,16 +93,22 @@ class Inequality:
         ...
     def __repr__(self) -> str:
         ...
+    def to_dict(self) -> dict:
+        """
+        The fields that are written to a file, by name.
+        """
     @property
     def formula(self) -> str:
-        ...
+        """
+        In the symbols of docs/certificate.md.
+        """
     @property
     def holds(self) -> bool:
         ...
     @property
     def id(self) -> str:
         """
-        Stable name; texts may change between releases.
+        Stable name, compared when a certificate is checked; texts are not.
         """
     @property
     def left(self) -> float:
@@ -110,7 +122,9 @@ class Inequality:
         """
     @property
     def name(self) -> str:
-        ...
+        """
+        Subject in words.
+        """
     @property
     def rests_on(self) -> str:
         """
@@ -123,10 +137,14 @@ class Inequality:
         """
     @property
     def source(self) -> str:
-        ...
+        """
+        Where the proof stands.
+        """
     @property
     def strict(self) -> bool:
-        ...
+        """
+        True if both sides must differ.
+        """
 class Certificate:
     """
     What is proved of a model, rendered by a scheme, on a device.
@@ -135,10 +153,8 @@ class Certificate:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, model: str, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex, fingerprint: str, why: str = '') -> None:
-        """
-        A certificate as stored in a file. Use the result of `check`.
-        """
+    def __init__(self, *, model: str, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex, fingerprint: str, why: str = '') -> None:
+        ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
@@ -146,6 +162,10 @@ class Certificate:
     def check(self, model: palpate._core.model.ForceModel) -> Certificate:
         """
         Computes the certificate again and returns the result. ValueError names the first field that differs.
+        """
+    def to_dict(self) -> dict:
+        """
+        The fields that are written to a file, by name.
         """
     @property
     def bounds(self) -> ForceBounds:
@@ -157,15 +177,19 @@ class Certificate:
         ...
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
-        ...
+        """
+        The device it holds for.
+        """
     @property
     def fingerprint(self) -> str:
         """
-        16 hexadecimal digits over every number and name of the certificate.
+        16 hexadecimal digits over every stored number and name before it.
         """
     @property
     def inequalities(self) -> list[Inequality]:
-        ...
+        """
+        Every line with both its sides.
+        """
     @property
     def longest_period_s(self) -> float:
         """
@@ -174,17 +198,21 @@ class Certificate:
     @property
     def model(self) -> str:
         """
-        Fingerprint of the model.
+        Fingerprint of the model; empty where only bounds were certified.
         """
     @property
     def refused(self) -> bool:
         ...
     @property
     def scheme(self) -> palpate._core.rendering.Scheme:
-        ...
+        """
+        How the model is rendered.
+        """
     @property
     def verdict(self) -> str:
-        ...
+        """
+        certified, stable-locally or refused.
+        """
     @property
     def why(self) -> str:
         """

@@ -6,12 +6,9 @@ every fitted real number. X (n, 1 to 3) holds position and, where they are known
 """
 
 from .comparison import PASSIVE, Compared, baselines, comparable, compare
-from .hunt_crossley import HuntCrossley
-from .lookup_table import LookupTable
-from .per_stroke import PerStroke
-from .smoothing_spline import SmoothingSpline
-from .tissue import TissueParameters
-from .zones import LinearZones
+from .curves import LookupTable, SmoothingSpline
+from .estimator import PerStroke
+from .mechanical import HuntCrossley, LinearZones, TissueParameters
 
 __all__ = [
     "PASSIVE",

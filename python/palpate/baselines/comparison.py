@@ -15,13 +15,9 @@ from ..errors import InputError
 from ..recording import Recording
 from ..recording.motion import velocity
 from ..verification.metrics import normalised, root_mean_square
-from .estimator import Estimator
-from .hunt_crossley import HuntCrossley
-from .lookup_table import LookupTable
-from .per_stroke import PerStroke
-from .smoothing_spline import SmoothingSpline
-from .tissue import TissueParameters
-from .zones import LinearZones
+from .curves import LookupTable, SmoothingSpline
+from .estimator import Estimator, PerStroke
+from .mechanical import HuntCrossley, LinearZones, TissueParameters
 
 
 @dataclass(frozen=True)

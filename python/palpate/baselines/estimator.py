@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one face of the baselines, and how each chooses its own setting."""
+"""Interface of the baselines, how each chooses its own setting, and one for objects with two strokes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import deepcopy
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -59,3 +61,41 @@ def merged(x: Float1D, y: Float1D) -> tuple[Float1D, Float1D, Float1D]:
     """Distinct positions in rising order, the mean of y at each, and how many rows it stands for."""
     distinct, place, count = np.unique(x, return_inverse=True, return_counts=True)
     return distinct, np.bincount(place, y) / count, count.astype(np.float64)
+
+
+@dataclass
+class PerStroke:
+    """One copy of an estimator for each stroke.
+
+    The last column of X is the stroke: above 0 press, below 0 release.
+
+    Parameters
+    ----------
+    estimator
+        What is fitted to each stroke; it is copied.
+    passive : bool
+        Where release would lie above press, by which a loop gains energy, both are their mean.
+    """
+
+    estimator: Estimator
+    passive: bool = False
+
+    def fit(self, X: Float2D, y: Float1D) -> PerStroke:
+        """Fit one copy to the press rows of X (n, d) and one to the release rows."""
+        press = X[:, -1] > 0
+        self.press_ = deepcopy(self.estimator).fit(X[press, :-1], y[press])
+        self.release_ = deepcopy(self.estimator).fit(X[~press, :-1], y[~press])
+        self.n_parameters_ = self.press_.n_parameters_ + self.release_.n_parameters_
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        press = X[:, -1] > 0
+        if self.passive:
+            above, below = (each.predict(X[:, :-1]) for each in (self.press_, self.release_))
+            half = 0.5 * np.maximum(above - below, 0.0)
+            return np.asarray(0.5 * (above + below) + np.where(press, half, -half))
+        force = np.empty(len(X))
+        force[press] = self.press_.predict(X[press, :-1])
+        force[~press] = self.release_.predict(X[~press, :-1])
+        return force

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate check-device: ten seconds, and a verdict that can be pasted into a bug report."""
+"""palpate check-device: measures a device for ten seconds and prints a verdict for a bug report."""
 
 from __future__ import annotations
 
@@ -25,21 +25,19 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
 @click.command(cls=Verb, epilog="Example: palpate check-device --device usb --push")
 @device_options
 @click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
-@click.option("--duration-s", type=float, default=10.0, help="How long altogether.")
+@click.option("--duration-s", type=float, default=10.0, help="Total duration.")
 @click.option(
     "--push", is_flag=True, help="Also push the handle a little: sign of the force, delay, mechanics."
 )
+@click.option("--profile", type=PATH, metavar="DEVICE.toml", help="Expected profile: does it hold?")
 @click.option(
-    "--profile", type=PATH, metavar="DEVICE.toml", help="What the device is thought to be: does that hold?"
-)
-@click.option(
-    "--model", "model_file", type=PATH, metavar="MODEL.json", help="One with a certificate: does that hold?"
+    "--model", "model_file", type=PATH, metavar="MODEL.json", help="Model with a certificate: does it hold?"
 )
 @click.option(
     "--write-profile",
     type=PATH,
     metavar="OUT.toml",
-    help="Write the device as it was measured; needs --push.",
+    help="Write the measured profile; needs --push.",
 )
 @click.option(
     "--coulomb-friction",
@@ -64,12 +62,12 @@ def check_device(
     yes: bool,
     as_json: bool,
 ) -> None:
-    """Measure whether a device is fit to render force, and end in a verdict.
+    """Measure a device and judge if it can render force.
 
-    The device stays disabled while it is looked at: rate, period, lost samples, encoder and, while you move
-    the handle against an object, the signs of its velocity and transducer. A motor that turns the wrong way
-    shows only when it turns: with --push, and only where the rest is right, it is enabled for pushes of half
-    a percent of its force. Before that was seen nothing should render. Exit code 1: not suitable.
+    The device stays disabled while its rate, period, lost samples and encoder are measured. Move the handle
+    against an object to show the signs of its velocity and transducer. A reversed motor cannot be detected
+    while the drive is disabled: with --push, and only where the rest is right, the device is enabled for
+    pushes of half a percent of its force. Do not render before that. Exit code 1: not suitable.
     """
     from ..devices import check_device as check
     from ..model import load_model
@@ -116,8 +114,7 @@ def check_device(
                 "verdict": str(verdict),
                 "written": None if written is None else str(written),
                 "findings": [
-                    {"name": finding.name, "told": finding.told, "right": finding.right}
-                    for finding in found.findings
+                    {"name": each.name, "text": each.text, "right": each.right} for each in found.observations
                 ],
                 **found.numbers,
             }
@@ -130,9 +127,9 @@ def check_device(
                 f"{os.cpu_count()} cores",
                 "device": found.device,
                 **{
-                    finding.name: f"{_MARKS[finding.right]:5} {finding.told}"
-                    + (f" ({finding.advice})" if finding.right is None and finding.advice else "")
-                    for finding in found.findings
+                    each.name: f"{_MARKS[each.right]:5} {each.text}"
+                    + (f" ({each.advice})" if each.right is None and each.advice else "")
+                    for each in found.observations
                 },
             }
         )

@@ -56,7 +56,7 @@ def demo(output: Path, as_json: bool) -> None:
     """
     from ..identification import identify
     from ..identification.classes.findings import error_findings
-    from ..planning import bench_for, compare_structures, describe
+    from ..planning import compare_structures, describe, rig_for
     from ..recording.sample import sample_recording
     from ..verdict import Verdict
     from ..verification import verify
@@ -72,7 +72,7 @@ def demo(output: Path, as_json: bool) -> None:
     verification = verify(model, fresh)
     loops = close_loops(model, fresh)
     talk("rendering on a simulated device with each structure ...")
-    structures = compare_structures(model, bench_for(model), RENDERED_S)
+    structures = compare_structures(model, rig_for(model), RENDERED_S)
 
     verdict = model.verdict + Verdict(tuple(error_findings(verification.nrmse, "the fresh recording")))
     files = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate devices: which devices there are, what is set on one, and the rule that lets a user at them."""
+"""palpate devices: lists USB devices, sets one up, and installs the udev rule."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import asdict
 
 import click
 
+from .._core.device import longest_watchdog_ms, shortest_watchdog_ms
 from ..devices import DeviceError, Found, find_devices, install_rule, open_usb
-from ..devices.wire import LONGEST_WATCHDOG_MS, SHORTEST_WATCHDOG_MS
 from ..errors import InputError
 from ..verdict import GOOD, Verdict, no, usable
 from .arguments import json_option
@@ -23,16 +23,16 @@ from .verb import Verb
 @click.option(
     "--install-udev-rule",
     is_flag=True,
-    help="Let users of this machine at USB devices; needs root, says what it does.",
+    help="Let users of this machine use USB devices; needs root and reports each step.",
 )
-@click.option("--device", default="usb", metavar="usb[:SERIAL]", help="Which one the four below are for.")
+@click.option("--device", default="usb", metavar="usb[:SERIAL]", help="The device for the next four options.")
 @click.option("--disable", is_flag=True, help="End its force.")
-@click.option("--clear", is_flag=True, help="Clear its faults; after an emergency stop nothing goes without.")
+@click.option("--clear", is_flag=True, help="Clear its faults; needed after an emergency stop.")
 @click.option("--zero", is_flag=True, help="Make its present position 0.")
 @click.option(
     "--watchdog-ms",
-    type=click.IntRange(SHORTEST_WATCHDOG_MS, LONGEST_WATCHDOG_MS),
-    help="How long it may make force without hearing anything.",
+    type=click.IntRange(shortest_watchdog_ms, longest_watchdog_ms),
+    help="Time for which it makes force without a command.",
 )
 @json_option
 def devices(
@@ -44,10 +44,9 @@ def devices(
     watchdog_ms: int | None,
     as_json: bool,
 ) -> None:
-    """List haptic devices: what they say of themselves, or why they cannot be used; or set one up.
+    """List haptic devices with their identity, or the reason why they cannot be used; or set one up.
 
-    Nothing moves by that, and no force is enabled: what renders does so itself. Exit code 1: devices are
-    plugged in, and none of them can be used.
+    No device moves and no force is enabled. Exit code 1: devices are plugged in, and none can be used.
     """
     try:
         if install_udev_rule:
@@ -77,19 +76,20 @@ def devices(
         info = one.info
         print_line(f"  --device usb:{one.serial}")
         print_line(
-            f"  encoder {info.counts_per_rev} counts a turn ({number(info.encoder_step)} rad), "
-            f"torque up to {number(info.max_torque)} N*m, {info.rate_hz} Hz, watchdog {info.watchdog_ms} ms"
+            f"  encoder {info['counts_per_rev']} counts a turn ({number(info['encoder_step'])} rad), "
+            f"torque up to {number(info['max_torque'])} N*m, {info['rate_hz']} Hz, "
+            f"watchdog {info['watchdog_ms']} ms"
         )
         print_line(
-            f"  force transducer: {'yes' if info.transducer else 'no'}; "
-            f"velocity: {'measured' if info.measures_velocity else 'not measured'}; "
-            f"firmware {info.firmware >> 8}.{info.firmware & 0xFF}, uid {info.uid:016x}"
+            f"  force transducer: {'yes' if info['transducer'] else 'no'}; "
+            f"velocity: {'measured' if info['measures_velocity'] else 'not measured'}; "
+            f"firmware {info['firmware'] >> 8}.{info['firmware'] & 0xFF}, uid {info['uid']:016x}"
         )
     end_with(verdict)
 
 
 def _verdict(found: Sequence[Found]) -> Verdict:
-    """Good if every device can be used, no if none of those that are plugged in can."""
+    """Good if every device can be used, no if none of the plugged-in devices can."""
     problems = [f"{one.serial or one.place}: {one.problem}" for one in found if one.info is None]
     if not found:
         return Verdict((usable("no haptic USB device is plugged in; --device simulated needs none"),))

@@ -85,7 +85,7 @@ def identify(
     from ..identification.search.criteria import reporting_to
     from ..verdict import Verdict
     from ..verification import verify
-    from ..verification.judgement import circumstances
+    from ..verification.verification import circumstances
 
     if plot is not None:
         require_figure_name(plot)

@@ -24,7 +24,6 @@ _VERBS = {
     "devices": "List haptic devices.",
     "check-device": "Measure for ten seconds whether a device is fit for it.",
     "show": "Print a model for a person.",
-    "chart": "Draw the figures of the documentation.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Every verb with its line in the help; its file is imported only when it is used."""

@@ -129,7 +129,7 @@ def plan(
     """
     from ..model import load_model
     from ..planning import DeviceProfile, profile_file
-    from ..planning.ladder import plan as choose
+    from ..planning.search import plan as choose
 
     profile_path = profile_file(device)
     if plot is not None:
@@ -181,7 +181,7 @@ def structure_words(plan: Plan) -> str:
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
-    from ..model.certified import certificate_record
+    from ..model.model_file import certificate_record
 
     error = plan.force_error
     felt, steepest = _felt_slopes(plan, certificate)
@@ -211,11 +211,11 @@ def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: f
     rows = {"structure": structure_words(plan)}
     if plan.solver is not None:
         rows["solver"] = plan.solver
-    if plan.structure != "direct":
+    if scheme.has_coupling:
         rows["coupling"] = (
             f"K_c = {number(scheme.coupling_stiffness)}, B_c = {number(scheme.coupling_damping)}"
         )
-    if plan.structure not in ("direct", "massless"):
+    if scheme.has_mass:
         rows["object"] = f"m = {number(scheme.mass)}, B_o = {number(scheme.damping)}"
     if scheme.predict:
         rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"

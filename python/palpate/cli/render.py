@@ -12,8 +12,8 @@ from .._core.run import LoopSettings, usual_telemetry_hz
 from ..recording.files import require_absent
 from .arguments import PATH, json_option
 from .live_line import live_line
-from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
-from .scheme_options import chosen_plan, scheme_options
+from .output import end_with, print_json, print_numbers, print_verdict, require_writable, talk
+from .scheme_options import scheme_options
 from .session_verdict import session_verdict
 from .verb import Verb
 
@@ -26,7 +26,24 @@ _LOOP = LoopSettings()
     epilog="Example: palpate render press.json --duration-s 10 --record felt.csv",
 )
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
-@click.option("--rate-hz", type=float, default=_LOOP.rate_hz, help="Ticks a second.")
+@click.option(
+    "--device",
+    default="simulated",
+    metavar="NAME",
+    help="simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z.",
+)
+@click.option(
+    "--uncertified",
+    is_flag=True,
+    help="Render without the certificate's limits: nothing proves that a real device stays stable.",
+)
+@click.option(
+    "--wait-ms",
+    type=click.FloatRange(0.1, 10000),
+    show_default="5 for USB, 20 for an Inverse3",
+    help="How long to wait for an answer of the device.",
+)
+@click.option("--rate-hz", type=float, show_default=f"{_LOOP.rate_hz:g}", help="Ticks a second.")
 @click.option("--duration-s", type=float, default=_LOOP.duration_s, help="How long; inf: until Ctrl-C.")
 @click.option(
     "--record",
@@ -55,72 +72,55 @@ _LOOP = LoopSettings()
 @scheme_options
 def render(
     model_file: Path,
-    rate_hz: float,
-    duration_s: float,
+    device: str,
+    wait_ms: float | None,
     record: Path | None,
     force: bool,
-    telemetry_port: int | None,
-    telemetry_hz: float,
-    lowest_rate_share: float,
     as_json: bool,
-    **scheme: Any,
+    **options: Any,
 ) -> None:
-    """Render a model live on a simulated device, tick by tick.
+    """Render a model live on a device, tick by tick.
 
-    The loop is that of palpate-control, with real-time priority where the system allows it. Ctrl-C ends it in
-    an orderly way: zero force first, then the recording is closed, then the summary is printed.
+    The loop is that of palpate-control, with real-time priority where the system allows it. A real device
+    requires a plan with a certificate for it. Ctrl-C stops the loop: it sends zero force, closes the device
+    and the recording, and prints the summary.
     """
     from .._core.run import render as render_live
     from ..model import load_model
-    from ..planning import bench_for
+    from ..planning import Plan
 
     if record is not None:
         require_writable(record, inputs=(model_file,))
         if not force:
             require_absent(record)
     model = load_model(model_file)
-    bench = bench_for(model)
-    plan = chosen_plan(model, bench, scheme)
-    talk(f"read {model_file}: {model!r}; rendering on a {bench.device.id}, which is simulated: nothing moves")
-    with live_line(rate_hz, (model.units["position"], model.units["force"])) as line:
+    plan = None if model.plan is None else Plan.of(model)
+    units = (model.units["position"], model.units["force"])
+    nothing_moves = ", which is simulated: nothing moves" if device == "simulated" else ""
+    talk(f"read {model_file}: {model!r}; rendering on {device}{nothing_moves}")
+    with live_line(options["rate_hz"] or _LOOP.rate_hz, units) as line:
         summary = render_live(
-            plan.rendered,
-            plan.scheme,
-            position_unit=model.units["position"],
-            force_unit=model.units["force"],
-            rate_hz=rate_hz,
-            duration_s=duration_s,
+            model,
+            None if plan is None else plan.scheme,
+            limited=None if plan is None else plan.limited,
+            certificate=None if plan is None else plan.certificate,
+            position_unit=units[0],
+            force_unit=units[1],
+            model_name=str(model_file),
+            progress=line.show,
+            device=device,
+            wait_s=None if wait_ms is None else 1e-3 * wait_ms,
             record="" if record is None else str(record),
             force=force,
-            model_name=str(model_file),
-            telemetry_port=telemetry_port,
-            telemetry_hz=telemetry_hz,
-            lowest_rate_share=lowest_rate_share,
-            progress=line.show,
+            **options,
         )
+    lines = summary.pop("lines")
     for note in summary["notes"]:
         talk(f"  {note}")
     verdict = session_verdict(summary)
     if as_json:
         print_json(summary)
-        end_with(verdict)
-        return
-    print_verdict(verdict)
-    rows = {
-        "ended": summary["ended"],
-        "rate": f"{number(summary['rate_hz'])} Hz of {number(rate_hz)} Hz, "
-        f"{summary['missed_deadlines']} deadlines missed",
-        "period": _percentiles(summary["period"]),
-        "late by": _percentiles(summary["lateness"]),
-        "energy": summary["energy"]["sentence"],
-        "ticks": ", ".join(f"{count} {word}" for word, count in summary["ticks_by_status"].items()),
-    }
-    if record is not None:
-        rows["recorded"] = f"{summary['record']}: {summary['recorded']} rows, {summary['lost_records']} lost"
-    print_numbers(rows)
+    else:
+        print_verdict(verdict)
+        print_numbers(dict(lines))
     end_with(verdict)
-
-
-def _percentiles(durations: dict[str, float]) -> str:
-    names = {"p50_us": "p50", "p99_us": "p99", "p999_us": "p99.9", "max_us": "max"}
-    return ", ".join(f"{name} {number(durations[key])} us" for key, name in names.items())

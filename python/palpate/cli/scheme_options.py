@@ -12,7 +12,7 @@ from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from .output import talk
 
 if TYPE_CHECKING:
-    from .._core.simulation import Bench
+    from .._core.simulation import TestRig
     from ..model import Model
     from ..planning import Plan
 
@@ -77,7 +77,7 @@ def scheme_options(command: F) -> F:
     return cast(F, described)
 
 
-def chosen_plan(model: Model, bench: Bench, scheme: Mapping[str, Any]) -> Plan:
+def chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
     """What was asked for; else the plan that stands in the model; else the default, which is told."""
     from ..planning import Plan
 
@@ -89,4 +89,4 @@ def chosen_plan(model: Model, bench: Bench, scheme: Mapping[str, Any]) -> Plan:
                 "no plan in the model: rendered behind the default coupling, which is felt; "
                 "'palpate plan' finds the simplest rendering that is not"
             )
-    return Plan(model, bench.scheme(model, **scheme))
+    return Plan(model, rig.scheme(model, **scheme))

@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from ..recording.files import require_absent
-from ..recording.writing import write_csv
 from .arguments import PATH, json_option, plot_option
 from .ending import interrupted_at_once
 from .figures import require_figure_name
@@ -61,7 +60,7 @@ def simulate(
     This shows what happens, and proves nothing.
     """
     from ..model import load_model
-    from ..planning import bench_for, force_error, force_range, judge
+    from ..planning import force_error, force_range, judge, rig_for
     from ..planning import simulate as render
 
     if plot is not None:
@@ -72,14 +71,14 @@ def simulate(
     if output is not None and not force:
         require_absent(output)
     model = load_model(model_file)
-    bench = bench_for(model)
-    plan = chosen_plan(model, bench, scheme)
-    device = bench.device if plan.certificate is None else plan.certificate.device
+    rig = rig_for(model)
+    plan = chosen_plan(model, rig, scheme)
+    device = rig.device if plan.certificate is None else plan.certificate.device
     talk(f"read {model_file}: {model!r}; rendering on a {device.id}, which is simulated")
     ticks = max(duration_s / device.period_s, 1.0)
     with progress("simulating") as shown:
         rendered = render(
-            plan, device, bench.hand, duration_s, lambda tick: shown(f"{100 * tick / ticks:.1f} %")
+            plan, device, rig.hand, duration_s, lambda tick: shown(f"{100 * tick / ticks:.1f} %")
         )
     error = force_error(plan, rendered)
     verdict = judge(plan, rendered, error)
@@ -103,7 +102,7 @@ def simulate(
     }
     with finishing():
         if output is not None and not endings["NonFinite"]:
-            write_csv(rendered, output, replace=force)
+            rendered.write(output, replace=force)
         if plot is not None:
             picture_rendering(plot, plan, rendered)
         if as_json:

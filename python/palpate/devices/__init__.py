@@ -1,25 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices: which there are, what is set before a run, whether one is fit, how an object is recorded."""
+"""Finds devices, sets them up, checks them, and records an object on one."""
 
 from .check import Check, check_device, judge, with_pushes
-from .errors import DeviceError
-from .finding import Finding
 from .measuring import measure, record
-from .push import Push, push_response
+from .observations import Observation
+from .pushes import Push, push_response
 from .udev import install_rule
-from .usb import Found, UsbSetup, find_devices, open_usb
-from .wire import DeviceInfo, decode_info
+from .usb import DeviceError, Found, UsbSetup, find_devices, open_usb
 
 __all__ = [
     "Check",
     "DeviceError",
-    "DeviceInfo",
-    "Finding",
     "Found",
+    "Observation",
     "Push",
     "UsbSetup",
     "check_device",
-    "decode_info",
     "find_devices",
     "install_rule",
     "judge",

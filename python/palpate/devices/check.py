@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check of a device: measurements, findings and the verdict whether it is fit to render force."""
+"""Checks a device: measurements, observations, and the verdict on rendering force with it."""
 
 from __future__ import annotations
 
@@ -14,19 +14,16 @@ from .._core.device import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..model import Model
 from ..planning import DeviceProfile
-from ..verdict import Verdict, no, usable
-from .finding import Finding
-from .fitting import compare, profile_of
-from .listening import findings_at_rest
+from ..verdict import Verdict
 from .measuring import Progress, measure
-from .mechanics import Mechanics
-from .push import Push, push_response
+from .observations import Observation, compare, observe_at_rest
+from .pushes import Mechanics, Push, push_response
 
 LISTENING_SHARE = 0.7
-"""Share of the check in which the device only listens; the rest is for the pushes."""
+"""Share of the check in which the device makes no force; the rest is for the pushes [-]"""
 
 PUSH_SHARE = 0.005
-"""A push, over the largest force of the device."""
+"""Force of a push [share of the largest force of the device]"""
 
 _STATE_FRICTION = (
     "let go of the handle and check for 10 s; if the friction is above the pushes, state it with "
@@ -37,51 +34,46 @@ _SHORTEST_S = 2.0
 _DELAY_MARGIN = 0.05
 """Added to the measured delay, because the clocks of host and device drift [periods]"""
 _SEEN_STEPS = 5.0
-"""A push that moved the handle by less, in encoder steps, tells nothing."""
+"""Least displacement from which a sign is read [encoder steps]"""
 _SURE = 3.0
-"""Standard errors that a push has to stand out by."""
+"""Least displacement from which a sign is read [standard errors]"""
 _SIGN = "sign of the force"
 _SIMULATED_FRICTION = 0.002
-"""Coulomb friction of the simulated device, a bearing's, over its largest force."""
+"""Coulomb friction of the simulated device [share of its largest force]"""
 
 
 @dataclass(frozen=True)
 class Check:
-    """What a check found."""
+    """Result of a check."""
 
     device: str
-    findings: tuple[Finding, ...]
+    observations: tuple[Observation, ...]
     numbers: Mapping[str, float | None]
     base: CoreProfile
-    """What the device says of itself, its mechanics apart."""
+    """What the device states of itself, without its mechanics."""
     coulomb_friction: float | None = None
     """Friction that was stated by the user [N or N*m]"""
 
     @property
     def suitable(self) -> bool:
-        """Whether nothing was wrong."""
-        return all(finding.right is not False for finding in self.findings)
+        """True if no observation is wrong."""
+        return all(each.right is not False for each in self.observations)
 
     @property
     def may_push(self) -> bool:
-        """Whether what was heard allows a small force. A machine that is late only does."""
-        return not any(finding.right is False and finding.forbids_force for finding in self.findings)
+        """True if a small force is allowed. A machine that is only late allows it."""
+        return not any(each.right is False and each.forbids_force for each in self.observations)
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on the device: no if a finding is wrong, usable if something was not seen."""
-        return Verdict(
-            tuple(
-                (usable if finding.right is None else no)(
-                    f"{finding.name}: {finding.told}" + (f" ({finding.advice})" if finding.advice else "")
-                )
-                for finding in self.findings
-                if finding.right is False or (finding.right is None and finding.advice)
-            )
-        )
+        """The verdict on the device: no if an observation is wrong, usable if a property was not seen."""
+        return Verdict(tuple(each.finding for each in self.observations if each.finding))
 
     def profile(self) -> DeviceProfile:
-        """The device as it was measured.
+        """Returns the device as it was measured.
+
+        Friction is a lower bound, as a certificate requires; encoder, force step and force limit are those
+        that the device states.
 
         Raises
         ------
@@ -90,10 +82,30 @@ class Check:
         """
         if not self.may_push:
             raise InputError("there is no profile of a device that must not make force")
-        return profile_of(self.base, self.numbers)
+        inertia, damping = self.numbers["inertia"], self.numbers["viscous_damping"]
+        friction = self.numbers["coulomb_friction_at_least"]
+        if inertia is None or damping is None or friction is None:
+            raise InputError(
+                "a profile needs inertia, damping and friction: push a handle that nobody holds and nothing "
+                "is mounted on, for 10 s; if the friction is above the pushes, state it with "
+                "--coulomb-friction (in Python coulomb_friction)"
+            )
+        period, jitter, delay = self.numbers["period_s"], self.numbers["jitter_s"], self.numbers["delay_s"]
+        assert period is not None
+        assert jitter is not None
+        return DeviceProfile(
+            **self.base.to_dict()
+            | {
+                "jitter_s": max(0.0, period + jitter - self.base.period_s),
+                "inertia": inertia,
+                "viscous_damping": damping,
+                "coulomb_friction": friction,
+                "delay_s": delay or 0.0,
+            }
+        )
 
     def profile_notes(self) -> tuple[str, ...]:
-        """For each number of the profile whether it was measured, stated or said by the device."""
+        """The origin of each number of the profile."""
         stated = self.coulomb_friction is not None
         friction = "stated, not measured" if stated else "measured, less its uncertainty: a lower bound"
         delay = "measured" if self.numbers["delay_s"] is not None else "not measured; assumed to be 0"
@@ -120,37 +132,37 @@ def check_device(
     wait_s: float | None = None,
     progress: Progress | None = None,
 ) -> Check:
-    """Measure a device for some seconds and judge it.
+    """Measures a device for some seconds and judges it.
 
-    First the device only listens, disabled: its rate, its lost samples, its encoder, and, while somebody
-    moves the handle against an object, the signs of its velocity and transducer against its positions. The
-    sign of its motor shows in nothing that a disabled device says. With `push`, and only where the other
-    signs and the encoder are right, it is therefore enabled and pushes the handle, which nobody need hold, a
-    little to either side: half a percent of its force shows that sign, its delay, its inertia and damping.
-    Where a sign is wrong there is no profile, and so nothing is certified for the device.
+    First the device is disabled, and its rate, lost samples and encoder are measured. While the user moves
+    the handle against an object, the signs of its velocity and transducer are compared with its positions.
+    A reversed motor cannot be detected while the drive is disabled. With `push`, and only where the other
+    signs and the encoder are right, it is therefore enabled and pushes the free handle a little to either
+    side. Half a percent of its force shows the sign of the force, the delay, inertia and damping. Where a
+    sign is wrong there is no profile, and so nothing is certified for the device.
 
     Parameters
     ----------
     device : str
         ``simulated``, or ``usb[:SERIAL]``.
     object : Model, optional
-        What is mounted on the simulated device.
+        The object mounted on the simulated device.
     transducer : bool
-        Whether the simulated device has a force transducer.
+        True if the simulated device has a force transducer.
     duration_s, rate_hz : float
-        How long altogether [s], and how often [Hz]; a USB device has its own rate.
+        Total duration [s] and sampling rate [Hz]; a USB device has its own rate.
     push : bool
-        Whether it may push.
+        True if the device may push.
     profile : DeviceProfile, optional
-        What the device is thought to be.
+        The expected device.
     model : Model, optional
-        One with a certificate: whether that holds on this device.
+        A model with a certificate: does it hold on this device?
     coulomb_friction : float, optional
         Friction of the device, where it is known and cannot be measured [N or N*m]; a lower bound.
     wait_s : float, optional
-        How long a packet of a USB device is waited for [s].
+        Longest wait for a packet of a USB device [s].
     progress : callable, optional
-        Is told ten times a second: ticks, position, force, samples lost.
+        Called ten times a second with ticks, position, force and samples lost.
 
     Raises
     ------
@@ -161,7 +173,7 @@ def check_device(
         raise InputError(f"duration_s is {duration_s:g}, must be at least {_SHORTEST_S:g} to see anything")
     if coulomb_friction is not None and not 0.0 <= coulomb_friction < math.inf:
         raise InputError(f"coulomb_friction is {coulomb_friction:g}, must be a finite number >= 0")
-    counted_on = _counted_on(profile, model)
+    expected = _expected(profile, model)
     common: dict[str, Any] = {
         "object": object,
         "transducer": transducer,
@@ -169,35 +181,35 @@ def check_device(
         "wait_s": wait_s,
         "progress": progress,
         "keep": True,
-        "lowest_rate_share": 0.0,  # a low rate is a finding, and no reason to stop
+        "lowest_rate_share": 0.0,  # a low rate is an observation, and no reason to stop
         "friction_share": _SIMULATED_FRICTION,
     }
     listened = measure(device, duration_s=duration_s * (LISTENING_SHARE if push else 1.0), **common)
     check = judge(listened)
     if not push:
-        check = _with(check, Finding(_SIGN, "not looked at", None, "let it push a free handle: --push"))
+        check = _with(check, Observation(_SIGN, "not looked at", None, "let it push a free handle: --push"))
     elif not check.may_push:
-        check = _with(check, Finding(_SIGN, "not looked at: what was heard forbids any force"))
+        check = _with(check, Observation(_SIGN, "not looked at: what was heard forbids any force"))
     else:
         force = PUSH_SHARE * check.base.force_limit
         pushed = measure(device, duration_s=duration_s * (1.0 - LISTENING_SHARE), push=force, **common)
         push_seen = push_response(pushed["kept"], check.base.encoder_step, coulomb_friction)
         check = with_pushes(replace(check, coulomb_friction=coulomb_friction), push_seen)
-    compared = tuple(compare(other, check.numbers, name=name) for name, other in counted_on.items())
+    compared = tuple(compare(other, check.numbers, name=name) for name, other in expected.items())
     return _with(check, *compared)
 
 
-def _with(check: Check, *findings: Finding) -> Check:
-    return replace(check, findings=(*check.findings, *findings))
+def _with(check: Check, *added: Observation) -> Check:
+    return replace(check, observations=(*check.observations, *added))
 
 
 def judge(listened: Mapping[str, Any]) -> Check:
-    """Judge what was heard of a device at no force.
+    """Judges a device from measurements at no force.
 
     Parameters
     ----------
     listened : mapping
-        A summary of :func:`measure`, with its ticks under ``kept`` and the device's word under ``profile``.
+        A summary of :func:`measure`, with its ticks under ``kept`` and the stated device under ``profile``.
     """
     base = listened["profile"]
     ticks = listened["kept"]
@@ -218,84 +230,78 @@ def judge(listened: Mapping[str, Any]) -> Check:
         "coulomb_friction_at_least": None,
         **{f"period_{name}": value for name, value in listened["period"].items()},
     }
-    findings = findings_at_rest(listened)
+    observations = observe_at_rest(listened)
     if "round_trip" in listened:
         delay_us = listened["delay"]
         delay_s = 1e-6 * delay_us["p999_us"] + _DELAY_MARGIN * base.period_s
         numbers["delay_s"] = delay_s
-        for told in ("round_trip", "delay"):
-            numbers.update({f"{told}_{name}": value for name, value in listened[told].items()})
-        findings.append(
-            Finding(
+        for each in ("round_trip", "delay"):
+            numbers.update({f"{each}_{name}": value for name, value in listened[each].items()})
+        observations.append(
+            Observation(
                 "delay",
                 f"{1e6 * delay_s:.0f} us from a sample to its force: p50 "
                 f"{delay_us['p50_us']:.0f} us, p99.9 {delay_us['p999_us']:.0f} us",
             )
         )
-    return Check(listened["device"], tuple(findings), numbers, base)
+    return Check(listened["device"], tuple(observations), numbers, base)
 
 
 def with_pushes(check: Check, push: Push) -> Check:
-    """Add what pushes showed to a check."""
-    findings = [*check.findings, _sign(push, check.base.encoder_step)]
+    """Adds the results of pushes to a check."""
+    observations = [*check.observations, _sign(push, check.base.encoder_step)]
     numbers = dict(check.numbers)
     if push.delay_samples is not None and numbers["delay_s"] is None:
         numbers["delay_s"] = push.delay_samples * check.base.period_s
-        findings.append(Finding("delay", f"{push.delay_samples} samples from a sample to its force"))
+        observations.append(Observation("delay", f"{push.delay_samples} samples from a sample to its force"))
     mechanics = push.mechanics
     if mechanics is None:
-        findings.append(Finding("friction", f"not measured: {push.unseen}", None, _STATE_FRICTION))
+        observations.append(Observation("friction", f"not measured: {push.unseen}", None, _STATE_FRICTION))
     else:
         numbers["inertia"], numbers["viscous_damping"] = mechanics.inertia, mechanics.damping
         numbers["coulomb_friction"] = mechanics.friction
         numbers["coulomb_friction_at_least"] = mechanics.friction_at_least
-        findings += _mechanics(mechanics, check)
-    return replace(check, findings=tuple(findings), numbers=numbers)
+        observations += _mechanics(mechanics, check)
+    return replace(check, observations=tuple(observations), numbers=numbers)
 
 
-def _mechanics(mechanics: Mechanics, check: Check) -> list[Finding]:
+def _mechanics(mechanics: Mechanics, check: Check) -> list[Observation]:
     turns = check.base.position_unit == "rad"
     units = ("kg*m^2", "N*m*s/rad", "N*m") if turns else ("kg", "N*s/m", "N")
     least = mechanics.friction_at_least
-    found = [
-        Finding(
-            "mechanics",
-            f"inertia {mechanics.inertia:.3g} {units[0]}, damping {mechanics.damping:.3g} {units[1]}",
-        )
-    ]
     if check.coulomb_friction is not None:
-        found.append(Finding("friction", f"{least:.3g} {units[2]}, stated and not measured"))
+        friction = Observation("friction", f"{least:.3g} {units[2]}, stated and not measured")
     elif least > 0.0:
-        told = f"{mechanics.friction:.3g} {units[2]}, at least {least:.3g}"
-        found.append(Finding("friction", told))
+        friction = Observation("friction", f"{mechanics.friction:.3g} {units[2]}, at least {least:.3g}")
     else:
-        told = f"none was found, {3.0 * mechanics.friction_unsure:.1g} {units[2]} at most"
-        found.append(Finding("friction", told, None, _NO_FRICTION))
-    return found
+        text = f"none was found, {3.0 * mechanics.friction_unsure:.1g} {units[2]} at most"
+        friction = Observation("friction", text, None, _NO_FRICTION)
+    text = f"inertia {mechanics.inertia:.3g} {units[0]}, damping {mechanics.damping:.3g} {units[1]}"
+    return [Observation("mechanics", text), friction]
 
 
-def _sign(push: Push, step: float) -> Finding:
-    """Whether pushes moved the handle the way that they should."""
-    told = f"a push moved the handle by {push.moved:.3g}, {push.unsure:.1g} unsure"
+def _sign(push: Push, step: float) -> Observation:
+    """Judges if pushes moved the handle in the right direction."""
+    text = f"a push moved the handle by {push.moved:.3g}, {push.unsure:.1g} unsure"
     if abs(push.moved) < max(_SEEN_STEPS * step, _SURE * push.unsure) or push.moved == 0.0:
-        return Finding(_SIGN, f"not seen: {told}", None, "let go of the handle")
+        return Observation(_SIGN, f"not seen: {text}", None, "let go of the handle")
     if push.moved < 0.0:
-        told = f"flipped: {told} the wrong way"
+        text = f"flipped: {text} the wrong way"
     elif not push.obeyed:
-        told = "flipped: the device says that it makes the opposite of what it is told to make"
+        text = "flipped: the device says that it makes the opposite of what it is told to make"
     else:
-        told = f"right: {told}"
-    return Finding(
+        text = f"right: {text}"
+    return Observation(
         _SIGN,
-        told,
+        text,
         push.moved > 0.0 and push.obeyed,
         "swap two wires of the motor or mirror its sign in the firmware; do not enable force",
         True,
     )
 
 
-def _counted_on(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:
-    """What the device is compared with, by the name of the finding."""
+def _expected(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:
+    """The devices to compare with, by the name of the observation."""
     devices: dict[str, CoreProfile] = {} if profile is None else {"profile": profile}
     if model is not None:
         if model.certificate is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A real object measured on a device by the core's loop: what `record` and `check-device` stand on."""
+"""Measures on a device with the loop of the core: for `record` and `check-device`."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from ..errors import InputError
 from ..model import Model
 
 Progress = Callable[[int, float, float, int], None]
-"""Is told, ten times a second, the ticks so far, the position, the object's force and the samples lost."""
+"""Called ten times a second with ticks, position, force of the object and samples lost"""
 
 
 def measure(device: str = "simulated", *, object: Model | None = None, **settings: Any) -> dict[str, Any]:
-    """Let the loop run on a device that nobody renders on.
+    """Runs the loop on a device without rendering.
 
     Parameters
     ----------
     device : str
         ``simulated``, or ``usb[:SERIAL]``.
     object : Model, optional
-        What is mounted on the simulated device.
+        The object mounted on the simulated device.
     **settings
         As :func:`palpate._core.run.measure` takes them.
 
     Returns
     -------
     dict
-        What was done, by name.
+        The summary, by name.
 
     Raises
     ------
     InputError
-        Refused before anything moved: with the device, the reason and its cure.
+        Refused before any motion; the message states the device, the reason and the cure.
     """
     if object is not None:
         if device != "simulated":
@@ -49,7 +49,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
                 f"the object has {object.dimension} inputs: one of the position alone can be mounted"
             )
     try:
-        return measure_live(device, object=object, **settings)
+        return measure_live(device=device, object=object, **settings)
     except InputError:
         raise
     except ValueError as error:
@@ -71,48 +71,47 @@ def record(
     progress: Progress | None = None,
     **sweep: float | None,
 ) -> dict[str, Any]:
-    """Record position and force of a real object.
+    """Records position and force of a real object.
 
-    Without `probe` somebody moves the handle; with it the device draws the handle along slowly, to and
-    fro, and turns round where the object holds `force_limit`. The force is that of the device's transducer;
-    without one it is what the motor holds against the object, the friction of the device included, which
-    needs the probe.
+    Without `probe` the user moves the handle. With it the device moves the handle slowly to and fro, and
+    turns round where the object holds `force_limit`. The force is that of the device's transducer. Without a
+    transducer it is the force of the motor, which includes the friction of the device and needs the probe.
 
     Parameters
     ----------
     path : str or Path
         The recording; it grows as path.part, which is locked while it grows.
     force : bool
-        Whether an existing recording is replaced; without, it is refused.
+        True: an existing recording is replaced. False: it is refused.
     device : str
         ``simulated``, or ``usb[:SERIAL]``.
     object : Model, optional
-        What is mounted on the simulated device.
+        The object mounted on the simulated device.
     probe : bool
-        Whether the device moves the handle by itself.
+        True: the device moves the handle by itself.
     duration_s, rate_hz : float
-        How long (inf: until Ctrl-C) [s], and how often [Hz].
+        Duration (inf: until Ctrl-C) [s] and sampling rate [Hz].
     transducer : bool
-        Whether the simulated device has one.
+        True if the simulated device has one.
     wait_s : float, optional
-        How long a packet of a USB device is waited for [s].
+        Longest wait for a packet of a USB device [s].
     lowest_rate_share : float, optional
-        Of the rate: less for half a second ends a probe, 0: never; a hand's recording never ends by it.
+        A lower share of the rate for half a second ends a probe; 0: never. It never ends a recording by hand.
     progress : callable, optional
-        Is told ten times a second: ticks, position, force, samples lost.
+        Called ten times a second with ticks, position, force and samples lost.
     **sweep
-        lower, upper [m or rad], speed [a second], stiffness, force_limit of the probe; None: as suits it.
+        lower, upper [m or rad], speed [a second], stiffness, force_limit of the probe; None: chosen.
 
     Returns
     -------
     dict
-        What was done, by name: verdict ("good", "usable: ..." or "no: ..."), findings, recorded rows, rate,
-        how it ended, ...
+        The summary, by name: verdict ("good", "usable: ..." or "no: ..."), findings, recorded rows, rate,
+        reason of the end, ...
 
     Raises
     ------
     InputError
-        Refused before anything moved.
+        Refused before any motion.
     """
     if device == "simulated" and object is None:
         raise InputError("nothing is mounted on the simulated device; give it an object, a model file")
@@ -122,7 +121,7 @@ def record(
             "moves the handle: probe instead"
         )
     if not probe:
-        lowest_rate_share = 0.0  # nothing makes force: a low rate is told, and no reason to stop
+        lowest_rate_share = 0.0  # no force is made: a low rate is reported, and no reason to stop
     if lowest_rate_share is not None:
         sweep["lowest_rate_share"] = lowest_rate_share
     return measure(

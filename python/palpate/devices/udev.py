@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The udev rule that lets somebody who is not root use a device: shipped here, installed on request."""
+"""Installs the udev rule with which users other than root can use a device."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..recording.files import replacing
-from .errors import DeviceError
+from .usb import DeviceError
 
 RULE = "60-palpate.rules"
 FOLDER = Path("/etc/udev/rules.d")
@@ -21,19 +21,19 @@ _RELOAD = (("udevadm", "control", "--reload-rules"), ("udevadm", "trigger", "--s
 
 
 def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
-    """Write the rule and ask udev to read it.
+    """Writes the rule and makes udev read it.
 
     Parameters
     ----------
     tell : callable
-        Is told of each step.
+        Called with a sentence for each step.
     folder : Path
-        Where the rules of this machine live.
+        Folder of the rules of this machine.
 
     Raises
     ------
     DeviceError
-        Without root, or where the system refuses: what to do instead.
+        Without root, or if the system refuses; the message states the cure.
     """
     target = folder / RULE
     if not folder.is_dir():

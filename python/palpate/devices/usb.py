@@ -1,33 +1,61 @@
 # SPDX-License-Identifier: Apache-2.0
-"""USB devices over pyusb: which there are, what they say of themselves, and what is set before a run.
+"""Lists USB devices over pyusb, reads their identity and sets them up before a run.
 
-The stream of samples needs both directions at once, which pyusb cannot do: it is the core's.
+The stream of samples needs both directions at once, which pyusb cannot do: the core reads it.
 """
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType, TracebackType
 from typing import Any
 
+from .._core import device as core
+from .._core.device import UsbRequest
 from ..errors import InputError
-from . import wire
-from .errors import DeviceError, device_error
 
 _TIMEOUT_MS = 500
+
+_PERMISSION = (
+    "permission denied",
+    "run `sudo palpate devices --install-udev-rule` once, then plug it in again",
+)
+_GONE = ("it is gone", "plug it in again")
+_REASONS = {
+    errno.EACCES: _PERMISSION,
+    errno.EPERM: _PERMISSION,
+    errno.EBUSY: ("another program holds it", "close palpate-control or whatever else uses it"),
+    errno.ENODEV: _GONE,
+    errno.ENOENT: _GONE,
+    errno.EPIPE: ("it refuses the request (stall)", "its firmware may be of another version"),
+    errno.ETIMEDOUT: ("it does not answer", "plug it in again; look at its power supply"),
+    errno.EIO: ("the transfer failed", "try another cable or port"),
+}
+
+
+class DeviceError(Exception):
+    """A device that cannot be used: one sentence that names it, the reason and the likely cure."""
+
+
+def device_error(device: str, doing: str, error: Any) -> DeviceError:
+    """The sentence for an error of pyusb while `doing` something with `device`."""
+    said = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    reason, cure = _REASONS.get(getattr(error, "errno", None) or 0, (said, "plug it in again"))
+    return DeviceError(f"{device}, {doing}: {reason}; {cure}")
 
 
 def _pyusb() -> ModuleType:
     try:
-        import usb.core as core
+        import usb.core
     except ModuleNotFoundError:
         raise DeviceError("USB devices need pyusb: pip install 'palpate[usb]'") from None
-    return core  # type: ignore[no-any-return]
+    return usb.core  # type: ignore[no-any-return]
 
 
 class UsbSetup:
-    """One USB device while it is set up. Use it as a context manager: it is let go at the end.
+    """Sets up one USB device. It is a context manager, which releases the device at the end.
 
     Parameters
     ----------
@@ -37,7 +65,7 @@ class UsbSetup:
     Raises
     ------
     DeviceError
-        From every method: the device, what was being done, the reason and the likely cure.
+        From every method: names the device, the action, the reason and the likely cure.
     """
 
     def __init__(self, handle: Any) -> None:
@@ -59,106 +87,105 @@ class UsbSetup:
 
     @property
     def name(self) -> str:
-        """How a person knows it."""
+        """Product, serial number and place on the bus."""
         known = " ".join(part for part in (self.product, self.serial) if part)
         return f"{known} ({self.place})" if known else self.place
 
-    def identify(self) -> wire.DeviceInfo:
-        """Ask the device who it is: strings and GET_INFO, decoded strictly."""
-        info = wire.decode_info(
-            bytes(self._request(wire.Request.GET_INFO, "asking who it is", wire.LARGEST_PACKET))
-        )
-        for field, index in (("product", self._handle.iProduct), ("serial", self._handle.iSerialNumber)):
-            setattr(self, field, self._string(index))
+    def identify(self) -> dict[str, Any]:
+        """Reads the names and the identity of the device: see :func:`palpate._core.device.decode_info`."""
+        answer = self._request(UsbRequest.GetInfo, "asking who it is", core.usb_largest_packet)
+        info = core.decode_info(answer)
+        self.product = self._string(self._handle.iProduct)
+        self.serial = self._string(self._handle.iSerialNumber)
         return info
 
     def zero(self) -> None:
-        """Make the present position 0."""
-        self._request(wire.Request.ZERO, "zeroing its encoder")
+        """Makes the present position 0."""
+        self._request(UsbRequest.Zero, "zeroing its encoder")
 
     def set_watchdog(self, milliseconds: int) -> None:
-        """Set how long the device makes force without a command, 2 to 1000 ms."""
-        if not wire.SHORTEST_WATCHDOG_MS <= milliseconds <= wire.LONGEST_WATCHDOG_MS:
+        """Sets the time for which the device makes force without a command, 2 to 1000 ms."""
+        if not core.shortest_watchdog_ms <= milliseconds <= core.longest_watchdog_ms:
             raise InputError(f"watchdog is {milliseconds} ms, must be 2 to 1000")
-        self._request(wire.Request.WATCHDOG, "setting its watchdog", value=milliseconds)
+        self._request(UsbRequest.Watchdog, "setting its watchdog", value=milliseconds)
 
     def enable(self) -> None:
-        """Let it make force; it starts at none."""
-        self._request(wire.Request.ENABLE, "enabling its force", value=1)
+        """Enables force, which starts at 0."""
+        self._request(UsbRequest.Enable, "enabling its force", value=1)
 
     def disable(self) -> None:
-        """No force any longer."""
-        self._request(wire.Request.ENABLE, "disabling its force", value=0)
+        """Ends the force."""
+        self._request(UsbRequest.Enable, "disabling its force", value=0)
 
     def clear(self) -> None:
-        """Clear its faults; after an emergency stop this comes before `enable`."""
-        self._request(wire.Request.CLEAR, "clearing its faults")
+        """Clears faults; after an emergency stop this comes before `enable`."""
+        self._request(UsbRequest.Clear, "clearing its faults")
 
     def close(self) -> None:
-        """Let the device go."""
+        """Releases the device."""
         import usb.util
 
         usb.util.dispose_resources(self._handle)
 
-    def _request(self, request: wire.Request, doing: str, size: int = 0, *, value: int = 0) -> bytes:
-        core = _pyusb()
+    def _request(self, request: UsbRequest, doing: str, size: int = 0, *, value: int = 0) -> bytes:
+        pyusb = _pyusb()
         try:
             answer = self._handle.ctrl_transfer(
-                wire.TO_HOST if size else wire.TO_DEVICE,
+                core.usb_to_host if size else core.usb_to_device,
                 int(request),
                 value,
-                wire.INTERFACE,
+                core.usb_interface,
                 size or None,
                 timeout=_TIMEOUT_MS,
             )
-        except (core.USBError, NotImplementedError) as error:
+        except (pyusb.USBError, NotImplementedError) as error:
             raise device_error(self.name, doing, error) from None
         return bytes(answer) if size else b""
 
     def _string(self, index: int) -> str:
+        """A string descriptor without control characters; empty if the device has none."""
         import usb.util
 
-        core = _pyusb()
         try:
             text = usb.util.get_string(self._handle, index) or "" if index else ""
-        except (core.USBError, ValueError):  # a device without names is as good
+        except (_pyusb().USBError, ValueError):
             return ""
         return "".join(" " if letter < " " or letter == "\x7f" else letter for letter in text).strip(" ")
 
 
 @dataclass(frozen=True)
 class Found:
-    """A device on the bus: its identity, or what keeps it from telling."""
+    """A device on the bus: its identity, or the reason why it cannot be read."""
 
     place: str
     product: str
     serial: str
-    info: wire.DeviceInfo | None
+    info: dict[str, Any] | None
     problem: str = ""
 
 
 def _candidates() -> Iterator[UsbSetup]:
-    core = _pyusb()
+    pyusb = _pyusb()
     try:
         handles = sorted(
-            core.find(find_all=True, idVendor=wire.VENDOR, idProduct=wire.PRODUCT),
+            pyusb.find(find_all=True, idVendor=core.usb_vendor, idProduct=core.usb_product),
             key=lambda handle: (handle.bus, handle.address),
         )
-    except core.NoBackendError:
+    except pyusb.NoBackendError:
         raise DeviceError("USB devices need libusb-1.0: apt-get install libusb-1.0-0") from None
     for handle in handles:
         kinds = {
             (face.bInterfaceClass, face.bInterfaceSubClass, face.bInterfaceProtocol)
             for configuration in handle
             for face in configuration
-            if face.bInterfaceNumber == wire.INTERFACE
+            if face.bInterfaceNumber == core.usb_interface
         }
-        if wire.INTERFACE_KIND in kinds:
+        if core.usb_interface_kind in kinds:
             yield UsbSetup(handle)
 
 
 def find_devices() -> list[Found]:
-    """Every haptic USB device, the unusable ones with their reason.
+    """Finds every haptic USB device, the unusable ones with their reason.
 
     Raises
     ------
@@ -178,7 +205,7 @@ def find_devices() -> list[Found]:
 
 
 def open_usb(serial: str = "") -> UsbSetup:
-    """Open the only device, or the one with a serial number, to set it up.
+    """Opens the only device, or the one with a serial number, to set it up.
 
     Parameters
     ----------
@@ -188,7 +215,7 @@ def open_usb(serial: str = "") -> UsbSetup:
     Raises
     ------
     DeviceError
-        There is none, there are several, or it cannot be used: with the reason.
+        There is no device, there are several, or it cannot be used: with the reason.
     """
     usable: list[UsbSetup] = []
     problems: list[str] = []

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import InputError
 from ..model import Fit, Model, PathStep
 from ..recording import Source
-from ..recording.given import Given, recordings_from
+from ..recording.reading import Given, recordings_from
 from ..verdict import Verdict
 from .classes.findings import verdict_of
 from .classes.selection import VELOCITY_INPUTS

@@ -18,8 +18,8 @@ from ..arguments import path_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
+from ..recording.conversion import mirrored
 from ..recording.long_recording import PART_ROWS, LongRecording, open_long_recording
-from ..recording.notes import mirrored
 from ..recording.rows import LeftOut
 from ..recording.strokes import strokes_from_order
 from ..verdict import Finding, usable

@@ -13,17 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from .._core import __version__
+from .._core.io import check_model, read_json
 from .._core.model import ForceModel
 from .._typing import Float1D
 from ..arguments import instance_of, path_of, shown
 from ..errors import InputError
 from ..recording import Source
+from ..recording.files import require_file
 from ..verdict import Verdict
-from .certified import checked_certificate
-from .checks import checked
-from .fit import Fit, PathStep
-from .jsontext import read_json, write_json
-from .schema import VERSION, ModelFile
+from .model_file import Fit, PathStep, write_json
 from .text import describe
 
 _HELD_OUT = "held_out_every"
@@ -156,11 +154,46 @@ class Model(ForceModel):
         self.certificate = None if certificate is None else dict(certificate)
         self.notes = dict(notes or {})
         self.created_by = created_by or f"palpate {__version__}"
-        checked(self.to_dict())
-        if self.plan is not None:
-            planned = self.planned
-            if self.certificate is not None:
-                checked_certificate(planned, self.plan, self.certificate)
+        check_model(self.to_dict())
+
+    @classmethod
+    def from_network(
+        cls,
+        *,
+        alpha: npt.ArrayLike,
+        beta: npt.ArrayLike,
+        weight: npt.ArrayLike,
+        lower: npt.ArrayLike,
+        upper: npt.ArrayLike,
+        **arguments: Any,
+    ) -> Model:
+        """A model of given numbers that was not identified.
+
+        Parameters
+        ----------
+        alpha, beta, weight, lower, upper : array_like
+            As for Model.
+        **arguments
+            Any other argument of Model. Defaults: no linear part, no bias, SI units that are not stated, and
+            the kind and input names that follow from the shapes.
+
+        Raises
+        ------
+        ValueError
+            A shape or value is wrong; the message names the field.
+        """
+        d, n = np.size(lower), np.size(weight)
+        hysteretic = arguments.get("weight_hysteresis") is not None
+        given: dict[str, Any] = {
+            "kind": "hysteresis" if hysteretic else "position" if d == 1 else "general",
+            "inputs": ("position",) if d == 1 else tuple(f"input_{k + 1}" for k in range(d)),
+            "units": {"position": "", "force": ""},
+            "linear": np.zeros(d),
+            "bias": 0.0,
+            "fit": Fit("given", "given", 0.0, n, (2 * d + 1 + hysteretic) * n + (1 + hysteretic) * (d + 1)),
+            "data": Source((), "", 0, {}),
+        }
+        return cls(alpha=alpha, beta=beta, weight=weight, lower=lower, upper=upper, **given | arguments)
 
     @property
     def n_parameters(self) -> int:
@@ -223,7 +256,7 @@ class Model(ForceModel):
         bounds = self.slope_bounds
         return {
             "format": "palpate-model",
-            "version": VERSION,
+            "version": 1,
             "created_by": self.created_by,
             "kind": self.kind,
             "units": self.units,
@@ -251,7 +284,7 @@ class Model(ForceModel):
                 "rows": self.data.rows,
                 "columns": dict(self.data.columns),
             },
-            "fit": _fit_record(self.fit),
+            "fit": self.fit.record(),
             "plan": self.plan,
             "certificate": self.certificate,
             "notes": notes,
@@ -266,40 +299,28 @@ class Model(ForceModel):
         InputError
             A field is missing, unknown or wrong; the message gives its path and value.
         """
-        file: ModelFile = checked(content)
-        held_out_every = file.notes.get(_HELD_OUT, 0)
-        bounds = file.slope_bounds
-        model = cls(
-            kind=file.kind,
-            inputs=file.inputs,
-            units=file.units.model_dump(),
-            **file.network.model_dump(exclude={"dimension"}),
-            lower=file.domain.lower,
-            upper=file.domain.upper,
-            **file.continuation.model_dump(),
-            play_radius=file.play_radius,
-            fit=Fit(**file.fit.model_dump()),
+        check_model(content)
+        file = dict(content)
+        for part in ("format", "version"):
+            del file[part]
+        network, domain, continuation = (file.pop(part) for part in ("network", "domain", "continuation"))
+        bounds, fit, data = (file.pop(part) for part in ("slope_bounds", "fit", "data"))
+        held_out_every = file.get("notes", {}).get(_HELD_OUT, 0)
+        return cls(
+            **file,
+            **{name: value for name, value in network.items() if name != "dimension"},
+            **domain,
+            **continuation,
+            slope_bounds=None if bounds is None else (bounds["min"], bounds["max"]),
+            fit=Fit(**fit),
             data=Source(
-                files=tuple(file.data.files),
-                sha256=file.data.sha256,
-                rows=file.data.rows,
-                columns=file.data.columns,
+                files=tuple(data["files"]),
+                sha256=data["sha256"],
+                rows=data["rows"],
+                columns=data["columns"],
                 held_out_every=held_out_every if type(held_out_every) is int else 0,
             ),
-            mass=file.mass,
-            damping=file.damping,
-            slope_bounds=None if bounds is None else (bounds.min, bounds.max),
-            plan=None if file.plan is None else file.plan.model_dump(),
-            certificate=None if file.certificate is None else file.certificate.model_dump(exclude_unset=True),
-            notes=file.notes,
-            created_by=file.created_by,
         )
-        if bounds is not None:
-            try:
-                model.require_slopes_within(bounds.min, bounds.max)
-            except ValueError as error:
-                raise InputError(str(error)) from None
-        return model
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model file; it appears under its name only when it is complete.
@@ -311,7 +332,7 @@ class Model(ForceModel):
         """
         target = path_of("path", path)
         content = self.to_dict()
-        checked(content)
+        check_model(content)
         return write_json(target, content)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -350,26 +371,6 @@ def _require_numbers(name: str, value: object) -> None:
         raise InputError(f"{name} is {shown(value)}; it must be {right}")
 
 
-def _fit_record(fit: Fit) -> dict[str, Any]:
-    """The record of a fit, with NumPy's numbers turned into Python's."""
-    return {
-        "rung": fit.rung,
-        "stop_reason": fit.stop_reason,
-        "nrmse": float(fit.nrmse),
-        "n_wavelets": int(fit.n_wavelets),
-        "n_parameters": int(fit.n_parameters),
-        "path": [
-            {
-                "n_wavelets": int(step["n_wavelets"]),
-                "rmse": float(step["rmse"]),
-                "criterion": None if step["criterion"] is None else float(step["criterion"]),
-                "rung": step["rung"],
-            }
-            for step in fit.path
-        ],
-    }
-
-
 def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model:
     """Read a model file.
 
@@ -387,7 +388,8 @@ def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model
         file's name, the field's path and the value.
     """
     file = path_of("path", path)
-    content = read_json(file)
+    require_file(file)
+    content = read_json(str(file))
     if not with_plan and isinstance(content, dict):
         content = {**content, "plan": None, "certificate": None}
     try:

@@ -3,20 +3,18 @@
 
 from .. import _core
 from .._core.rendering import Scheme, explicit_slope_limit
-from .._core.simulation import Bench, Hand
+from .._core.simulation import Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
-from .bench import bench_for
 from .comparison import Comparison, compare_structures
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
 from .plan import ACCEPTED_FORCE_ERROR, Plan
-from .simulation import ForceError, describe, force_at, force_error, force_range, judge, simulate
+from .simulation import ForceError, describe, force_at, force_error, force_range, judge, rig_for, simulate
 from .static_error import StaticForceError
 
 __all__ = [
     "ACCEPTED_FORCE_ERROR",
     "EXAMPLES",
-    "Bench",
     "Certificate",
     "Comparison",
     "DeviceProfile",
@@ -26,7 +24,7 @@ __all__ = [
     "Plan",
     "Scheme",
     "StaticForceError",
-    "bench_for",
+    "TestRig",
     "compare_structures",
     "describe",
     "example_profiles",
@@ -36,6 +34,7 @@ __all__ = [
     "force_range",
     "judge",
     "profile_file",
+    "rig_for",
     "simulate",
 ]
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from .. import _core
 from .._core.device import DeviceProfile
-from .._core.rendering import Scheme
+from .._core.model import ForceModel
+from .._core.rendering import Scheme, default_play_radius, explicit_object, fewest_encoder_steps_in_play
 from .._core.stability import ForceBounds, certify_bounds, narrowest_play, stiffest_coupling
-from ..model import Model
-from .slope_limit import sliding_bounds, sliding_slopes
+from .limited_network import sliding_bounds, sliding_slopes
 
 SPARE = 0.95
 """Share of what the device allows that is used where nothing else sets a number [-]"""
@@ -19,25 +19,19 @@ SPARE = 0.95
 LONGEST_PLAY = 0.1
 """Largest play radius [share of the travel]: a wider one would be felt as play, not as a loss."""
 
-USUAL_PLAY = 0.01
-"""Play radius where no proof asks for another [share of the travel]"""
-
-_ENCODER_STEPS = 4
-"""A narrower play would be switched by the encoder instead of by the hand [encoder steps]"""
-
 _WANTED = 1.02
 """Slope that is asked of a device over that of the model: a network is fitted just below its limits [-]"""
 
 _STABLE_SHARES = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
 """Coupling stiffness tried for the explicit structure, over the stiffest that the device can hold [-]"""
 _STABLE_DAMPINGS = (0.1, 0.25, 0.5, 1.0)
-"""T B_o / m tried for the explicit structure; the paper's choice is 0.5 [-]"""
+"""T/m times the object damping tried for the explicit structure; the paper's choice is 0.5 [-]"""
 _STABLE_RESERVES = (1.1, 1.5, 2.5, 5.0)
 """Slope limit of the explicit structure over the slope that it has to meet [-]"""
 
 
 def renderable_slopes(
-    device: DeviceProfile, stick: float = 0.0, model: Model | None = None
+    device: DeviceProfile, stick: float = 0.0, model: ForceModel | None = None
 ) -> tuple[float, float]:
     """(lowest, highest) slope that direct rendering is certified for, shared out as the model needs them.
 
@@ -59,24 +53,21 @@ def coupling_for(device: DeviceProfile, damping: float, falling: float = 0.0) ->
     return stiffest_coupling(damping=damping, falling=falling, device=device, share=SPARE)
 
 
-def play_radius_for(model: Model, device: DeviceProfile) -> float:
+def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
     """Narrowest certified play radius for direct rendering, at least 4 encoder steps.
 
     Infinite if none is certified up to `LONGEST_PLAY`.
     """
     longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
-    narrowest = _ENCODER_STEPS * device.encoder_step
+    narrowest = fewest_encoder_steps_in_play * device.encoder_step
     radius = narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
     # Bounds are computed once more for the certificate, and rounded.
     return radius if radius == narrowest else 1.000001 * radius
 
 
-def usual_play_radius(model: Model, device: DeviceProfile) -> float:
+def usual_play_radius(model: ForceModel, device: DeviceProfile) -> float:
     """Play radius where nothing is certified that depends on it; 0 without hysteresis or with one's own."""
-    if not model.hysteretic or model.play_radius is not None:
-        return 0.0
-    travel = float(model.upper[0] - model.lower[0])
-    return max(_ENCODER_STEPS * device.encoder_step, USUAL_PLAY * travel)
+    return default_play_radius(model, device.encoder_step)
 
 
 def explicit_scheme(
@@ -103,17 +94,19 @@ def explicit_scheme(
         trials = []
         for ratio in _STABLE_DAMPINGS:
             for reserve in _STABLE_RESERVES:
-                needed = reserve * (max(0.0, bounds.slope_max) + K_c) + 2.0 * B_c / T
-                m = mass if mass else needed * T**2 / (4.0 - 2.0 * ratio)
-                B_o = damping if damping is not None else ratio * m / T
-                trials.append((B_o, m))
-        for B_o, m in sorted(set(trials)):
+                limit = reserve * (max(0.0, bounds.slope_max) + K_c) - K_c
+                m, _ = explicit_object(
+                    limit, coupling_stiffness=K_c, coupling_damping=B_c, ratio=ratio, period_s=T
+                )
+                m = mass or m
+                trials.append((damping if damping is not None else ratio * m / T, m))
+        for object_damping, m in sorted(set(trials)):
             scheme = Scheme(
                 structure="explicit",
                 coupling_stiffness=K_c,
                 coupling_damping=B_c,
                 mass=m,
-                damping=B_o,
+                damping=object_damping,
                 play_radius=play_radius,
             )
             if not certify_bounds(bounds, scheme, device).refused:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same model through every structure, on the same bench."""
+"""The same model through every structure, on the same test rig."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme
-from .._core.simulation import Bench, Hand
+from .._core.simulation import Hand, TestRig
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
@@ -36,7 +36,7 @@ class Comparison:
         return describe(self.scheme)
 
 
-def compare_structures(model: Model, bench: Bench, duration: float) -> tuple[Comparison, ...]:
+def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Comparison, ...]:
     """Render a model with each structure and measure its force error.
 
     The order is that of what they lose: direct, with and without prediction; massless behind a coupling,
@@ -48,22 +48,22 @@ def compare_structures(model: Model, bench: Bench, duration: float) -> tuple[Com
     ----------
     model : Model
         A model of one position.
-    bench : Bench
-        Device, hand and coupling, from :func:`bench_for`.
+    rig : TestRig
+        Device, hand and coupling, from :func:`rig_for`.
     duration : float
         Simulated time of each rendering [s].
     """
-    quarter = _COMPENSATED_DAMPING * bench.scheme(model).coupling_damping
+    quarter = _COMPENSATED_DAMPING * rig.scheme(model).coupling_damping
     schemes = (
-        bench.scheme(model, structure="direct", predict=_PREDICT),
-        bench.scheme(model, structure="direct"),
-        bench.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
-        bench.scheme(model, structure="massless"),
-        bench.scheme(model, structure="implicit", damping=0.0),
-        bench.scheme(model, structure="implicit"),
-        bench.scheme(model, structure="explicit"),
+        rig.scheme(model, structure="direct", predict=_PREDICT),
+        rig.scheme(model, structure="direct"),
+        rig.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
+        rig.scheme(model, structure="massless"),
+        rig.scheme(model, structure="implicit", damping=0.0),
+        rig.scheme(model, structure="implicit"),
+        rig.scheme(model, structure="explicit"),
     )
-    return tuple(_render(model, scheme, bench.device, bench.hand, duration) for scheme in schemes)
+    return tuple(_render(model, scheme, rig.device, rig.hand, duration) for scheme in schemes)
 
 
 def _render(model: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, duration: float) -> Comparison:

@@ -14,7 +14,6 @@ import tomli_w
 from .. import _core
 from ..arguments import path_of
 from ..errors import InputError
-from ..model.certified import device_record
 from ..recording.files import replacing, require_file
 
 if sys.version_info >= (3, 11):
@@ -52,30 +51,8 @@ class DeviceProfile(_core.device.DeviceProfile):
     ``b`` and ``f_c`` are what the mechanism itself brakes with: a certificate spends them. Where one of them
     is not known, a lower bound is right; where delay, steps or jitter are not known, an upper one.
 
-    Parameters
-    ----------
-    id : str
-        Its name; a certificate holds for the device of this name and these numbers.
-    position_unit : {"rad", "m"}
-        Forces are then in N*m or N.
-    period_s : float
-        T, time between two samples [s].
-    jitter_s : float
-        How much longer than T it can get [s].
-    inertia : float
-        Of handle and motor [kg*m^2 or kg].
-    viscous_damping : float
-        b, physical [N*m*s/rad or N*s/m].
-    coulomb_friction : float
-        f_c, physical [N*m or N].
-    encoder_step : float
-        Delta [rad or m]; 0 = not quantised.
-    force_step : float
-        Delta_F, of the command [N*m or N]; 0 = not quantised.
-    delay_s : float
-        t_d, time from a sample to the force that is computed from it [s]; 0 to 16 periods.
-    force_limit : float
-        [N*m or N]
+    The keyword arguments are the fields of the core's DeviceProfile, listed there with their units; every one
+    has a default, that of a simulated knob.
 
     Raises
     ------
@@ -108,7 +85,7 @@ class DeviceProfile(_core.device.DeviceProfile):
             if "integer string conversion" in reason:
                 reason = f"a number has more than {sys.get_int_max_str_digits()} digits; write 17 or fewer"
             raise InputError(f"{file}: a value cannot be read: {reason}") from None
-        expected = device_record(_core.device.DeviceProfile())
+        expected = _core.device.DeviceProfile().to_dict()
         for name in content:
             if name not in expected:
                 raise InputError(f"{file}: {name} is not a field of a device profile")
@@ -134,7 +111,7 @@ class DeviceProfile(_core.device.DeviceProfile):
         file = path_of("path", path)
         comment = "".join(f"# {note}\n" for note in notes)
         with replacing(file) as temporary:
-            temporary.write_text(comment + tomli_w.dumps(device_record(self)), encoding="utf-8")
+            temporary.write_text(comment + tomli_w.dumps(self.to_dict()), encoding="utf-8")
         return file
 
 

@@ -9,14 +9,14 @@ from functools import cached_property
 from typing import Any
 
 from .._core.device import DeviceProfile
+from .._core.io import checked_certificate, scheme_of
 from .._core.rendering import Scheme, solver_name
 from .._core.stability import Certificate, certify, device_difference
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
-from ..model.certified import certificate_record, checked_certificate, scheme_of
-from ..verdict import Finding, Verdict, no, usable
-from ..verification.perception import FLOOR_SHARE
+from ..model.model_file import certificate_record
+from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 from .static_error import StaticForceError, static_force_error
 
 ACCEPTED_FORCE_ERROR = 0.1
@@ -53,11 +53,8 @@ class Plan:
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
         instance_of("scheme", self.scheme, Scheme, "make one with palpate.Scheme")
-        if self.model.units["force"] == "A":
-            raise InputError(
-                "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A"
-            )
-        self._validate(None)
+        require_force(self.model)
+        self.scheme.validate(self.rendered)
 
     @property
     def rendered(self) -> Model:
@@ -130,15 +127,14 @@ class Plan:
     def record(self) -> dict[str, Any]:
         """The plan as it stands in a model file."""
         scheme = self.scheme
-        coupled, heavy = self.structure != "direct", self.structure not in ("direct", "massless")
         return {
             "structure": scheme.structure,
             "solver": self.solver,
             "network": None if self.limited is None else self.limited.to_dict()["network"],
             "coupling": {"stiffness": scheme.coupling_stiffness, "damping": scheme.coupling_damping}
-            if coupled
+            if scheme.has_coupling
             else None,
-            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if heavy else None,
+            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if scheme.has_mass else None,
             "compensated": scheme.compensated,
             "play_radius": scheme.play_radius or None,
             "predict": scheme.predict or None,
@@ -159,7 +155,7 @@ class Plan:
             The explicit structure's slope limit is not above the model's steepest slope, or the certificate
             is for another device; the message names what differs.
         """
-        self._validate(device.period_s)
+        self.scheme.validate(self.rendered, device.period_s)
         if self.certificate is not None:
             wrong = device_difference(self.certificate.device, device)
             if wrong:
@@ -184,7 +180,7 @@ class Plan:
 
     def _force_findings(self) -> tuple[Finding, ...]:
         error = self.force_error
-        if error.share <= FLOOR_SHARE:
+        if error.share <= FORCE_FLOOR:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
         told = (
@@ -204,13 +200,13 @@ class Plan:
             ),
         )
 
-    def _validate(self, period_s: float | None) -> None:
-        try:
-            self.scheme.validate(self.rendered, period_s)
-        except InputError:
-            raise
-        except ValueError as error:
-            raise InputError(str(error)) from None
+
+def require_force(model: Model) -> None:
+    """Refuses a model whose force is a motor current."""
+    if model.units["force"] == "A":
+        raise InputError(
+            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A"
+        )
 
 
 def _percent(share: float) -> str:

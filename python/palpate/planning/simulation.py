@@ -13,10 +13,11 @@ from .. import _core
 from .._core import Status
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme
-from .._core.simulation import Hand, motion_driven
+from .._core.simulation import Hand, TestRig, motion_driven
 from .._typing import Float1D
 from ..arguments import instance_of, real_of
 from ..errors import InputError
+from ..model import Model
 from ..recording import Recording
 from ..recording.units import COLUMN_SUFFIX
 from ..verdict import Finding, Verdict, no, usable
@@ -39,6 +40,11 @@ _SMALLEST_DOMAIN_SHARE = 0.1
 """Of the model's domain that the handle should cover."""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
+
+
+def rig_for(model: Model) -> TestRig:
+    """Return the test rig for a model: default knob and hand, scaled to the model unless it is an angle."""
+    return _core.simulation.rig_for(model, is_angle=model.units["position"] == "rad")
 
 
 def simulate(

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Static force error of a plan: what is felt at rest, minus the identified force."""
+"""Static force error of a plan: the force felt at rest minus the identified force."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +13,25 @@ from .._core.model import ForceModel
 from .._core.rendering import Scheme
 from .._core.simulation import motion_driven
 from .._typing import Float1D, Float2D
-from ..model import Model
 
 SAMPLES = 1001
 """Positions over the domain [-]"""
+
+
+NETWORK = (
+    "alpha",
+    "beta",
+    "weight",
+    "linear",
+    "bias",
+    "weight_hysteresis",
+    "linear_hysteresis",
+    "bias_hysteresis",
+)
+"""Arguments of a force model that make its network"""
+
+_DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velocity")
+"""The other arguments"""
 
 
 @dataclass(frozen=True)
@@ -35,12 +51,12 @@ class StaticForceError:
     """`rms` over the population standard deviation of the identified force [-]"""
 
 
-def static_force_error(identified: Model, rendered: Model, scheme: Scheme) -> StaticForceError:
+def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Scheme) -> StaticForceError:
     """Force error at rest where `rendered` is rendered by a scheme in place of `identified`.
 
     Parameters
     ----------
-    identified, rendered : Model
+    identified, rendered : ForceModel
         Of one position, on the same domain; or the same model of position and velocity.
     scheme : Scheme
         A coupling makes the rendered force softer: K_c f' / (K_c + f') is felt in place of f'.
@@ -58,7 +74,17 @@ def static_force_error(identified: Model, rendered: Model, scheme: Scheme) -> St
     )
 
 
-def strokes(model: Model, x: Float1D) -> Float2D:
+def with_network(model: ForceModel, **changes: Any) -> ForceModel:
+    """A force model with other arguments; what is not given stays."""
+    return ForceModel(**{name: getattr(model, name) for name in (*NETWORK, *_DOMAIN)} | changes)
+
+
+def network_of(model: ForceModel) -> dict[str, Any]:
+    """The network of a model as it stands in a model file."""
+    return {name: np.asarray(getattr(model, name)).tolist() for name in NETWORK}
+
+
+def strokes(model: ForceModel, x: Float1D) -> Float2D:
     """(1, n) the force, or (2, n) pressing and releasing."""
     sides = (1.0, -1.0) if model.hysteretic else (None,)
     return np.array([model.force(x, direction=side) for side in sides])
@@ -70,31 +96,23 @@ def _share(error: float, size: float, force: Float2D) -> float:
     return 0.0 if error == 0.0 else error / size if size else math.inf
 
 
-def _behind_coupling(model: Model, scheme: Scheme, x: Float1D) -> Float2D:
+def _behind_coupling(model: ForceModel, scheme: Scheme, x: Float1D) -> Float2D:
     """Force (k, n) of each stroke at a handle that rests at x, from the load line of a massless object."""
     at_rest = Scheme(structure="massless", coupling_stiffness=scheme.coupling_stiffness, coupling_damping=0.0)
     return np.array([motion_driven(stroke, at_rest, x, 1.0)["force"] for stroke in _single_strokes(model)])
 
 
-def _single_strokes(model: Model) -> list[ForceModel]:
+def _single_strokes(model: ForceModel) -> list[ForceModel]:
     """Models without hysteresis, one for each stroke: f, or g + h and g - h."""
-    network = model.to_dict()["network"]
-    loss = {name: network.pop(f"{name}_hysteresis") for name in ("weight", "linear", "bias")}
-    del network["dimension"]
-    sides = (1.0, -1.0) if model.hysteretic else (0.0,)
+    if not model.hysteretic:
+        return [model]
+    names = ("weight", "linear", "bias")
+    plain = {"play_radius": None, **{f"{name}_hysteresis": None for name in names}}
     return [
-        ForceModel(
-            **network
-            | {
-                name: np.asarray(network[name]) + side * np.asarray(loss[name])
-                for name in loss
-                if model.hysteretic
-            },
-            lower=model.lower,
-            upper=model.upper,
-            below=model.below,
-            above=model.above,
-            period=model.period,
+        with_network(
+            model,
+            **plain,
+            **{name: getattr(model, name) + side * getattr(model, f"{name}_hysteresis") for name in names},
         )
-        for side in sides
+        for side in (1.0, -1.0)
     ]

@@ -8,8 +8,7 @@ import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..errors import InputError
-from .names import listed, shortened
+from ..errors import InputError, listed, shortened
 from .units import (
     FORCE_UNITS,
     POSITION_UNITS,

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CSV: the dialect is recognised once, then pandas reads the rows; messages name the line of a row."""
+"""CSV: the dialect is recognised once, then pandas reads the rows; messages name the line of a row.
+
+Rows are counted, and ends of rows are found, without splitting them into cells.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,17 @@ import io
 import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .dialect import HEAD_BYTES, not_csv, recognise
-from .file_bytes import FileBytes
-from .header import refuse_marks
-from .row_count import count_rows
-from .table import MISSING, Cells, parse_with, to_numbers
+from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
+from .table import MISSING, Cells, LongTable, parse_with, to_numbers
 
 _CHUNK_ROWS = 1_000_000
 """Rows read at a time: bounds the memory beside the columns themselves."""
@@ -36,8 +37,58 @@ _FURTHER = "\n"
 _SNIFF_ROWS = 1000
 """Rows looked at to tell text columns from numeric ones before the fast reader starts."""
 
+_BLOCK = 1 << 22
+"""Bytes in which rows are counted at a time."""
 
-class CsvFile:
+_BLANK = re.compile(rb"\n[ \t\r\n]")
+"""The start of a line that may be blank"""
+
+_CLOSING = re.compile(rb'(?:[^"]|"")*"(?!")')
+"""The rest of a quoted cell"""
+
+_OPENING = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator in (b",", b";", b"\t")}
+"""A quote opens a cell only at the start of the cell."""
+
+
+class FileBytes(io.RawIOBase):
+    """Some of a file's bytes, [start, stop): a recording without its torn last line, or a part of one."""
+
+    def __init__(self, path: Path, start: int, stop: int) -> None:
+        self._stream = path.open("rb", buffering=0)
+        self._stream.seek(start)
+        self._start, self._stop = start, stop
+        self.failure: OSError | None = None
+        """Why reading failed: a parser that calls this from C tells only that it did"""
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self._stream.tell() - self._start
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        if whence != io.SEEK_SET:
+            raise io.UnsupportedOperation("only from the start")
+        return self._stream.seek(self._start + offset) - self._start
+
+    def readinto(self, buffer: Any) -> int:
+        try:
+            block = self._stream.read(min(len(buffer), max(self._stop - self._stream.tell(), 0)))
+        except OSError as failure:
+            self.failure = failure
+            raise
+        buffer[: len(block)] = block
+        return len(block)
+
+    def close(self) -> None:
+        self._stream.close()
+        super().close()
+
+
+class CsvFile(LongTable):
     """A CSV recording. The header is read when it is opened; the rows when :meth:`read` is called.
 
     A name that ends in ``.part`` is a recording that was cut off while it grew: a last line without its line
@@ -129,8 +180,7 @@ class CsvFile:
         )
 
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
-        """See :class:`palpate.recording.table.TableFile`."""
-        as_text = self.text_names | set(text)
+        as_text = {*self.text_names, *text}
         try:
             return self._read(as_text, numbers, text)
         except ValueError as error:
@@ -170,7 +220,6 @@ class CsvFile:
         return found
 
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
-        """See :class:`palpate.recording.table.TableFile`: ranges of bytes that end where a row does."""
         if not self._dialect.single_bytes:
             encoding = self._dialect.encoding.upper().replace("16-", "16")  # as iconv names it
             raise InputError(
@@ -192,7 +241,6 @@ class CsvFile:
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
-        """See :class:`palpate.recording.table.TableFile`."""
         wanted = [name for name in self.names if name in numbers or name in text]
         # Most files hold only numbers in number columns, and are read fast. If a block does not, the part is
         # read again as text, without the rows that were given already.
@@ -228,7 +276,6 @@ class CsvFile:
         return numbers
 
     def rows_before(self, part: tuple[int, int]) -> int:
-        """See :class:`palpate.recording.table.TableFile`."""
         with self._bytes(self._dialect.start, part[0]) as stream:
             return count_rows(stream, self._dialect.separator).rows
 
@@ -297,11 +344,9 @@ class CsvFile:
         return self._dialect.lines_before + line
 
     def place(self, row: int) -> str:
-        """See :class:`palpate.recording.table.TableFile`."""
         return f"line {self._find(row)[0]}"
 
     def cell(self, row: int, name: str) -> str:
-        """See :class:`palpate.recording.table.TableFile`."""
         cells = self._find(row)[1]
         column = self.names.index(name)
         return cells[column].strip() if column < len(cells) else ""
@@ -312,3 +357,77 @@ class CsvFile:
                 if index == row:
                     return found
         raise IndexError(row)
+
+
+@dataclass
+class RowCount:
+    """Rows of a stream."""
+
+    rows: int = 0
+    ends: list[int] = field(default_factory=lambda: [0])
+    """Bytes from the start to ends of rows that are at least one step apart, and to the end"""
+    too_wide: tuple[int, int] | None = None
+    """First row with more cells than the table has columns, and the number of its cells"""
+
+
+def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int = _BLOCK) -> RowCount:
+    """Count the rows of a stream that begins with a row, and find ends of rows.
+
+    A line break within a quoted cell ends no row. A line of white space is no row.
+
+    Parameters
+    ----------
+    stream : binary stream
+    separator : str
+        One character.
+    columns : int
+        Look for rows with more cells than this; 0 for not.
+    step : int
+        Least distance of the ends of rows that are returned [bytes].
+    """
+    mark = separator.encode()
+    space = b" \r" if mark == b"\t" else b" \t\r"
+    found, place, quoted, record = RowCount(), 0, False, b""
+    while block := stream.read(min(step, _BLOCK)):
+        block += stream.readline()
+        place += len(block)
+        lines = block.count(b"\n") + (not block.endswith(b"\n"))
+        blank = block[0] in b"\n" + space or _BLANK.search(block)
+        even = not columns or block.count(mark) == lines * (columns - 1)
+        if not (quoted or blank or b'"' in block) and even:
+            found.rows += lines
+        else:
+            for line in block.removesuffix(b"\n").split(b"\n"):
+                if b'"' in line:
+                    quoted = _ends_quoted(line, quoted, mark)
+                # A quote that is never closed must not gather the rest of the file.
+                record += line[: _BLOCK - len(record)]
+                if quoted:
+                    record += b"\n"
+                    continue
+                if record.strip(space):
+                    if columns and not found.too_wide and (cells := _cells(record, mark)) > columns:
+                        found.too_wide = found.rows, cells
+                    found.rows += 1
+                record = b""
+        if not quoted and place - found.ends[-1] >= step:
+            found.ends.append(place)
+    if place > found.ends[-1]:
+        found.ends.append(place)
+    return found
+
+
+def _cells(record: bytes, mark: bytes) -> int:
+    if b'"' not in record:
+        return record.count(mark) + 1
+    return len(next(csv.reader([record.decode("latin-1")], delimiter=mark.decode())))
+
+
+def _ends_quoted(line: bytes, quoted: bool, mark: bytes) -> bool:
+    """Whether a line ends within a quoted cell, if it begins within one or not."""
+    place = 0
+    while True:
+        found = (_CLOSING.match if quoted else _OPENING[mark].search)(line, place)
+        if found is None:
+            return quoted
+        place, quoted = found.end(), not quoted

@@ -12,8 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import InputError
-from .names import shortened
+from ..errors import InputError, shortened
 
 _BLOCK = 1 << 20
 

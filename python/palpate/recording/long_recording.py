@@ -4,20 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
-from .columns import Choice, Column, choose_columns
+from .conversion import Conversion, Source
 from .files import require_file, sha256_of_file
-from .layout import Layout
-from .notes import chosen
-from .recording import UNSTATED, Source
-from .rows import LeftOut, RowCheck
-from .table import Places, TableFile
-from .tables import open_table
+from .formats import open_table
+from .rows import LeftOut
+from .table import LongTable, Places, Table
 
 PART_ROWS = 4_000_000
 """Rows of a part: what one worker reads at a time."""
@@ -45,20 +42,25 @@ class LongRecording:
     """How a file is read; from :func:`open_long_recording`, and light enough to be sent to workers."""
 
     path: Path
-    choice: Choice
-    direction: str | None
-    status: str | None
-    """Column that says of each row whether its force was the model's alone"""
-    negate: tuple[str, ...]
-    drop: bool
+    how: Conversion
+    """Of position, force and direction"""
     parts: tuple[tuple[int, int], ...]
     """Places between which the file is read apart"""
     rows: int
     """Rows of the file, counted without reading their cells"""
-    units: Mapping[str, str]
     source: Source
     """Without the number of rows that are used"""
     notes: tuple[str, ...]
+
+    @property
+    def direction(self) -> str | None:
+        """Column of the direction."""
+        return self.how.direction
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of position and force."""
+        return self.how.units
 
     def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
         """Position, force and direction of the rows of a part, block by block.
@@ -68,38 +70,25 @@ class LongRecording:
         InputError
             A row has no finite number or no known direction, and rows are not to be dropped.
         """
-        table = open_table(self.path)
-        columns = (self.choice.position, self.choice.force)
-        numbers = [column.name for column in columns]
-        text = [name for name in (self.direction, self.status) if name is not None]
-        for first, cells in table.blocks(part, BLOCK_ROWS, numbers=numbers, text=text):
-            rows = len(cells[numbers[0]])
-            check = RowCheck(str(self.path), _Part(table, part), first, rows, self.drop)
-            if self.status is not None:
-                check.as_modelled(cells[self.status])
-            for name in numbers:
-                check.finite(name, cells[name])
-            words = (
-                None if self.direction is None else check.directions(self.direction, cells[self.direction])
+        table = _long(open_table(self.path), self.path)
+        how = self.how
+        for first, cells in table.blocks(part, BLOCK_ROWS, numbers=how.numbers, text=how.text):
+            check, words = how.checked(_Part(table, part), cells, first)
+            position, force = (
+                how.si(column, cells)[check.kept] for column in (how.choice.position, how.choice.force)
             )
-            position, force = (self._read(column, cells[column.name])[check.kept] for column in columns)
             direction = None if words is None else words[check.kept]
-            yield Block(position, force, direction, rows, check.left_out)
+            yield Block(position, force, direction, len(check.kept), check.left_out)
 
     def places(self) -> Places:
         """Where the rows of the file stand."""
         return open_table(self.path)
 
-    def _read(self, column: Column, values: Float1D) -> Float1D:
-        role = "position" if column is self.choice.position else "force"
-        sign = -1.0 if {role, column.name} & set(self.negate) else 1.0
-        return values * (sign if column.unit is None else sign * column.unit.factor)
-
 
 class _Part:
     """Where the rows of a part stand. The rows before the part are counted only when a place is needed."""
 
-    def __init__(self, table: TableFile, part: tuple[int, int]) -> None:
+    def __init__(self, table: LongTable, part: tuple[int, int]) -> None:
         self._table, self._part = table, part
 
     def place(self, row: int) -> str:
@@ -131,51 +120,36 @@ def open_long_recording(
     file = Path(path)
     require_file(file)
     table = open_table(file)
-    layout = Layout.taken_from(str(file), dict(table.metadata))
-    choice = choose_columns(
+    how = Conversion.of(
+        table,
         str(file),
-        table.names,
-        position=position or layout.roles.get("position"),
-        force=force or layout.roles.get("force"),
-        time=time or layout.roles.get("time"),
-        direction=direction or layout.roles.get("direction"),
+        position=position,
+        force=force,
+        time=time,
+        direction=direction,
         units=units,
-        unstated=layout.roles.values(),
-        text=table.text_names,
-        steady=table.steady_names,
+        negate=negate,
+        drop=invalid == "drop",
     )
-    used = {"position", "force", choice.position.name, choice.force.name}
-    for name in negate:
-        if name not in used:
-            raise InputError(
-                f"{file}: --negate {name} names no column that is used ({', '.join(sorted(used))})"
-            )
-    stroke = choice.direction
-    if stroke == "segment" and direction is None and stroke not in table.text_names:
-        stroke = None  # numbered segments do not state the stroke
-    status = layout.roles.get("status")
-    if status is not None and status not in table.names:
-        raise InputError(f"{file} has no column {status!r}, which its metadata names as the status")
-    rows, parts = table.parts(part_rows)
-    columns = {"position": choice.position.name, "force": choice.force.name}
+    if how.direction == "segment" and direction is None and "segment" not in table.text_names:
+        how = replace(how, direction=None)  # numbered segments do not state the stroke
+    notes = how.note(dialect=table.notes), *how.choice.notes
+    how = replace(how, choice=replace(how.choice, time=None, inputs=()))
+    rows, parts = _long(table, file).parts(part_rows)
     return LongRecording(
         path=file,
-        choice=choice,
-        direction=stroke,
-        status=status,
-        negate=tuple(negate),
-        drop=invalid == "drop",
+        how=how,
         parts=tuple(parts),
         rows=rows,
-        units={
-            "position": choice.position.unit.si if choice.position.unit else UNSTATED,
-            "force": choice.force.unit.si if choice.force.unit else UNSTATED,
-        },
-        source=Source(
-            files=(str(file),),
-            sha256=sha256_of_file(file),
-            rows=0,
-            columns=columns if stroke is None else {**columns, "direction": stroke},
-        ),
-        notes=(chosen(choice, stroke, None, table.notes), *choice.notes),
+        source=Source(files=(str(file),), sha256=sha256_of_file(file), rows=0, columns=how.names),
+        notes=notes,
     )
+
+
+def _long(table: Table, file: Path) -> LongTable:
+    if not isinstance(table, LongTable):
+        raise InputError(
+            f"{file} cannot be read part by part; leave out --out-of-core, --jobs and --scheduler, or "
+            "convert the file to CSV or Parquet"
+        )
+    return table

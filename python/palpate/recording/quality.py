@@ -1,24 +1,96 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of a recording before it is used: each finding names the rows, the likely cause and the cure."""
+"""Checks of a recording before it is used: each finding names the rows, the likely cause and the cure.
+
+The checks look for implausible magnitudes, contradicting signs, clipped or stuck sensors, repeated samples,
+gaps, and (in `comparison`) files that hold two objects or recordings that do not belong together.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .._typing import Float1D
-from ..verdict import Finding
-from .branches import merged_findings
-from .cells import Travel, cell_rows
-from .coverage import gap_findings
-from .holds import hold_findings
-from .magnitudes import magnitude_findings
-from .recording import Recording
-from .saturation import saturation_findings
-from .scales import scale_findings
-from .signs import sign_findings
+import numpy as np
+from numpy.typing import NDArray
 
-LEAST_ROWS = 10
-"""Rows below which a recording is not checked."""
+from .._typing import Float1D
+from ..verdict import Finding, usable
+from .cells import CellRows, Travel, amount, cell_rows, sides
+from .comparison import merged_findings, scale_findings
+from .conversion import MIN_ROWS, mirrored
+from .motion import GAP
+from .recording import Recording
+
+TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
+"""Least and largest plausible travel, by unit: from a microscope's tip to an arm, and up to 50 turns."""
+
+FORCE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
+"""Least and largest plausible range of the force, by unit; that of N depends on the travel."""
+
+SMALL_TRAVEL = 1e-4
+"""Travel below which a recording is one of a microscope [m]."""
+
+SMALL_FORCE, LARGE_FORCE = (1e-10, 0.1), (1e-3, 1e4)
+"""Plausible range of the force below that travel, and from it on [N]."""
+
+LOOP_IN_LINE = 0.8
+"""Share of the positions at which a loop has the sign of its mean."""
+
+LEAST_LOOP = 0.02
+"""Mean of press minus release force, as a share of the force's spread, from which there is a loop."""
+
+LOOP_ERRORS = 5.0
+"""The same mean over its standard error."""
+
+CLIPPED_ROWS = 5
+"""Rows that a clipped force or position needs."""
+
+CLIPPED_POSITIONS = 3
+"""Positions of a clipped force; a tool that rests has one."""
+
+CLIPPED_RATIO = 5.0
+"""Rows at the extreme value over the rows at any value near it: a rounded force rarely has more than 3."""
+
+NEAR_EXTREME = 0.1
+"""Share of the force's range that is near the extreme."""
+
+CONTACT_FLOOR = 0.2
+"""Share of the largest |force| below which an extreme is that of a tool that touches nothing."""
+
+FORCE_GOES_ON = 0.1
+"""Share of the force's range by which the force changes while the position stands still."""
+
+STANDING_NOISE = 6.0
+"""The same change over the noise of the force."""
+
+STUCK_FORCE = 0.005
+"""The same share where the position jumps afterwards."""
+
+JUMP = 5.0
+"""Step over the usual one with which a position that was stuck goes on."""
+
+REGULAR_RUNS = 0.8
+"""Share of the rows that stand in runs of one length, or of its multiples."""
+
+SLOWER = 1.5
+"""Changes of the other column over those of the held one."""
+
+TOLD_LAG = 0.005
+"""Change of the force from run to run, as a share of its spread, from which a lag is reported."""
+
+LONGEST_RUN = 1000
+"""Rows of a run from which it is no held sample but a pause."""
+
+LEAST_GAP = 0.02
+"""Share of the travel from which an interval without rows is a gap."""
+
+WIDER_GAP = 8.0
+"""Width of a gap over the 90th percentile of the distances between neighbouring positions."""
+
+END_GAP = 0.05
+"""Share of the travel that one stroke may leave out at an end."""
+
+LEAST_LOST = 0.05
+"""Share of the duration from which missing samples are reported."""
 
 
 def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
@@ -40,7 +112,7 @@ def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) ->
 
 def quality_findings(recording: Recording) -> list[Finding]:
     """Findings on a recording as it was read, none where nothing looks wrong."""
-    if len(recording) < LEAST_ROWS:
+    if len(recording) < MIN_ROWS:
         return []
     travel = Travel.of(recording.position)
     cells = None if recording.input_names else cell_rows(recording, travel)
@@ -51,4 +123,276 @@ def quality_findings(recording: Recording) -> list[Finding]:
         *hold_findings(recording),
         *gap_findings(recording, travel),
         *merged_findings(recording, cells),
+    ]
+
+
+def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
+    """Findings on an implausible travel or range of force. Nothing is known of units that are not stated."""
+    position, force = recording.units["position"], recording.units["force"]
+    inner = recording.force[travel.inside]
+    force_bounds = FORCE.get(force)
+    if position == "m" and force == "N":
+        force_bounds = SMALL_FORCE if travel.length < SMALL_TRAVEL else LARGE_FORCE
+    found = []
+    for role, value, unit, bounds in (
+        ("travel", travel.length, position, TRAVEL.get(position)),
+        ("range of the force", float(np.ptp(inner)), force, force_bounds),
+    ):
+        if bounds is None or value == 0.0 or bounds[0] <= value <= bounds[1]:
+            continue
+        side, bound = ("below", bounds[0]) if value < bounds[0] else ("above", bounds[1])
+        over = "" if role == "travel" else f" over a travel of {amount(travel.length, position)}"
+        found.append(
+            usable(
+                f"the {role} is {amount(value, unit)}{over}, {side} {amount(bound, unit)}: the unit of "
+                "position or force is probably wrong; name the right one with --units"
+            )
+        )
+    return found
+
+
+def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) -> list[Finding]:
+    """Findings on a turned direction, a loop that gives out energy, and a force that falls with position."""
+    words = recording.direction
+    if words is not None and len(words) > 1:
+        # a spike goes both ways, so it does not count
+        step = np.where(travel.inside[1:] & travel.inside[:-1], np.diff(recording.position) * words[1:], 0.0)
+        if step.sum() < 0:
+            against = float(np.mean(step[step != 0.0] < 0))
+            return [
+                usable(
+                    f"the position falls in rows whose direction goes into the object ({against:.0%} of the "
+                    "moving rows): position or direction is probably turned; if the position grows out of "
+                    "the object give --negate position, else swap the words of the direction column"
+                )
+            ]
+    if recording.input_names:
+        return []
+    mean, is_loop = _loop(recording, cells)
+    if is_loop and mean < 0.0:
+        late = "" if recording.time is None else "if the force was recorded late --force-late-s SECONDS, "
+        return [
+            usable(
+                f"the force on release is {amount(-mean, recording.units['force'])} above that on press on "
+                "average: the loop gives out energy, as no passive object does; if a sign is turned give "
+                f"--negate force or --negate position, {late}for a latch or a stored spring "
+                "--no-hysteresis-nonnegative"
+            )
+        ]
+    x, f = recording.position[travel.inside], recording.force[travel.inside]
+    if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
+        return []
+    return [usable(sentence) for sentence in mirrored(float(np.corrcoef(x, f)[0, 1]))]
+
+
+def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
+    """Mean of press minus release force, and whether it is clearly not zero."""
+    if cells is None or len(cells.loop) < 4:
+        return 0.0, False
+    mean = float(np.mean(cells.loop))
+    error = float(np.sqrt(np.mean(cells.loop_error**2) / len(cells.loop)))
+    in_line = float(np.mean(np.sign(cells.loop) == np.sign(mean)))
+    large = abs(mean) > max(LOOP_ERRORS * error, LEAST_LOOP * float(np.std(recording.force)))
+    return mean, large and in_line >= LOOP_IN_LINE
+
+
+def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:
+    """Findings on a clipped force, a clipped position, and a position that was stuck."""
+    x, f = recording.position, recording.force
+    reach = float(np.ptp(f))
+    if not reach > 0.0:
+        return []
+    largest = float(np.max(np.abs(f)))
+    found = []
+    for value, name in ((float(f.max()), "largest"), (float(f.min()), "least")):
+        near = f[np.abs(f - value) <= NEAR_EXTREME * reach]
+        rows = np.flatnonzero(f == value)
+        if abs(value) < CONTACT_FLOOR * largest or len(rows) < CLIPPED_ROWS:
+            continue
+        _, counts = np.unique(near, return_counts=True)
+        others = np.delete(counts, -1 if name == "largest" else 0)
+        few = others.max(initial=1)
+        if len(rows) >= CLIPPED_RATIO * few and len(np.unique(x[rows])) >= CLIPPED_POSITIONS:
+            found.append(
+                usable(
+                    f"the {name} force, {amount(value, recording.units['force'])}, stands in {len(rows)} "
+                    f"rows ({len(rows) / len(f):.2g} of all) while the position goes on from "
+                    f"{x[rows].min():.4g} to {x[rows].max():.4g}: the force sensor or its converter is "
+                    "probably clipped there; record with a larger force range or press less far"
+                )
+            )
+    return [*found, *_standing(recording, travel, reach)]
+
+
+def _standing(recording: Recording, travel: Travel, reach: float) -> list[Finding]:
+    """Findings on a position that has the same value in many rows while the force goes on."""
+    x, f = recording.position, recording.force
+    noise = float(np.median(np.abs(np.diff(f)))) / 0.954
+    bound = max(FORCE_GOES_ON * reach, STANDING_NOISE * noise)
+    unit = recording.units["position"]
+    for value, name in ((travel.upper, "largest"), (travel.lower, "least")):
+        rows = np.flatnonzero(x == value)
+        if len(rows) >= max(CLIPPED_ROWS, CLIPPED_RATIO * _usual_count(x, value, travel)):
+            change = _change_inside(f, rows)
+            if change > bound:
+                return [
+                    usable(
+                        f"the {name} position, {amount(value, unit)}, stands in {len(rows)} rows while the "
+                        f"force changes by {change:.3g} and comes back: the position sensor is probably "
+                        "clipped there; record with a larger range of position"
+                    )
+                ]
+    step = np.diff(x)
+    moving = np.abs(step[step != 0.0])
+    if not len(moving):
+        return []
+    usual = float(np.median(moving))
+    bound = max(STUCK_FORCE * reach, STANDING_NOISE * noise)
+    edges = np.r_[0, np.flatnonzero(step != 0.0) + 1, len(x)]
+    lengths = np.diff(edges)
+    many = max(float(CLIPPED_ROWS), CLIPPED_RATIO * float(np.median(lengths)))
+    for k in np.flatnonzero(lengths >= many).tolist():
+        start, stop = int(edges[k]), int(edges[k + 1])
+        jump = abs(float(x[stop] - x[stop - 1])) if stop < len(x) else 0.0
+        if jump > JUMP * usual and _range_of(f[start:stop]) > bound:
+            return [
+                usable(
+                    f"the position stands still in rows {start} to {stop - 1}, then jumps by "
+                    f"{amount(jump, unit)}, while the force changes by {_range_of(f[start:stop]):.3g}: the "
+                    f"position sensor was probably stuck; use the rows before or after with --rows 0:{start} "
+                    f"or --rows {stop}:{len(x)}"
+                )
+            ]
+    return []
+
+
+def _usual_count(x: Float1D, value: float, travel: Travel) -> float:
+    """Rows at the values next to an extreme one."""
+    near = x[(np.abs(x - value) <= NEAR_EXTREME * travel.length) & (x != value)]
+    return float(np.median(np.unique(near, return_counts=True)[1])) if len(near) else 1.0
+
+
+def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
+    """Largest distance of the force inside a run of consecutive rows from both ends of the run.
+
+    A hand that turns stands still while friction lets go: the force then ends elsewhere than it began, but
+    lies between.
+    """
+    first = np.flatnonzero(np.diff(rows, prepend=-2) != 1)
+    last = np.r_[first[1:], len(rows)] - 1
+    force = f[rows]
+    ends = force[first], force[last]
+    above = np.maximum.reduceat(force, first) - np.maximum(*ends)
+    below = np.minimum(*ends) - np.minimum.reduceat(force, first)
+    return float(max(above.max(), below.max()))
+
+
+def _range_of(values: Float1D) -> float:
+    """Range of the inner 90 %."""
+    low, high = np.percentile(values, (5.0, 95.0))
+    return float(high - low)
+
+
+def hold_findings(recording: Recording) -> list[Finding]:
+    """Findings on columns that change only once in several rows.
+
+    Both columns together matter only with time, which then belongs to other rows than they do.
+    """
+    x, f = recording.position, recording.force
+    rows = {"position": _held_for(x), "force": _held_for(f)}
+    if rows["position"] == rows["force"]:
+        return (
+            [] if recording.time is None else _held(recording, "position and force change", rows["force"], "")
+        )
+    found = []
+    for name, held, other in (("force", f, x), ("position", x, f)):
+        if np.count_nonzero(np.diff(other)) >= SLOWER * np.count_nonzero(np.diff(held)):
+            found += _held(
+                recording, f"the {name} changes", rows[name], " while the other column changes in between"
+            )
+    return found
+
+
+def _held(recording: Recording, what: str, rows: int, other: str) -> list[Finding]:
+    f, lag = recording.force, (rows - 1) / 2.0
+    if rows < 2 or not np.std(f[rows:] - f[:-rows]) > TOLD_LAG * np.std(f):
+        return []
+    late = ""
+    if what == "the force changes" and (period := recording.sample_period) is not None:
+        late = f", or give --force-late-s {lag * period:.3g}"
+    return [
+        usable(
+            f"{what} only once in {rows} rows{other}: a slower sensor was probably repeated, and "
+            f"is late by {lag:g} rows on average; keep one row of each {rows}, the first with a new "
+            f"value{late}"
+        )
+    ]
+
+
+def _held_for(values: Float1D) -> int:
+    """Rows for which a column is held; 1 where the runs of equal values have no common length."""
+    edges = np.flatnonzero(np.diff(values)) + 1
+    lengths = np.diff(edges)
+    lengths = lengths[lengths < LONGEST_RUN]
+    if len(lengths) < 4:
+        return 1
+    rows = np.bincount(lengths) * np.arange(lengths.max() + 1)
+    common = int(np.argmax(rows))
+    return common if rows[::common].sum() >= REGULAR_RUNS * rows.sum() else 1
+
+
+def gap_findings(recording: Recording, travel: Travel) -> list[Finding]:
+    """Findings on gaps in position and in time."""
+    return [*_position_gaps(recording, travel), *_time_gaps(recording)]
+
+
+def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
+    if not travel.length > 0.0 or recording.input_names:
+        return []
+    side = sides(recording, travel)
+    strokes = [(1, "press stroke"), (-1, "release stroke")] if recording.direction is not None else []
+    found, told = [], set()
+    for of, name in [(0, "recording"), *strokes]:
+        rows = travel.inside if of == 0 else travel.inside & (side == of)
+        at = np.unique(recording.position[rows])
+        if len(at) < 10:
+            continue
+        apart = np.diff(at)
+        bound = max(LEAST_GAP * travel.length, WIDER_GAP * float(np.percentile(apart, 90.0)))
+        for k in np.flatnonzero(apart > bound).tolist():
+            if (at[k], at[k + 1]) not in told:
+                told.add((at[k], at[k + 1]))
+                found.append(_gap(recording, travel, name, float(at[k]), float(at[k + 1])))
+        if of and at[0] - travel.lower > END_GAP * travel.length:
+            found.append(_gap(recording, travel, name, travel.lower, float(at[0])))
+        if of and travel.upper - at[-1] > END_GAP * travel.length:
+            found.append(_gap(recording, travel, name, float(at[-1]), travel.upper))
+    return found
+
+
+def _gap(recording: Recording, travel: Travel, name: str, start: float, stop: float) -> Finding:
+    unit, share = recording.units["position"], (stop - start) / travel.length
+    return usable(
+        f"the {name} has no rows from {start:.4g} to {amount(stop, unit)}, {share:.0%} of the travel: the "
+        "model is interpolated there; record this interval too"
+    )
+
+
+def _time_gaps(recording: Recording) -> list[Finding]:
+    if recording.time is None or len(recording) < 3:
+        return []
+    steps = np.diff(recording.time)
+    period = float(np.median(steps))
+    gaps = steps[steps > GAP * period]
+    duration = float(recording.time[-1] - recording.time[0])
+    lost = float(np.sum(gaps - period)) / duration
+    if lost < LEAST_LOST:
+        return []
+    many = "s" * (len(gaps) > 1)
+    return [
+        usable(
+            f"time has {len(gaps)} gap{many}, the longest {gaps.max():.4g} s at a sample period of "
+            f"{period:.4g} s; {lost:.0%} of the duration has no rows: samples were probably dropped, and "
+            "velocity and hysteresis are not judged across a gap; record without dropped samples"
+        )
     ]

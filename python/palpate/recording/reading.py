@@ -1,36 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read a recording: choose its columns, check every row, convert to SI, and say what was done."""
+"""Read a recording from a file, or take it from a Recording, a frame or arrays."""
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Literal
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+import numpy.typing as npt
+import pandas as pd
 
-from .._typing import Float1D
-from ..arguments import path_of
+from ..arguments import path_of, shown
 from ..errors import InputError
-from .columns import Choice, Column, choose_columns
-from .files import require_file, sha256_of_file
-from .layout import Layout
-from .notes import chosen, noticed
-from .recording import UNSTATED, Motion, Recording, Source
-from .rows import RowCheck
-from .table import Cells, parse_number, to_numbers
-from .tables import open_table
-from .units import COLUMN_SUFFIX
+from .conversion import converted
+from .files import require_file
+from .formats import open_table
+from .recording import Recording
 
-MIN_ROWS = 10
-"""Fewer usable rows are no recording."""
+Given: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
+"""What is a recording, or can be read as one."""
 
-MIN_POSITIONS = 3
-"""Fewer distinct positions show no force over position."""
+CURE = "give a Recording, the name of a file, a DataFrame, or arrays of position and force"
 
 
 def read_recording(
@@ -105,173 +96,95 @@ def read_recording(
     if invalid not in ("refuse", "drop"):
         raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
     require_file(file)
-    table = open_table(file)
-    metadata = dict(table.metadata)
-    layout = Layout.taken_from(str(file), metadata)
-    choice = choose_columns(
+    fields = converted(
+        open_table(file),
         str(file),
-        table.names,
-        position=position or layout.roles.get("position"),
-        force=force or layout.roles.get("force"),
-        time=time or layout.roles.get("time"),
-        direction=direction or layout.roles.get("direction"),
-        inputs=tuple(inputs) or layout.inputs,
+        file=file,
+        position=position,
+        force=force,
+        time=time,
+        direction=direction,
+        inputs=inputs,
         units=units,
-        unstated=layout.roles.values(),
-        text=table.text_names,
-        steady=table.steady_names,
+        torque_constant=torque_constant,
+        negate=negate,
+        rows=rows,
+        zero=zero,
+        drop=invalid == "drop",
     )
-    numeric = [column for column in (choice.position, choice.force, choice.time, *choice.inputs) if column]
-    status = layout.roles.get("status")
-    if status is not None and status not in table.names:
-        raise InputError(f"{file} has no column {status!r}, which its metadata names as the status")
-    cells = table.read(
-        numbers=[column.name for column in numeric],
-        text=[name for name in (choice.direction, status) if name is not None],
-    )
-    stroke = choice.direction
-    if (
-        stroke == "segment"
-        and direction is None
-        and all(parse_number(word) is not None for word in cells[stroke])
-    ):
-        # Numbered segments say nothing about the stroke.
-        cells[stroke], stroke = to_numbers(cells[stroke]), None
-    notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
-    total = len(cells[choice.position.name])
-    start, stop = _row_range(file, rows, total)
-    whole = dict(cells)
-    if (start, stop) != (0, total):
-        notes.append(f"rows {start} to {stop - 1} of 0 to {total - 1} are used")
-        cells = {name: column[start:stop] for name, column in cells.items()}
-
-    check = RowCheck(str(file), table, start, stop - start, drop=invalid == "drop")
-    if status is not None:
-        check.as_modelled(cells[status])
-    for column in numeric:
-        check.finite(column.name, cells[column.name])
-    words = None if stroke is None else check.directions(stroke, cells[stroke])
-    if choice.time is not None:
-        check.increasing(choice.time.name, cells[choice.time.name])
-    if not check.kept.all():
-        cells = {name: column[check.kept] for name, column in cells.items()}
-        words = None if words is None else words[check.kept]
-    notes += check.notes
-
-    _negate(file, choice, negate, cells)
-    x = _in_si(choice.position, cells)
-    f = _in_si(choice.force, cells)
-    force_unit = choice.force.unit.si if choice.force.unit else UNSTATED
-    if torque_constant is not None:
-        if not (math.isfinite(torque_constant) and torque_constant > 0):
-            raise InputError(f"--torque-constant-Nm-per-A is {torque_constant}; it must be a number > 0")
-        if force_unit != "A":
-            raise InputError(
-                f"{file}: --torque-constant-Nm-per-A turns a current into a torque, but the force is "
-                f"{choice.force.name}, which is not in A"
-            )
-        f, force_unit = f * torque_constant, "N*m"
-    if zero is not None:
-        first, last = _row_range(file, zero, total)
-        numbers = np.arange(start, stop)[check.kept]
-        free = (numbers >= first) & (numbers < last)
-        if not free.any():
-            raise InputError(f"{file}: --zero {first}:{last} holds none of the rows that are used")
-        offset = float(np.mean(f[free]))
-        f = f - offset
-        notes.append(f"{offset:.6g} {force_unit}, the mean force of rows {first} to {last - 1}, is taken off")
-    _require_enough(file, choice.position, x, check.notes)
-    inputs_si = [_in_si(column, cells) for column in choice.inputs]
-    used = {column.name for column in numeric} | {stroke}
-    source = Source(
-        files=(str(file),),
-        sha256=sha256_of_file(file),
-        rows=len(x),
-        columns=_source_columns(choice, stroke),
-    )
-    recording = Recording(
-        position=x,
-        force=f,
-        time=None if choice.time is None else _in_si(choice.time, cells),
-        direction=words,
-        inputs=np.column_stack(inputs_si) if inputs_si else np.empty((len(x), 0)),
-        input_names=tuple(map(_si_name, choice.inputs)),
-        columns={name: column for name, column in cells.items() if name not in used},
-        metadata=metadata,
-        units={
-            "position": choice.position.unit.si if choice.position.unit else UNSTATED,
-            "force": force_unit,
-        },
-        source=source,
-        notes=(chosen(choice, stroke, torque_constant, table.notes), *notes, *noticed(x, f, words)),
-    )
-    if (start, stop) != (0, total):
-        _negate(file, choice, negate, whole)
-        recording = replace(recording, part_of=_motion(choice, whole, start + np.flatnonzero(check.kept)))
+    recording = Recording(**fields)
     return recording.with_force_earlier(force_late_s) if force_late_s else recording
 
 
-def _motion(choice: Choice, cells: dict[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
-    """The motion of all rows of a file, of which these are used; None if it has no continuous time."""
-    if choice.time is None:
-        return None
-    position, time = _in_si(choice.position, cells), _in_si(choice.time, cells)
-    usable = np.isfinite(position) & np.isfinite(time)
-    if not usable[rows].all() or np.any(np.diff(time[usable]) <= 0.0):
-        return None
-    number = np.cumsum(usable) - 1
-    return Motion(position[usable], time[usable], number[rows])
+def recording_from(
+    recording: Given | npt.ArrayLike,
+    force: npt.ArrayLike | None = None,
+    time: npt.ArrayLike | None = None,
+    direction: npt.ArrayLike | None = None,
+    *,
+    inputs: Sequence[str] = (),
+    name: str = "recording",
+) -> Recording:
+    """The recording that is given, read or made of arrays.
+
+    Parameters
+    ----------
+    recording : Recording, path, DataFrame or (n,) array_like
+        With `force` it is the array of positions.
+    force, time, direction : (n,) array_like, optional
+        As in :meth:`palpate.Recording.from_arrays`.
+    inputs : sequence of str
+        Further columns to read from a file or a frame.
+    name : str
+        The argument in messages.
+
+    Raises
+    ------
+    InputError
+        It is something else; the message names the argument.
+    """
+    if force is not None:
+        if isinstance(recording, (Recording, str, os.PathLike, pd.DataFrame)):
+            raise InputError(f"force is given beside {name}, which holds a force already; leave force out")
+        return Recording.from_arrays(recording, force, time, direction)
+    for role, array in (("time", time), ("direction", direction)):
+        if array is not None:
+            raise InputError(f"{role} is given without force; arrays need a position and a force")
+    if isinstance(recording, Recording):
+        return recording
+    if isinstance(recording, pd.DataFrame):
+        return Recording.from_frame(recording, inputs=inputs)
+    if isinstance(recording, (str, os.PathLike)):
+        return read_recording(path_of(name, recording), inputs=inputs)
+    raise InputError(f"{name} is {shown(recording)}; {CURE}")
 
 
-def _row_range(file: Path, rows: tuple[int | None, int | None] | None, total: int) -> tuple[int, int]:
-    first, last = rows or (None, None)
-    start, stop = first or 0, total if last is None else last
-    if not 0 <= start < stop <= total and rows is not None:
-        raise InputError(
-            f"{file}: rows {start}:{stop} were asked for; it has {total} rows, and START must be below STOP"
-        )
-    return start, stop
+def recordings_from(
+    recording: Given | Iterable[Given] | npt.ArrayLike,
+    force: npt.ArrayLike | None = None,
+    time: npt.ArrayLike | None = None,
+    direction: npt.ArrayLike | None = None,
+    *,
+    inputs: Sequence[str] = (),
+) -> list[Recording]:
+    """The recordings that are given: one, as in :func:`recording_from`, or a list.
 
-
-def _negate(file: Path, choice: Choice, negate: Sequence[str], cells: dict[str, Cells]) -> None:
-    by_role = {"position": choice.position.name, "force": choice.force.name}
-    used = {*by_role.values(), *(column.name for column in choice.inputs)}
-    for name in negate:
-        column = by_role.get(name, name)
-        if column not in used:
-            raise InputError(
-                f"{file}: --negate {name} names no column that is used ({', '.join(sorted(used))})"
-            )
-        cells[column] = -cells[column]
-
-
-def _in_si(column: Column, cells: dict[str, Cells]) -> Float1D:
-    values: Float1D = cells[column.name]
-    return values if column.unit is None else values * column.unit.factor
-
-
-def _si_name(column: Column) -> str:
-    """The name of an input after conversion, so that the name still tells the unit."""
-    return column.name if column.unit is None else f"{column.stem}_{COLUMN_SUFFIX[column.unit.si]}"
-
-
-def _source_columns(choice: Choice, stroke: str | None) -> dict[str, str]:
-    columns = {"position": choice.position.name, "force": choice.force.name}
-    if choice.time is not None:
-        columns["time"] = choice.time.name
-    if stroke is not None:
-        columns["direction"] = stroke
-    return columns | {_si_name(column): column.name for column in choice.inputs}
-
-
-def _require_enough(file: Path, position: Column, x: Float1D, left_out: Sequence[str]) -> None:
-    if len(x) < MIN_ROWS:
-        told = "".join(f"; {note}" for note in left_out)
-        raise InputError(f"{file} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}{told}")
-    distinct = len(np.unique(x))
-    if distinct < MIN_POSITIONS:
-        plural = "s" * (distinct > 1)
-        raise InputError(
-            f"{file}: column {position.name} holds {distinct} distinct value{plural}; "
-            f"force over position needs at least {MIN_POSITIONS}; choose another column with --position NAME"
-        )
+    Raises
+    ------
+    InputError
+        One of them is something else, or there is none.
+    """
+    several: Any = recording
+    is_list = isinstance(recording, Iterable) and not isinstance(
+        recording, (Recording, str, os.PathLike, pd.DataFrame, dict, bytes, np.ndarray, pd.Series)
+    )
+    if force is not None or time is not None or direction is not None or not is_list:
+        return [recording_from(several, force, time, direction, inputs=inputs)]
+    found = list(several)
+    if not found:
+        raise InputError(f"recording is an empty list; {CURE}")
+    if all(isinstance(each, (int, float, np.number)) for each in found):
+        raise InputError(f"recording is a list of numbers, and force is not given; {CURE}")
+    return [
+        recording_from(each, inputs=inputs, name=f"recording[{number}]") for number, each in enumerate(found)
+    ]

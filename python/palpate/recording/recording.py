@@ -3,73 +3,26 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from .._typing import Float1D, Float2D, Int8Vector
 from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
+from .conversion import UNSTATED, Motion, Source, converted, digest_of
+from .frame import NAME, FrameTable, python_arguments
 from .table import Cells
-from .units import FORCE_UNITS, POSITION_UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS
+from .writing import Layout, free_name, write_csv
 
 T = TypeVar("T")
-
-UNSTATED = ""
-"""The unit of an array that was handed over without one: SI, but not said which."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where data came from: enough to find it again, and to tell whether other data is the same."""
-
-    files: tuple[str, ...]
-    sha256: str
-    """SHA-256 of each file (of the arrays, for data that never was a file), separated by spaces."""
-    rows: int
-    columns: Mapping[str, str]
-    """Role (position, force, time, direction, or an input's name) to the column's name in the file."""
-    held_out_every: int = 0
-    """k where the rows i with i mod k = k - 1 were separated from the others; 0: all rows are together."""
-    held_out: bool = False
-    """True for the rows that were held out, False for those that were kept."""
-
-    @staticmethod
-    def merged(sources: Iterable[Source]) -> Source:
-        """One source for data taken from several recordings."""
-        parts = list(sources)
-        first = parts[0]
-        return replace(
-            first,
-            files=tuple(file for part in parts for file in part.files),
-            sha256=" ".join(part.sha256 for part in parts),
-            rows=sum(part.rows for part in parts),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """All rows of a measured motion, of which a recording holds a part.
-
-    Velocity and play depend on the rows before and after a row. Rows that were held out keep the motion
-    between them, so that both are formed from all rows.
-    """
-
-    position: Float1D
-    """(m,)"""
-    time: Float1D | None
-    """(m,) [s]"""
-    rows: npt.NDArray[np.intp]
-    """(n,) rows that the recording holds"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,10 +148,6 @@ class Recording:
                 raise InputError(
                     f"{name} has shape {arrays[name].shape}, but position has {arrays['position'].shape}"
                 )
-        digest = hashlib.sha256()
-        for array_or_none in (*arrays.values(), words):
-            if array_or_none is not None:
-                digest.update(array_or_none.tobytes())
         n = len(arrays["position"])
         return cls(
             position=arrays["position"],
@@ -210,7 +159,7 @@ class Recording:
             columns={},
             metadata=_mapping("metadata", metadata),
             units=checked_units,
-            source=Source(files=(), sha256=digest.hexdigest(), rows=n, columns={}),
+            source=Source(files=(), sha256=digest_of(*arrays.values(), words), rows=n, columns={}),
         )
 
     @classmethod
@@ -246,21 +195,22 @@ class Recording:
         InputError
             One sentence that names the column, the row and the value.
         """
-        from .frame import recording_of_frame  # it needs this class
-
         what: object = invalid
         if not isinstance(what, str) or what not in ("refuse", "drop"):
             raise InputError(f"invalid is {shown(what)}; it must be 'refuse' or 'drop'")
-        return recording_of_frame(
-            frame,
-            position=position,
-            force=force,
-            time=time,
-            direction=direction,
-            inputs=inputs,
-            units=units,
-            drop=invalid == "drop",
-        )
+        with python_arguments():
+            fields = converted(
+                FrameTable(frame),
+                NAME,
+                position=position,
+                force=force,
+                time=time,
+                direction=direction,
+                inputs=inputs,
+                units=units,
+                drop=invalid == "drop",
+            )
+        return cls(**fields)
 
     def __len__(self) -> int:
         return len(self.position)
@@ -356,20 +306,39 @@ class Recording:
         )
         return moved._rows(rows)
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
+    def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
         """Write the recording as CSV that :func:`palpate.read_recording` reads back exactly, with no option.
 
         The file appears under its name only when it is complete. Numbers are written so that they are read
         back to the last bit; positions and forces are written in SI units.
+
+        Parameters
+        ----------
+        path : path
+        replace : bool
+            False refuses an existing file.
 
         Raises
         ------
         InputError
             The folder does not exist or cannot be written, or the metadata cannot stand on one line.
         """
-        from .writing import write_csv  # the writer needs this class
-
-        return write_csv(self, path_of("path", path))
+        file = path_of("path", path)
+        taken = {*self.columns, *self.input_names}
+        suffixes = {"time": "_s", "direction": ""}
+        for role in ("position", "force"):
+            unit = self.units[role]
+            suffixes[role] = f"_{COLUMN_SUFFIX[unit]}" if unit else ""
+        roles = {
+            role: free_name(role, suffixes[role], taken)
+            for role in ("time", "position", "force", "direction")
+            if getattr(self, role) is not None
+        }
+        cells = {name: getattr(self, role) for role, name in roles.items()}
+        cells |= {name: self.inputs[:, index] for index, name in enumerate(self.input_names)}
+        cells |= self.columns
+        write_csv(file, Layout(roles, self.input_names), cells, self.metadata, replace=replace)
+        return file
 
 
 def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:

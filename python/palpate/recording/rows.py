@@ -12,10 +12,15 @@ from numpy.typing import NDArray
 
 from .._core import Status
 from .._typing import Float1D, Int8Vector
-from ..errors import InputError
-from .direction import DIRECTION_WORDS, direction_of
-from .names import shortened
+from ..errors import InputError, shortened
 from .table import Cells, Places
+
+DIRECTION_WORDS: dict[str, int] = {
+    **dict.fromkeys(("press", "approach", "load", "loading", "forward", "+1"), 1),
+    **dict.fromkeys(("release", "retract", "unload", "unloading", "back", "-1"), -1),
+    **dict.fromkeys(("pause", "hold", "extra", "0"), 0),
+}
+"""Words for the stroke: into the object (+1), out of it (-1), neither (0)."""
 
 
 @dataclass
@@ -153,3 +158,18 @@ class RowCheck:
 
 def _rows(count: int) -> str:
     return f"{count} row{'s' * (count > 1)}"
+
+
+def direction_of(word: str) -> int | None:
+    """The direction that a cell states, or None for a word that is not known.
+
+    Numbers count by their value, so ``1``, ``+1`` and ``1.0`` are the same direction.
+    """
+    text = word.strip()
+    if text in DIRECTION_WORDS:
+        return DIRECTION_WORDS[text]
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return int(value) if value in (-1.0, 0.0, 1.0) else None

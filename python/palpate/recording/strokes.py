@@ -5,14 +5,11 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._typing import Float1D, Int8Vector
-
-if TYPE_CHECKING:
-    from .recording import Recording
+from .recording import Recording
 
 TURN_SHARE = 0.02
 """Share of the travel by which the position must move back to count as a turn [-]."""

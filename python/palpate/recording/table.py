@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a file of columns gives before anything is chosen from it: names first, cells later."""
+"""Interface of all tables that are read: names first, cells later; and the numbers that cells hold."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 
@@ -14,46 +15,45 @@ Cells: TypeAlias = NDArray[Any]
 
 
 class Places(Protocol):
-    """Where the rows of a file stand."""
+    """Where the rows of a table stand."""
 
-    def place(self, row: int) -> str:
-        """Where a person finds a row: "line 12"."""
+    def place(self, row: int) -> str: ...
 
-    def cell(self, row: int, name: str) -> str:
-        """The text of one cell as it stands in the file."""
+    def cell(self, row: int, name: str) -> str: ...
 
 
-class TableFile(Places, Protocol):
-    """A file with a header, read in two steps so that only the header is needed to choose columns."""
+class Table(ABC):
+    """A table with a header, read in two steps so that only the header is needed to choose columns."""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The column names."""
+    names: tuple[str, ...]
+    metadata: Mapping[str, str]
+    torn = 0
+    """Torn lines at the end that are left out"""
+    notes: Sequence[str] = ()
+    """How the table was read where it differs from a plain one, in parts of a sentence"""
+    text_names: Collection[str] = ()
+    """Columns that are known to hold text before the rows are read"""
+    steady_names: Collection[str] = ()
+    """Columns that have one or two values at the start of the table, as far as they are read by then"""
 
-    @property
-    def metadata(self) -> Mapping[str, str]:
-        """What the file says about itself."""
-
-    @property
-    def torn(self) -> int:
-        """How many torn lines at the end are left out."""
-
-    @property
-    def notes(self) -> Sequence[str]:
-        """How the file was read where it differs from a plain one, in parts of a sentence."""
-
-    @property
-    def text_names(self) -> Collection[str]:
-        """Columns that are known to hold text before the rows are read."""
-
-    @property
-    def steady_names(self) -> Collection[str]:
-        """Columns that have one or two values at the start of the file, as far as they are read by then."""
-
+    @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
         """All columns. Those in `numbers` become float64 whatever they hold, those in `text` become strings;
         any other is numeric if every cell of it is."""
 
+    @abstractmethod
+    def place(self, row: int) -> str:
+        """Where a person finds a row: "line 12"."""
+
+    @abstractmethod
+    def cell(self, row: int, name: str) -> str:
+        """The text of one cell as it stands in the table."""
+
+
+class LongTable(Table):
+    """A table that can also be read part by part."""
+
+    @abstractmethod
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
         """Number of rows of the file, counted without reading cells, and places (start, stop) that divide it
         into parts of about so many rows, or more.
@@ -64,11 +64,13 @@ class TableFile(Places, Protocol):
             The file cannot be read part by part.
         """
 
+    @abstractmethod
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
         """The first row's number within the part, and the columns named, of each block of so many rows."""
 
+    @abstractmethod
     def rows_before(self, part: tuple[int, int]) -> int:
         """Rows of the file that come before a part."""
 

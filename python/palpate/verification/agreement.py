@@ -10,7 +10,8 @@ import numpy as np
 from .._typing import Float1D
 from ..errors import InputError
 from ..model import Model
-from .perception import FORCE_JND, force_floor
+from ..verdict import FORCE_JND
+from .metrics import force_floor
 
 _POSITIONS = 2001
 """Positions at which two models are compared."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -16,10 +17,9 @@ from ..identification.data.rows import input_columns
 from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
+from ..recording.conversion import Motion
 from ..recording.motion import GAP, acceleration, velocity
-from ..recording.recording import Motion
-from .flight import FlightRecord, flight_of
-from .strokes import with_strokes
+from ..recording.strokes import ordered_strokes, turns_of
 
 PLAY_SHARE_OF_TRAVEL = 0.01
 """Play radius over travel where nothing states one: recorded strokes do not tell it."""
@@ -27,6 +27,12 @@ PLAY_SHARE_OF_TRAVEL = 0.01
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are left out"
 
 _UNSTATED = ""
+
+_STRUCTURE = "structure"
+"""Line of metadata with the structure that was rendered."""
+
+_OBJECT_POSITION = "environment_position"
+"""Stem of the column with the position of the virtual object."""
 
 
 @dataclass(frozen=True)
@@ -201,3 +207,57 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
         if ours != theirs and _UNSTATED not in (ours, theirs):
             hint = "; give --torque-constant-Nm-per-A for the one in A" if "A" in (ours, theirs) else ""
             raise InputError(f"the model's {role} is in {ours}, the recording's in {theirs}{hint}")
+
+
+@dataclass(frozen=True)
+class FlightRecord:
+    """Statements of a flight record; None where the recording is none."""
+
+    play_radius: float | None = None
+    """[position]"""
+    object_position: Float1D | None = None
+    """(n,) position at which the force was computed: behind a coupling, or predicted"""
+    predicted: bool = False
+    """True if it is a predicted position of the handle"""
+
+
+def flight_of(recording: Recording) -> FlightRecord:
+    """Read what the metadata and the columns of a flight record state."""
+    structure = recording.metadata.get(_STRUCTURE, "")
+    found = re.search(r"\br = ([0-9.eE+-]+)", structure)
+    radius = float(found.group(1)) if found else None
+    predicted = ", predict " in structure
+    directly = structure.startswith("direct") and not predicted
+    if not structure or directly or "compensated" in structure:
+        return FlightRecord(radius)
+    for name, cells in recording.columns.items():
+        if name.startswith(_OBJECT_POSITION) and cells.dtype.kind == "f" and np.isfinite(cells).all():
+            return FlightRecord(radius, np.asarray(cells, dtype=np.float64), predicted)
+    return FlightRecord(radius)
+
+
+def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """The recording with the strokes that its order of rows gives, and a note; else as it is.
+
+    Used where the model differs between press and release, and neither time nor a play radius is known. A
+    recording that never turns back may be sorted by position: it is the stroke whose force is nearer.
+    """
+    known = recording.direction is not None or recording.time is not None or model.play_radius is not None
+    if known or not model.hysteretic:
+        return recording, ()
+    direction = ordered_strokes(recording)
+    if direction is None:
+        return recording, ()
+    turns = turns_of(direction)
+    if turns:
+        note = f"direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}"
+        return replace(recording, direction=direction), (note,)
+
+    def error(side: int) -> float:
+        modelled = model.force(recording.position, direction=np.full(len(recording), float(side)))
+        return float(np.sum((modelled - recording.force) ** 2))
+
+    side = 1 if error(1) <= error(-1) else -1
+    word = "press" if side > 0 else "release"
+    note = f"the position never turns back: all rows are taken as {word}, whose force in the model is nearer"
+    return replace(recording, direction=np.full(len(recording), side, dtype=np.int8)), (note,)

@@ -15,7 +15,6 @@
 #include "held_scenes.hpp"
 #include "line.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate.hpp"
 

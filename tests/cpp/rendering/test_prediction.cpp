@@ -10,12 +10,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/failure/objects.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/predicted.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session_text.hpp"
-#include "palpate/simulation/virtual_time.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -17,7 +17,7 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/simulated_device.hpp"
-#include "palpate/simulation/virtual_time.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "support.hpp"
 
@@ -473,7 +473,7 @@ TEST(Scheme, RendersAForceOfVelocityDirectlyOrNotAtAll) {
         ASSERT_NEAR(trace.force[k], 5.0 * trace.position[k] + drag, 1e-9) << "tick " << k;
     }
     for (const std::string_view name : {"massless", "implicit", "explicit", "energy-consistent"}) {
-        scheme.structure = structure_named(name);
+        scheme.structure = named<StructureKind>(name, "structure");
         EXPECT_THROW(validate(scheme, dashpot_model()), std::invalid_argument) << name;
     }
 }
@@ -481,7 +481,7 @@ TEST(Scheme, RendersAForceOfVelocityDirectlyOrNotAtAll) {
 TEST(Scheme, SimulatesEveryStructureOfAModel) {
     for (const std::string_view name : structure_names) {
         Scheme scheme;
-        scheme.structure = structure_named(name);
+        scheme.structure = named<StructureKind>(name, "structure");
         const Trace trace = simulate(spring_model(5.0), scheme, DeviceProfile{}, Hand{}, 2000);
         ASSERT_EQ(trace.force.size(), 2000U);
         for (std::size_t k = 0; k < trace.force.size(); ++k) {
@@ -501,7 +501,7 @@ TEST(Scheme, RefusesWhatCannotBeRendered) {
     EXPECT_THROW((void)simulate(spring_model(5.0), scheme, {}, {}, 10), std::invalid_argument);
     scheme = {};
     EXPECT_THROW((void)force_driven(spring_model(5.0), scheme, {}, period, 0.0), std::invalid_argument);
-    EXPECT_THROW((void)structure_named("implied"), std::invalid_argument);
+    EXPECT_THROW((void)named<StructureKind>("implied", "structure"), std::invalid_argument);
     const ForceModel loose{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
     EXPECT_THROW((void)simulate(loose, {}, {}, {}, 10), std::invalid_argument);

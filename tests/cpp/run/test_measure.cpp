@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/rendering/free_motion.hpp"
-#include "palpate/rendering/pulses.hpp"
+#include "palpate/rendering/measuring.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 namespace {

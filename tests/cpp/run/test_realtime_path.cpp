@@ -204,7 +204,7 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
             LastRecords<TickRecord> last{100};
             LoopProgress progress;
             const auto report = std::make_unique<LoopReport>();
-            const std::atomic<bool> asked{false};
+            const std::atomic<bool> stop_requested{false};
             std::atomic<bool> over{false};
             std::thread loop{[&] {
                 Periodic clock{100'000};
@@ -212,7 +212,7 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
                 allocations = locks = exceptions = 0;
                 before();
                 watched = true;
-                run_loop(controller, settings, clock, asked, sink, progress, *report);
+                run_loop(controller, settings, clock, stop_requested, sink, progress, *report);
                 watched = false;
                 over.store(true);
                 after();

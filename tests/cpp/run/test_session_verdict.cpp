@@ -137,14 +137,14 @@ TEST(SessionVerdict, RefusesARecordingWithoutUsableRows) {
 TEST(SessionVerdict, RefusesARunThatWasStoppedAndPutsThatFirst) {
     Judged stopped;
     stopped.report->lost_records = 5;
-    stopped.report->loop.ending = Ending::DeviceFault;
+    stopped.report->loop.exit_reason = ExitReason::DeviceFault;
     stopped.report->loop.status = Status::Fault;
     expect(stopped, "no: stopped by a fault of the device: Fault", "; 5 of 1000 (0.5 %) rows are missing");
 }
 
 TEST(SessionVerdict, NamesNoMotionOfARunThatWasStopped) {
     Judged stopped;
-    stopped.report->loop.ending = Ending::RateTooLow;
+    stopped.report->loop.exit_reason = ExitReason::RateTooLow;
     stopped.sinks.positions = {0.5, 0.5};
     stopped.sinks.forces = {0.0, 0.0};
     EXPECT_EQ(stopped.text().find("handle"), std::string::npos) << stopped.text();

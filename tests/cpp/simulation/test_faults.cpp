@@ -104,22 +104,22 @@ Rendering render(const std::vector<Fault>& faults, const LoopSettings& settings,
                  RecordingFile* file = nullptr, LateTick late = {}) {
     Rendering run;
     const ForceModel model = spring();
-    const Bench bench = bench_for(model, true, period_s);
-    run.guards = bench.guards();
+    const TestRig rig = rig_for(model, true, period_s);
+    run.guards = guards_for(rig.scale, rig.device);
     run.guards.ramp_s = 0.02;
-    with_structure(model, bench.scheme(model), period_s, bench.device.force_limit, [&](auto structure) {
-        Observing device{Faulty{SimulatedDevice{bench.device, bench.hand, 4}, faults,
+    with_structure(model, rig.scheme(model), period_s, rig.device.force_limit, [&](auto structure) {
+        Observing device{Faulty{SimulatedDevice{rig.device, rig.hand, 4}, faults,
                                 3.0 * run.guards.largest_speed * period_s},
                          run.observed};
         EXPECT_TRUE(device.open());
         Controller controller{device, std::move(structure),
-                              guards_of(run.guards, model, bench.scheme(model), period_s)};
+                              guards_of(run.guards, model, rig.scheme(model), period_s)};
         VirtualClock clock{late};
         Collected sink;
         sink.file = file;
         LoopProgress progress;
-        const std::atomic<bool> asked{false};
-        run_loop(controller, settings, clock, asked, sink, progress, *run.report);
+        const std::atomic<bool> stop_requested{false};
+        run_loop(controller, settings, clock, stop_requested, sink, progress, *run.report);
         run.ticks = std::move(sink.ticks);
         return 0;
     });
@@ -158,7 +158,7 @@ void expect_safe(const Rendering& run) {
 TEST(Faults, ARunWithoutThemIsOrderly) {
     const Rendering run = render({}, 2.0);
     expect_safe(run);
-    EXPECT_EQ(run.report->ending, Ending::TimeUp);
+    EXPECT_EQ(run.report->exit_reason, ExitReason::TimeUp);
     EXPECT_EQ(run.ticks.size(), 2000U);
     EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ramp)], 20U);
     EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Ok)], 1980U);
@@ -173,33 +173,33 @@ TEST(Faults, ATickLaterThanCertifiedEndsTheRunWithZeroForceAndSaysSo) {
     settings.duration_s = 1.0;
     settings.longest_period_s = 1.5e-3;
     const Rendering punctual = render({}, settings, nullptr, {400, 499'000});
-    EXPECT_EQ(punctual.report->ending, Ending::TimeUp);
+    EXPECT_EQ(punctual.report->exit_reason, ExitReason::TimeUp);
     const Rendering late = render({}, settings, nullptr, {400, 501'000});
     expect_safe(late);
-    EXPECT_EQ(late.report->ending, Ending::NotCertified);
-    EXPECT_FALSE(is_orderly(late.report->ending));
+    EXPECT_EQ(late.report->exit_reason, ExitReason::NotCertified);
+    EXPECT_FALSE(is_orderly(late.report->exit_reason));
     ASSERT_EQ(late.ticks.size(), 400U) << "the late tick makes no force";
     EXPECT_GT(late.ticks.back().force, 0.1);
     EXPECT_EQ(
-        ending_text(*late.report, settings),
+        exit_text(*late.report, settings),
         "stopped because a tick came 1.501 ms after the one before: the certificate holds up to 1.5 ms");
 }
 
 struct Expected {
     FaultKind kind;
     Status status;
-    Ending ending;
+    ExitReason exit_reason;
 };
 
 TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
     // 0.4 s: the hand is on its way, the force far from zero.
     for (const Expected& expected :
-         std::vector<Expected>{{FaultKind::Late, Status::Timeout, Ending::TimeUp},
-                               {FaultKind::Lost, Status::Lost, Ending::TimeUp},
-                               {FaultKind::Repeated, Status::Lost, Ending::TimeUp},
-                               {FaultKind::NotANumber, Status::NonFinite, Ending::TimeUp},
-                               {FaultKind::Jump, Status::Jump, Ending::Guard},
-                               {FaultKind::Gone, Status::Fault, Ending::DeviceFault}}) {
+         std::vector<Expected>{{FaultKind::Late, Status::Timeout, ExitReason::TimeUp},
+                               {FaultKind::Lost, Status::Lost, ExitReason::TimeUp},
+                               {FaultKind::Repeated, Status::Lost, ExitReason::TimeUp},
+                               {FaultKind::NotANumber, Status::NonFinite, ExitReason::TimeUp},
+                               {FaultKind::Jump, Status::Jump, ExitReason::Guard},
+                               {FaultKind::Gone, Status::Fault, ExitReason::DeviceFault}}) {
         const Rendering run = render({{expected.kind, 400, 1}}, 1.0);
         const std::string name{fault_names[static_cast<std::size_t>(expected.kind)]};
         expect_safe(run);
@@ -207,7 +207,7 @@ TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
         EXPECT_GT(run.ticks[399].force, 0.1) << name;
         EXPECT_EQ(run.ticks[400].status, expected.status) << name;
         EXPECT_EQ(run.ticks[400].force, 0.0) << name;
-        EXPECT_EQ(run.report->ending, expected.ending) << name;
+        EXPECT_EQ(run.report->exit_reason, expected.exit_reason) << name;
         if (is_final(expected.status)) {
             EXPECT_EQ(run.ticks.size(), 401U) << name;
         } else {
@@ -220,7 +220,7 @@ TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
 TEST(Faults, AFrozenEncoderIsFoundWhileTheHandleMoves) {
     const Rendering run = render({{FaultKind::Frozen, 300, 100'000}}, 1.0);
     expect_safe(run);
-    EXPECT_EQ(run.report->ending, Ending::Guard);
+    EXPECT_EQ(run.report->exit_reason, ExitReason::Guard);
     EXPECT_EQ(run.report->status, Status::Frozen);
     EXPECT_LE(run.ticks.size(), 300U + 52U);
 }
@@ -228,7 +228,7 @@ TEST(Faults, AFrozenEncoderIsFoundWhileTheHandleMoves) {
 TEST(Faults, ASaturatedMotorIsSaidAndTolerated) {
     const Rendering run = render({{FaultKind::Saturated, 300, 50}}, 1.0);
     expect_safe(run);
-    EXPECT_EQ(run.report->ending, Ending::TimeUp);
+    EXPECT_EQ(run.report->exit_reason, ExitReason::TimeUp);
     EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Limited)], 50U);
     EXPECT_NEAR(run.ticks[320].applied, 0.5 * run.ticks[319].force, 1e-12);
 }
@@ -237,8 +237,8 @@ TEST(Faults, OneSampleMoreThanToleratedEndsTheRun) {
     for (const std::uint64_t samples : {5U, 6U}) {
         const Rendering late = render({{FaultKind::Late, 300, samples}}, 0.5);
         const Rendering nan = render({{FaultKind::NotANumber, 300, samples}}, 0.5);
-        EXPECT_EQ(late.report->ending, samples == 5 ? Ending::TimeUp : Ending::DeviceFault);
-        EXPECT_EQ(nan.report->ending, samples == 5 ? Ending::TimeUp : Ending::Guard);
+        EXPECT_EQ(late.report->exit_reason, samples == 5 ? ExitReason::TimeUp : ExitReason::DeviceFault);
+        EXPECT_EQ(nan.report->exit_reason, samples == 5 ? ExitReason::TimeUp : ExitReason::Guard);
     }
 }
 
@@ -317,9 +317,9 @@ TEST(Faults, InAnyOrderTheForceStaysSafeAndTheRecordIsComplete) {
             }
         }
         const bool bad_end = !sends_force(run.report->status);
-        EXPECT_EQ(is_orderly(run.report->ending), ticks == 500 && !is_final(run.report->status));
-        EXPECT_TRUE(is_orderly(run.report->ending) || bad_end);
-        EXPECT_EQ(file.finish(ending_text(*run.report, {}), "virtual"), "");
+        EXPECT_EQ(is_orderly(run.report->exit_reason), ticks == 500 && !is_final(run.report->status));
+        EXPECT_TRUE(is_orderly(run.report->exit_reason) || bad_end);
+        EXPECT_EQ(file.finish(exit_text(*run.report, {}), "virtual"), "");
         EXPECT_EQ(rows_of(name), ticks);
     }
 }

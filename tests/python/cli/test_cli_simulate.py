@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate import Recording, _core, load_model, read_recording, simulate
 from palpate._core.device import DeviceProfile
 from palpate._core.rendering import Scheme
 from palpate._core.simulation import Hand
-
-from palpate import Recording, _core, load_model, read_recording, simulate
 from palpate.cli import demo as demo_module
 from palpate.cli.main import main
-from test_planning import keyswitch_by_hand, model_by_hand
 
 JSON_FIELDS = ["verdict", "structure", "duration_s", "ticks", "force_error_end", "force_error_instant"]
 JSON_FIELDS += [

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.cli.pictures import close_loops, picture_closed_loops, picture_verification
-from test_planning import keyswitch_by_hand, model_by_hand
 
 JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated"]
 JSON_FIELDS += ["verdict", "units"]

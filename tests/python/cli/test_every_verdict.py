@@ -6,14 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from models_by_hand import model_by_hand
 from palpate.cli.main import main
 from palpate.verdict import LEVELS, Verdict, no
 from test_cli_identify import spring
 from test_every_verb import VERBS
-from test_planning import model_by_hand
-
-JUDGING = sorted(set(VERBS) - {"chart"})
-"""chart draws the figures of the documentation and has no result of a user to judge."""
 
 
 @pytest.fixture
@@ -24,7 +21,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("verb", JUDGING)
+@pytest.mark.parametrize("verb", sorted(VERBS))
 def test_the_verdict_is_the_first_line_and_sets_the_exit_code(
     verb: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -36,7 +33,7 @@ def test_the_verdict_is_the_first_line_and_sets_the_exit_code(
     assert code == (1 if level == "no" else 0)
 
 
-@pytest.mark.parametrize("verb", JUDGING)
+@pytest.mark.parametrize("verb", sorted(VERBS))
 def test_the_verdict_is_a_field_of_the_json_object_and_sets_the_exit_code(
     verb: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

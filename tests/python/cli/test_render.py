@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from palpate._core.rendering import Scheme
-from palpate._core.simulation import motion_driven
 
 from control_program import MODEL, PATIENT, every_row, wait_for_rows
 from palpate import _core, load_model, read_recording
+from palpate._core.rendering import Scheme
+from palpate._core.simulation import motion_driven
 
 COMMAND = [sys.executable, "-m", "palpate", "render", str(MODEL)]
 

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, identify, load_model
 from palpate.cli.main import main
 from palpate.cli.printing import visible
 from palpate.cli.progress import Progress
 from palpate.identification.search.criteria import reporting_to
 from test_cli_identify import spring
-from test_planning import keyswitch_by_hand, model_by_hand
 
 CLI = Path(__file__).parents[3] / "python" / "palpate" / "cli"
 

@@ -68,7 +68,10 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL, "--rate-hz", "fast"], "--rate-hz: must be a number from 100 to 10000, not fast"),
         ([MODEL, "--rate-hz", "nan"], "--rate-hz: must be a number from 100 to 10000, not nan"),
         ([MODEL, "--duration-s", "0"], "--duration-s: must be a number above 0, not 0"),
-        ([MODEL, "--structure", "soft"], "must be direct, massless, implicit or explicit, not soft"),
+        (
+            [MODEL, "--structure", "soft"],
+            "must be one of direct, massless, implicit, explicit or energy-consistent, not soft",
+        ),
         (
             [MODEL, "--structure", "explicit", "--mass", "1e-4"],
             "explicit, which diverges: the model's steepest",
@@ -109,7 +112,7 @@ def test_a_usb_device_is_refused_for_what_is_missing() -> None:
     without = "built without libusb" in control("--help").stdout
     answer = control(MODEL, "--device", "usb:NOBODY")
     assert answer.returncode == 2
-    assert answer.stderr.startswith("error: --device usb:NOBODY: ")
+    assert answer.stderr.startswith("error: device usb:NOBODY: ")
     assert answer.stderr.count("\n") == 1
     assert ("built without libusb" in answer.stderr) == without
 
@@ -136,7 +139,7 @@ def test_asked_to_stop_it_ends_in_an_orderly_way(tmp_path: Path, number: signal.
     process.send_signal(number)
     told, talk = process.communicate(timeout=20)
     assert process.returncode == 0, talk
-    assert json.loads(told)["ended"] == "stopped because it was asked to"
+    assert json.loads(told)["ended"] == "stopped on request"
     assert len(every_row(out)) == json.loads(told)["ticks"]
 
 

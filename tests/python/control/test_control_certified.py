@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from control_program import control, needs_program
+from models_by_hand import model_by_hand
 from palpate import DeviceProfile, Scheme, load_model, plan, read_recording
 from palpate.planning import Plan
-from test_planning import model_by_hand
 
 pytestmark = needs_program
 

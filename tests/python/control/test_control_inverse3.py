@@ -134,7 +134,7 @@ def test_what_cannot_be_used_is_refused_with_its_cure(spring: Path, service: Ser
     [
         ("inverse3:w", "must be inverse3[:AXIS[@PORT]], AXIS of x, y, z, -x, -y, -z"),
         ("inverse3:z@0", "must be inverse3[:AXIS[@PORT]]"),
-        ("inverse3:", "--device is 'inverse3:', must be simulated, usb[:SERIAL] or inverse3"),
+        ("inverse3:", "device is 'inverse3:', must be simulated, usb[:SERIAL] or inverse3"),
         ("inverse3:z@1", "no Haply Inverse Service answers at 127.0.0.1:1 (Connection refused)"),
     ],
 )

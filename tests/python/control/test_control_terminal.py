@@ -121,7 +121,7 @@ def test_ctrl_c_in_a_terminal_is_an_orderly_end() -> None:
         screen.press(b"\x03")
         screen.watch()
         assert screen.process.wait() == 0
-        assert screen.summary()["ended"] == "stopped because it was asked to"
+        assert screen.summary()["ended"] == "stopped on request"
         last = screen.shown.rpartition(AGAIN)[2]
         assert last == "", "what the terminal echoed of the key is wiped away with the line"
 

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from palpate._core.rendering import Scheme
 
 from conftest import ROOT
 from palpate import DeviceProfile, load_model, plan, read_recording
+from palpate._core.rendering import Scheme
 from palpate.planning import Plan
 from usb_emulation import RUNNER, emulated, frames, needs_emulation
 
@@ -155,8 +155,8 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
         (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; there is EMU-1"),
         (["--device", "usb:"], [], "--device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
         ([], ["--somebody-elses"], "is 1209:0001 but not of this protocol"),
-        ([], ["--info-bytes", "31"], "its answer to GET_INFO has the wrong size"),
-        ([], ["--info-bytes", "33"], "its answer to GET_INFO has the wrong size"),
+        ([], ["--info-bytes", "31"], "the answer to GET_INFO has 31 bytes, must have 32"),
+        ([], ["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),
         ([], ["--denied"], "sudo palpate devices --install-udev-rule"),
         (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: choose --rate-hz 1000"),
         (["--force-limit", "6"], [], "--force-limit is 6, the device makes 5"),
@@ -230,7 +230,7 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
     process.send_signal(ask)  # the emulator passes it on
     out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert "stopped because it was asked to" in out
+    assert "stopped on request" in out
     assert frames(trace)[-1].torque == 0.0
     assert not frames(trace)[-1].enabled
 

@@ -6,6 +6,9 @@ import os
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from palpate import _core
 from palpate._core.device import DeviceProfile
 from palpate._core.dynamics import environment_filters
 from palpate._core.model import (
@@ -17,9 +20,6 @@ from palpate._core.model import (
 )
 from palpate._core.rendering import Scheme, structure_names
 from palpate._core.simulation import Hand, force_driven, motion_driven, simulate
-from scipy.signal import lfilter
-
-from palpate import _core
 
 CASES = 100 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+import palpate
+from conftest import ROOT
+from models_by_hand import model_by_hand
+from palpate import load_model
 from palpate._core.device import DeviceProfile
 from palpate._core.rendering import Scheme
 from palpate._core.simulation import Hand
 from palpate._core.stability import ForceBounds, Inequality, certify
-
-import palpate
-from conftest import ROOT
-from palpate import load_model
-from palpate.planning import Plan, bench_for
-from test_planning import model_by_hand
+from palpate.planning import Plan, rig_for
 
 GOOD = ROOT / "tests" / "models" / "good"
 
@@ -34,7 +34,7 @@ CHANGED: dict[str, Any] = {
     "Inequality": Inequality(
         id="i", name="a", formula="b > c", left=1 / 3, right=0.1, rests_on="linear", source="s", strict=True
     ),
-    "Bench": bench_for(model_by_hand()),
+    "TestRig": rig_for(model_by_hand()),
     "Certificate": certify(model_by_hand(), Scheme(structure="direct"), DeviceProfile()),
 }
 COPIES: list[Callable[[Any], Any]] = [
@@ -69,7 +69,7 @@ def test_the_fields_of_a_copy_are_the_arguments_of_the_constructor(name: str) ->
 
 def test_values_that_differ_in_one_field_are_not_equal() -> None:
     for name, value in CHANGED.items():
-        if name in ("Bench", "Certificate", "Inequality", "ForceBounds"):
+        if name in ("TestRig", "Certificate", "Inequality", "ForceBounds"):
             continue
         fields = value.__reduce__()[0].keywords
         for field, content in fields.items():

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from palpate._core.model import ForceModel
 
 from conftest import ROOT
+from palpate._core.model import ForceModel
 
 Array = NDArray[np.float64]
 

@@ -62,15 +62,15 @@ def heard(**changed: Any) -> dict[str, Any]:
     }
 
 
-def finding(found: Check, name: str) -> Any:
-    return next(one for one in found.findings if one.name == name)
+def observed(found: Check, name: str) -> Any:
+    return next(one for one in found.observations if one.name == name)
 
 
 def test_a_faultless_device_is_ok_and_all_numbers_are_told() -> None:
     found = judge(heard())
     assert str(found.verdict) == "good"
     assert found.may_push
-    assert {one.name for one in found.findings} >= {
+    assert {one.name for one in found.observations} >= {
         "rate",
         "period",
         "round trip",
@@ -108,10 +108,10 @@ def test_what_is_wrong_is_named_and_forbids_force_where_it_must(
     changed: dict[str, Any], name: str, forbids: bool
 ) -> None:
     found = judge(heard(**changed))
-    wrong = finding(found, name)
+    wrong = observed(found, name)
     assert wrong.right is False
     assert str(found.verdict).startswith("no: ")
-    assert f"{name}: {wrong.told}" in str(found.verdict)
+    assert f"{name}: {wrong.text}" in str(found.verdict)
     assert wrong.advice in str(found.verdict)
     assert found.may_push is not forbids
 
@@ -143,7 +143,7 @@ def test_a_flipped_sign_is_caught_before_any_force(what: str, monkeypatch: pytes
     found = check_device(push=True)
     assert not found.suitable
     assert all("push" not in settings for settings in calls)
-    assert finding(found, "sign of the force").told == "not looked at: what was heard forbids any force"
+    assert observed(found, "sign of the force").text == "not looked at: what was heard forbids any force"
 
 
 def pushed(
@@ -238,7 +238,7 @@ def test_a_device_without_friction_is_usable_and_says_what_that_costs() -> None:
 )
 def test_the_sign_of_the_force_is_what_moved_the_handle(ticks: dict[str, np.ndarray], told: str) -> None:
     found = check.with_pushes(judge(heard()), push_response(ticks))
-    assert finding(found, "sign of the force").told.startswith(told)
+    assert observed(found, "sign of the force").text.startswith(told)
     assert found.suitable is not told.startswith("flipped")
 
 
@@ -252,7 +252,7 @@ def faultless(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("faultless")
 def test_a_check_without_pushes_says_that_the_sign_of_the_force_was_not_seen() -> None:
     found = check_device()
-    assert finding(found, "sign of the force").right is None
+    assert observed(found, "sign of the force").right is None
     assert str(found.verdict) == (
         "usable: sign of the force: not looked at (let it push a free handle: --push)"
     )
@@ -261,7 +261,7 @@ def test_a_check_without_pushes_says_that_the_sign_of_the_force_was_not_seen() -
 def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
     profile = DeviceProfile()
     found = check_device(duration_s=4.0, push=True, profile=profile)
-    assert finding(found, "sign of the force").right
+    assert observed(found, "sign of the force").right
     assert found.numbers["coulomb_friction"] == pytest.approx(0.002 * profile.force_limit, rel=0.1)
     measured = found.profile()
     assert measured.inertia == pytest.approx(profile.inertia, rel=0.05)
@@ -310,8 +310,8 @@ def test_a_profile_that_promises_more_than_the_device_keeps_does_not_hold(
     changed: dict[str, float], wrong: str
 ) -> None:
     found = check_device(profile=DeviceProfile(**changed), push=True)
-    assert finding(found, "profile").right is False
-    assert wrong in finding(found, "profile").told
+    assert observed(found, "profile").right is False
+    assert wrong in observed(found, "profile").text
 
 
 def test_a_model_without_a_certificate_cannot_be_held_against_a_device() -> None:

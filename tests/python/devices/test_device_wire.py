@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""GET_INFO as Python reads it: strictly, and every refusal says what it is about."""
+"""The binding of the decoder of GET_INFO: SI units, and refusals that name the field."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from palpate import InputError
-from palpate.devices import decode_info
+from palpate._core.device import decode_info
 
 RIGHT: dict[str, Any] = {
     "magic": ord("I"),
@@ -34,9 +34,9 @@ def info(**changed: Any) -> bytes:
 
 def test_what_a_device_says_comes_in_si_units() -> None:
     read = decode_info(info())
-    assert (read.max_torque, read.rate_hz, read.watchdog_ms) == (0.25, 1000, 20)
-    assert read.encoder_step == pytest.approx(2 * 3.14159265358979 / 4096)
-    assert (read.transducer, read.measures_velocity) == (True, False)
+    assert (read["max_torque"], read["rate_hz"], read["watchdog_ms"]) == (0.25, 1000, 20)
+    assert read["encoder_step"] == pytest.approx(2 * 3.14159265358979 / 4096)
+    assert (read["transducer"], read["measures_velocity"]) == (True, False)
 
 
 @pytest.mark.parametrize("size", [0, 31, 33])

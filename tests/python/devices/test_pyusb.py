@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from palpate.devices.errors import device_error
+from palpate.devices.usb import device_error
 from usb_emulation import emulated, needs_emulation
 
 USBError = pytest.importorskip("usb.core", reason="needs pyusb").USBError

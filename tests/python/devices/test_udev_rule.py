@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from palpate.devices import DeviceError, install_rule, udev, wire
+from palpate._core.device import usb_product, usb_vendor
+from palpate.devices import DeviceError, install_rule, udev
 
 
 @pytest.fixture
@@ -34,7 +35,7 @@ def test_one_call_writes_the_rule_and_asks_udev_to_read_it(
     (rule,) = tmp_path.iterdir()
     assert rule.name == "60-palpate.rules"
     text = rule.read_text(encoding="utf-8")
-    assert f'ATTR{{idVendor}}=="{wire.VENDOR:04x}", ATTR{{idProduct}}=="{wire.PRODUCT:04x}"' in text
+    assert f'ATTR{{idVendor}}=="{usb_vendor:04x}", ATTR{{idProduct}}=="{usb_product:04x}"' in text
     assert 'TAG+="uaccess"' in text
     assert ran == [
         ("udevadm", "control", "--reload-rules"),

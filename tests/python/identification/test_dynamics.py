@@ -82,9 +82,9 @@ def test_velocity_and_hysteresis_are_taken_where_they_are_and_nowhere_else(
 
 def test_each_term_is_reported_with_what_it_gains() -> None:
     notes = identify(moved(1, damping=0.03)).notes["identification"]
-    (taken,) = (note for note in notes if note.startswith("damping taken"))
+    (taken,) = (note for note in notes if note.startswith("damping accepted"))
     assert "bic falls by" in taken
-    assert "the squared error on fresh stretches falls by" in taken
+    assert "the squared error on held-out stretches falls by" in taken
     assert any(note.startswith("mass refused: bic ") for note in notes)
 
 
@@ -203,9 +203,9 @@ def test_one_speed_tells_no_damping_from_hysteresis_but_two_do() -> None:
     for seed in range(1 if SCALE == 1 else 20):
         one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)
-        told = [note for note in one.notes["identification"] if note.startswith("velocity was not tried")]
+        told = [note for note in one.notes["identification"] if note.startswith("damping was not tested")]
         assert len(told) == 1
-        assert "does not tell damping from hysteresis" in told[0]
+        assert "damping and hysteresis look alike" in told[0]
         two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45, 0.15, 0.15, 0.45, 0.45], damping=0.06))
         assert two.kind == "position"
         assert two.damping == pytest.approx(0.06, rel=0.05)

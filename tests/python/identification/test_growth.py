@@ -107,7 +107,7 @@ def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.Mo
     def tried(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(growth, "_smooth", tried)
+    monkeypatch.setattr(Growth, "_smooth", tried)
     assert len(grown(over_two_inputs(smooth, 200, noise=0.02)).solution.basis) > 0
 
 

@@ -153,7 +153,7 @@ def test_a_gain_on_fresh_rows_below_its_standard_error_earns_nothing(
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
     assert network.model_class == rung
-    verdict = "taken" if rung == "position" else "refused"
+    verdict = "accepted" if rung == "position" else "refused"
     assert all(note.split()[1] == f"{verdict}:" for note in network.notes)
     assert all(note.endswith(f"falls by {100 * gain:g} +- 2 %") for note in network.notes)
 
@@ -303,7 +303,7 @@ def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() ->
     starts = [0, *range(70, len(x), 3)]
     network = fit_environment(x[:, None], force, starts=starts)
     assert network.model_class == "linear"
-    assert any(note.startswith("hysteresis was not tried: the motions") for note in network.notes)
+    assert any(note.startswith("hysteresis was not tested: the motions") for note in network.notes)
     with pytest.raises(InputError, match="inputs names hysteresis, but the motions"):
         fit_environment(
             x[:, None], force, starts=starts, options=IdentifyOptions(inputs=("position", "hysteresis"))

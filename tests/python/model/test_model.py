@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palpate._core.model import ForceModel
 
 from conftest import ROOT
 from palpate import InputError, Model, _core, load_model
+from palpate._core.model import ForceModel
 from palpate.model import Fit
 from palpate.recording import Source
 

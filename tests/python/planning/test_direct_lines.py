@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 import pytest
-from palpate._core.stability import balancing_shift, certify
 
+from models_by_hand import model_by_hand
 from palpate import DeviceProfile, Model, Scheme, plan
+from palpate._core.stability import balancing_shift, certify
 from palpate.model import Fit
 from palpate.planning import profile_file
 from palpate.planning.choices import renderable_slopes
-from palpate.planning.slope_limit import limit_slopes
+from palpate.planning.limited_network import limit_slopes
 from palpate.planning.static_error import static_force_error
-from test_planning import model_by_hand
 
 TURN = 2.0 * math.pi
 BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))

@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan
 from palpate.cli.main import main
 from palpate.identification.network.constraints import slope_limited
-from palpate.model.certified import device_record
 from palpate.planning import example_profiles, profile_file
 from palpate.planning.root_locus import root_locus
-from test_planning import keyswitch_by_hand, model_by_hand
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.005, jitter_s=1e-4)
 WEAK = DeviceProfile(id="weak knob", viscous_damping=0.003, coulomb_friction=0.005)
@@ -56,7 +55,7 @@ def test_every_example_loads_under_its_name_and_says_where_its_numbers_are_from(
 
 def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
     again = DeviceProfile.load(KNOB.save(tmp_path / "knob.toml"))
-    assert device_record(again) == device_record(KNOB)
+    assert again.to_dict() == KNOB.to_dict()
 
 
 @pytest.mark.parametrize(

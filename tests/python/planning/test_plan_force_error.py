@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palpate._core.model import fingerprint
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import (
     DeviceProfile,
     InputError,
@@ -26,11 +26,10 @@ from palpate import (
     read_recording,
     verify,
 )
+from palpate._core.model import fingerprint
 from palpate.cli.main import main
-from palpate.model.certified import device_record
 from palpate.planning import example_profiles
 from test_plan import SMOOTH, WEAK, slide
-from test_planning import keyswitch_by_hand, model_by_hand
 
 
 @pytest.fixture(scope="session")
@@ -52,7 +51,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def changed(device: DeviceProfile, **fields: Any) -> DeviceProfile:
-    return DeviceProfile(**device_record(device) | fields)
+    return DeviceProfile(**device.to_dict() | fields)
 
 
 def network(path: str) -> dict[str, Any]:
@@ -277,7 +276,7 @@ def test_a_device_is_taken_by_object_name_and_path(tmp_path: Path) -> None:
     for device in (DeviceProfile.load(file), file, str(file)):
         other = plan(model, device, accept_force_error=1.0)
         assert other.certificate is not None
-        assert device_record(other.certificate.device) == device_record(named.certificate.device)
+        assert other.certificate.device.to_dict() == named.certificate.device.to_dict()
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from palpate._core.rendering import structure_names
 
 from control_program import control, needs_program
+from models_by_hand import model_by_hand
 from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, plan, simulate
+from palpate._core.rendering import structure_names
 from palpate.cli.main import main
-from palpate.planning import bench_for, force_at, force_error
-from test_planning import model_by_hand
+from palpate.planning import force_at, force_error, rig_for
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.02)
 # A certificate that a busy machine does not leave: its longest period is a tenth of a second.
@@ -106,9 +106,9 @@ def test_the_plan_comes_back_from_its_file_and_an_edited_bound_does_not(tmp_path
 
 def test_what_is_rendered_is_the_model_at_the_last_difference_of_positions() -> None:
     model = fluid_by_hand()
-    bench = bench_for(model)
+    rig = rig_for(model)
     chosen = plan(model, KNOB)
-    rendered = simulate(chosen, KNOB, bench.hand, 2.0)
+    rendered = simulate(chosen, KNOB, rig.hand, 2.0)
     x = rendered.position[1:]
     v = np.diff(rendered.position) / KNOB.period_s
     inside = (x >= 0.0) & (x <= 0.5) & (np.abs(v) <= 4.0)

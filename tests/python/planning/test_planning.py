@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendering a model on a simulated bench: plans, hands, force errors, and what is refused."""
+"""Rendering a model on a test rig: plans, hands, force errors, and what is refused."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
+from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import (
     DeviceProfile,
     Hand,
@@ -18,61 +19,19 @@ from palpate import (
     read_recording,
     simulate,
 )
-from palpate.model import Fit
 from palpate.planning import (
-    bench_for,
     compare_structures,
     explicit_slope_limit,
     force_at,
     force_error,
+    rig_for,
 )
-from palpate.recording import Source
-
-
-def model_by_hand(**changes: Any) -> Model:
-    """f = 5 x + one wavelet over 0 to 0.5 rad, at most 3 N*m; with changes."""
-    arguments: dict[str, Any] = {
-        "kind": "position",
-        "inputs": ("position",),
-        "units": {"position": "rad", "force": "N*m"},
-        "alpha": [[20.0]],
-        "beta": [[0.3]],
-        "weight": [0.1],
-        "linear": [5.0],
-        "bias": 0.0,
-        "lower": [0.0],
-        "upper": [0.5],
-        "fit": Fit("network", "bic", 0.01, 1, 5),
-        "data": Source(("by-hand.csv",), "0" * 64, 100, {}),
-    }
-    return Model(**{**arguments, **changes})
-
-
-def keyswitch_by_hand(**changes: Any) -> Model:
-    """A tactile switch of 4 mm travel whose press lies 0.1 N above its release."""
-    return model_by_hand(
-        **{
-            "kind": "hysteresis",
-            "units": {"position": "m", "force": "N"},
-            "alpha": [[2000.0]],
-            "beta": [[0.002]],
-            "weight": [-0.2],
-            "linear": [100.0],
-            "bias": 0.3,
-            "weight_hysteresis": [0.0],
-            "linear_hysteresis": [0.0],
-            "bias_hysteresis": 0.05,
-            "upper": [0.004],
-            "below": "free",
-            **changes,
-        }
-    )
 
 
 def rendered(model: Model, duration: float = 4.0, **scheme: Any) -> tuple[Plan, Recording]:
-    bench = bench_for(model)
-    plan = Plan(model, bench.scheme(model, **scheme))
-    return plan, simulate(plan, bench.device, bench.hand, duration)
+    rig = rig_for(model)
+    plan = Plan(model, rig.scheme(model, **scheme))
+    return plan, simulate(plan, rig.device, rig.hand, duration)
 
 
 def test_a_plan_claims_no_certificate() -> None:
@@ -149,7 +108,7 @@ def test_a_sweep_asks_for_no_force_that_the_device_cannot_hold(structure: str) -
     assert 0.5 * DeviceProfile().force_limit < np.abs(recording.force).max() < DeviceProfile().force_limit
 
 
-def test_the_bench_of_another_unit_is_the_knob_as_a_scale_model() -> None:
+def test_the_rig_of_another_unit_is_the_knob_as_a_scale_model() -> None:
     """The same object in metres and newtons, or in radians and newton metres, has the same relative error."""
     scale_length, scale_force = 0.008, 0.2
     rotary = model_by_hand(below="free")
@@ -169,7 +128,7 @@ def test_the_bench_of_another_unit_is_the_knob_as_a_scale_model() -> None:
     assert relative == pytest.approx(
         force_error(plan, recording).end / np.abs(recording.force).max(), rel=0.5
     )
-    assert bench_for(linear).device.encoder_step == pytest.approx(DeviceProfile().encoder_step * scale_length)
+    assert rig_for(linear).device.encoder_step == pytest.approx(DeviceProfile().encoder_step * scale_length)
 
 
 def test_what_was_rendered_is_a_recording_that_says_it_is_simulated(tmp_path: Any) -> None:
@@ -188,7 +147,7 @@ def test_the_recorded_force_is_what_the_device_made_of_the_command() -> None:
     model = model_by_hand()
     plan = Plan(model, Scheme(structure="direct"))
     coarse = DeviceProfile(force_step=0.5)
-    recording = simulate(plan, coarse, bench_for(model).hand, 1.0)
+    recording = simulate(plan, coarse, rig_for(model).hand, 1.0)
     assert set(recording.force % 0.5) == {0.0}
     assert not set(recording.columns["commanded_Nm"] % 0.5) <= {0.0}
 
@@ -211,7 +170,7 @@ def test_force_error_is_the_rms_of_force_minus_the_model_at_the_handle() -> None
 
 def test_force_along_a_motion_follows_the_play_of_a_hysteresis_model() -> None:
     model = keyswitch_by_hand()
-    plan = Plan(model, bench_for(model).scheme(model))
+    plan = Plan(model, rig_for(model).scheme(model))
     motion = np.concatenate([np.linspace(0.0, 0.004, 500), np.linspace(0.004, 0.0, 500)])
     force = force_at(plan, motion)
     np.testing.assert_allclose(force[250], model.force(motion[250], direction=1.0), rtol=1e-12)
@@ -224,14 +183,14 @@ def test_the_play_radius_is_chosen_only_where_the_model_leaves_it_open() -> None
         (keyswitch_by_hand(play_radius=1e-4), 0.0),
         (keyswitch_by_hand(), 4e-5),  # 1 % of the travel, far above the encoder's step
     ):
-        assert bench_for(model).scheme(model).play_radius == pytest.approx(radius)
-    assert bench_for(model).scheme(model, play_radius=1e-3).play_radius == 1e-3
+        assert rig_for(model).scheme(model).play_radius == pytest.approx(radius)
+    assert rig_for(model).scheme(model, play_radius=1e-3).play_radius == 1e-3
 
 
 def test_the_structures_stand_in_the_order_of_what_they_lose() -> None:
     """Compensated equals direct; softness of the coupling comes next; added damping costs most."""
     model = model_by_hand(linear=[8.0])
-    rows = compare_structures(model, bench_for(model), 4.0)
+    rows = compare_structures(model, rig_for(model), 4.0)
     assert [row.scheme.structure for row in rows] == [
         "direct", "direct", "massless", "massless", "implicit", "implicit", "explicit",
     ]  # fmt: skip
@@ -247,7 +206,7 @@ def test_the_structures_stand_in_the_order_of_what_they_lose() -> None:
 
 def test_compensation_of_a_slope_beyond_the_coupling_is_refused_with_its_reason() -> None:
     model = model_by_hand(linear=[95.0], upper=[0.05])
-    row = compare_structures(model, bench_for(model), 0.1)[2]
+    row = compare_structures(model, rig_for(model), 0.1)[2]
     assert row.recording is None
     assert row.error is None
     assert row.refused is not None

@@ -12,10 +12,9 @@ from pathlib import Path
 import pytest
 
 from conftest import ROOT
+from models_by_hand import model_by_hand
 from palpate import InputError, Model, load_model
 from palpate.recording.files import replacing
-from palpate.recording.writing import write_csv
-from test_planning import model_by_hand
 
 MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
@@ -180,7 +179,7 @@ def test_a_recording_is_written_to_a_free_name_only(tmp_path: Path) -> None:
 
     recording = sample_recording(seed=1)
     path = tmp_path / "a.csv"
-    write_csv(recording, path, replace=False)
+    recording.write(path, replace=False)
     with pytest.raises(InputError, match="exists already"):
-        write_csv(recording, path, replace=False)
-    write_csv(recording, path)
+        recording.write(path, replace=False)
+    recording.write(path)

@@ -11,8 +11,8 @@ import pytest
 import palpate
 from corruptions import SEED, SYNTHETIC, Rows, base, base_names
 from palpate.cli.main import main
+from palpate.recording.comparison import UNIT_RATIOS
 from palpate.recording.quality import findings_of, quality_findings
-from palpate.recording.scales import UNIT_RATIOS
 
 
 def rows_of(name: str, draw: int = 0) -> Rows:

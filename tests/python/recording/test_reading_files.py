@@ -88,6 +88,8 @@ def test_parquet_without_pyarrow_says_what_to_install(
     def missing(name: str) -> object:
         raise ImportError(name)
 
-    reader = importlib.import_module("palpate.recording.parquet_file")
+    reader = importlib.import_module("palpate.recording.formats")
     monkeypatch.setattr(reader, "import_module", missing)
-    assert refusal(path) == "a.parquet is Parquet, which needs pyarrow: install it with pip install pyarrow"
+    assert refusal(path) == (
+        "a.parquet is Parquet, which needs pyarrow: install it with pip install 'palpate[parquet]'"
+    )

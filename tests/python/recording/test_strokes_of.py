@@ -11,7 +11,7 @@ import pytest
 from palpate import InputError, Model, Recording, identify, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
-from palpate.recording.scales import scale_findings
+from palpate.recording.comparison import scale_findings
 from palpate.recording.strokes import strokes_from_order
 
 MEASURED = ("keyswitches", "rubber_domes", "switch_springs")

@@ -11,7 +11,7 @@ from palpate import InputError, Model, Recording, Scheme
 from palpate.model import Fit
 from palpate.recording import Source, sample_recording
 from palpate.verification import force_driven, motion_driven
-from palpate.verification.timing import even_motion
+from palpate.verification.closed_loop import even_motion
 
 RAD = {"position": "rad", "force": "N*m"}
 NOWHERE = Source((), "", 0, {})

@@ -6,12 +6,10 @@ import pytest
 
 from palpate.verification.metrics import (
     durbin_watson,
+    force_floor,
     lag_one_autocorrelation,
     normalised,
     root_mean_square,
-)
-from palpate.verification.perception import (
-    force_floor,
     share_within_force_jnd,
     share_within_stiffness_jnd,
 )

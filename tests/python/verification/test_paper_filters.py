@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from palpate._core.dynamics import environment_filters
 
 from palpate import InputError, Recording, identify
+from palpate._core.dynamics import environment_filters
 from palpate.identification import IdentifyOptions, SearchOptions
 from palpate.identification.data.rows import paper_target
 from palpate.recording import sample_force, sample_recording

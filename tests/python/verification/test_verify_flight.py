@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from control_program import PATIENT, control, needs_program
+from models_by_hand import model_by_hand
 from palpate import Model, Recording, identify, read_recording, verify
 from palpate.cli.main import main
-from palpate.verification.flight import flight_of
-from test_planning import model_by_hand
+from palpate.verification.prediction import flight_of
 
 UNITS = {"position": "m", "force": "N"}
 

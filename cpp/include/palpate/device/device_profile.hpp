@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <tuple>
 
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate {
 
@@ -18,19 +21,20 @@ inline constexpr int longest_delay_samples = 16;
     return longest_delay_samples * period_s * (1.0 + 1e-9);
 }
 
-/// What is known of a haptic device. The default is a direct-drive knob with a 16-bit encoder.
+/// What is known of a haptic device; `fields_of` says what each number means. The default is a direct-drive knob with a
+/// 16-bit encoder.
 struct DeviceProfile {
     std::string id = "simulated-knob";
-    double period_s = 1e-3;                                  ///< T, time between two samples [s]
-    double inertia = 2e-4;                                   ///< of handle and motor [kg or kg*m^2]
-    double viscous_damping = 0.06;                           ///< b, physical [N*s/m or N*m*s/rad]
-    double coulomb_friction = 0.0;                           ///< f_c, physical [N or N*m]
-    double encoder_step = 2.0 * std::numbers::pi / 65536.0;  ///< Delta [m or rad]; 0 = not quantised
-    double force_step = 0.0;            ///< Delta_F, of the command [N or N*m]; 0 = not quantised
-    double delay_s = 0.0;               ///< t_d, time from a sample to the force that is computed from it [s]
-    double force_limit = 5.0;           ///< [N or N*m]
-    double jitter_s = 0.0;              ///< how much longer than T the time between two samples can get [s]
-    std::string position_unit = "rad";  ///< rad, and forces are in N*m; or m, and they are in N
+    std::string position_unit = "rad";
+    double period_s = 1e-3;
+    double inertia = 2e-4;
+    double viscous_damping = 0.06;
+    double coulomb_friction = 0.0;
+    double encoder_step = 2.0 * std::numbers::pi / 65536.0;
+    double force_step = 0.0;
+    double delay_s = 0.0;
+    double force_limit = 5.0;
+    double jitter_s = 0.0;
 
     /// What a certificate has to hold for.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
@@ -57,30 +61,41 @@ struct DeviceProfile {
     [[nodiscard]] bool operator==(const DeviceProfile&) const = default;
 };
 
+namespace detail {
+inline constexpr std::array<std::string_view, 2> position_units{"rad", "m"};
+}
+
+template <>
+inline constexpr auto fields_of<DeviceProfile> = std::tuple{
+    Field<&DeviceProfile::id>{"id",
+                              "Its name; a certificate holds for the device of this name and these numbers."},
+    Field<&DeviceProfile::position_unit>{"position_unit",
+                                         "\"rad\", with forces in N*m, or \"m\", with forces in N.",
+                                         Rule::Any, true, detail::position_units},
+    Field<&DeviceProfile::period_s>{"period_s", "T, time between two samples [s].", Rule::Positive},
+    Field<&DeviceProfile::inertia>{"inertia", "Of handle and motor [kg or kg*m^2].", Rule::Positive},
+    Field<&DeviceProfile::viscous_damping>{
+        "viscous_damping", "b, physical [N*s/m or N*m*s/rad]; at most the true one.", Rule::NotNegative},
+    Field<&DeviceProfile::coulomb_friction>{
+        "coulomb_friction", "f_c, physical [N or N*m]; at most the true one.", Rule::NotNegative},
+    Field<&DeviceProfile::encoder_step>{"encoder_step", "Delta [m or rad]; 0 = not quantised.",
+                                        Rule::NotNegative},
+    Field<&DeviceProfile::force_step>{"force_step", "Delta_F, of the command [N or N*m]; 0 = not quantised.",
+                                      Rule::NotNegative},
+    Field<&DeviceProfile::delay_s>{
+        "delay_s", "t_d, time from a sample to the force that is computed from it [s]; 0 to 16 periods.",
+        Rule::NotNegative},
+    Field<&DeviceProfile::force_limit>{"force_limit", "Largest force [N or N*m].", Rule::Positive},
+    Field<&DeviceProfile::jitter_s>{
+        "jitter_s", "How much longer than T the time between two samples can get [s].", Rule::NotNegative}};
+
 /// Throws std::invalid_argument naming the field, its value and what would be right.
 inline void validate(const DeviceProfile& profile) {
-    const auto require = [](bool holds, const char* field, double value, const char* right) {
-        if (!holds) {
-            throw std::invalid_argument("device profile: " + std::string(field) + " is " + readable(value) +
-                                        ", must be " + right);
-        }
-    };
-    const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
-    const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
-    require(positive(profile.period_s), "period_s", profile.period_s, "> 0");
-    require(positive(profile.inertia), "inertia", profile.inertia, "> 0");
-    require(not_negative(profile.viscous_damping), "viscous_damping", profile.viscous_damping, ">= 0");
-    require(not_negative(profile.coulomb_friction), "coulomb_friction", profile.coulomb_friction, ">= 0");
-    require(not_negative(profile.encoder_step), "encoder_step", profile.encoder_step, ">= 0");
-    require(not_negative(profile.force_step), "force_step", profile.force_step, ">= 0");
-    require(positive(profile.force_limit), "force_limit", profile.force_limit, "> 0");
-    require(not_negative(profile.jitter_s), "jitter_s", profile.jitter_s, ">= 0");
-    if (profile.position_unit != "rad" && profile.position_unit != "m") {
-        throw std::invalid_argument("device profile: position_unit is '" + profile.position_unit +
-                                    "', must be 'rad' or 'm'");
+    check_fields(profile, "device profile: ");
+    if (!(profile.delay_s <= longest_delay_s(profile.period_s))) {
+        throw std::invalid_argument("device profile: delay_s is " + readable(profile.delay_s) +
+                                    ", must be 0 to 16 periods");
     }
-    require(profile.delay_s >= 0.0 && profile.delay_s <= longest_delay_s(profile.period_s), "delay_s",
-            profile.delay_s, "0 to 16 periods");
 }
 
 }  // namespace palpate

@@ -43,7 +43,7 @@ class PacketStream {
     /// A packet that arrived at `now`, of the host's clock. False: not a packet of this protocol.
     [[nodiscard]] bool take(std::span<const std::uint8_t> bytes, Nanoseconds now) noexcept {
         wire::InPacket packet;
-        if (wire::decode(bytes, packet) != wire::Decoded::Ok) {
+        if (!wire::decode(bytes, packet)) {
             ++health_.malformed;
             return false;
         }

@@ -7,8 +7,12 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <numbers>
 #include <span>
+#include <string>
+#include <tuple>
+#include <utility>
 
 /// What a USB device and its host say to each other, version 1: packets of fixed size, little endian, packed. A wrong
 /// size, magic or version is an error, never a guess.
@@ -45,6 +49,10 @@ inline constexpr unsigned fault_bits = encoder_fault | over_temperature | emerge
 /// Bits of Info::capabilities.
 inline constexpr std::uint32_t has_transducer = 1;
 inline constexpr std::uint32_t measures_velocity = 2;
+
+/// Range of the time for which the device makes force without a command.
+inline constexpr int shortest_watchdog_ms = 2;
+inline constexpr int longest_watchdog_ms = 1000;
 
 inline constexpr std::size_t largest_packet = 64;  ///< what a full-speed interrupt endpoint can send
 inline constexpr std::size_t in_size = 32;
@@ -83,13 +91,6 @@ struct Info {
     std::uint32_t capabilities = 0;
     std::uint64_t uid = 0;
 };
-
-/// What is wrong with received bytes.
-enum class Decoded : std::uint8_t { Ok, WrongSize, WrongMagic, WrongVersion, WrongField };
-
-inline constexpr std::array<const char*, 5> decoded_texts{
-    "is as it should be", "has the wrong size", "begins with the wrong byte",
-    "is of another version of the protocol", "has a field that no device can have"};
 
 namespace detail {
 
@@ -140,46 +141,65 @@ class Putting {
     std::size_t at_ = 0;
 };
 
-/// What every packet begins with.
-[[nodiscard]] inline Decoded begins(std::span<const std::uint8_t> bytes, std::size_t size,
-                                    char magic) noexcept {
-    if (bytes.size() != size) {
-        return Decoded::WrongSize;
-    }
-    if (bytes[0] != static_cast<std::uint8_t>(magic)) {
-        return Decoded::WrongMagic;
-    }
-    return bytes[1] == protocol_version ? Decoded::Ok : Decoded::WrongVersion;
-}
-
 }  // namespace detail
 
-[[nodiscard]] inline Decoded decode(std::span<const std::uint8_t> bytes, InPacket& packet) noexcept {
-    const Decoded begun = detail::begins(bytes, in_size, 'H');
-    if (begun == Decoded::Ok) {
-        detail::Taking{bytes.subspan(2)}(packet.sequence, packet.clock_us, packet.count, packet.velocity_cps,
-                                         packet.torque_uNm, packet.status, packet.out_sequence,
-                                         packet.out_age_us, packet.temperature_dC, packet.sensor_uNm);
+/// Reads a packet; false if the bytes are not one of this protocol.
+[[nodiscard]] inline bool decode(std::span<const std::uint8_t> bytes, InPacket& packet) noexcept {
+    if (bytes.size() != in_size || bytes[0] != 'H' || bytes[1] != protocol_version) {
+        return false;
     }
-    return begun;
+    detail::Taking{bytes.subspan(2)}(packet.sequence, packet.clock_us, packet.count, packet.velocity_cps,
+                                     packet.torque_uNm, packet.status, packet.out_sequence, packet.out_age_us,
+                                     packet.temperature_dC, packet.sensor_uNm);
+    return true;
 }
 
-[[nodiscard]] inline Decoded decode(std::span<const std::uint8_t> bytes, Info& info) noexcept {
-    if (const Decoded begun = detail::begins(bytes, info_size, 'I'); begun != Decoded::Ok) {
-        return begun;
+/// Reads the answer to GET_INFO. Returns why it is refused, with the field, its value and the right one; else "".
+[[nodiscard]] inline std::string decode(std::span<const std::uint8_t> bytes, Info& info) {
+    using Number = std::int64_t;
+    const std::string answer = "the answer to GET_INFO";
+    if (bytes.size() != info_size) {
+        return answer + " has " + std::to_string(bytes.size()) + " bytes, must have " +
+               std::to_string(info_size);
     }
+    if (bytes[0] != 'I') {
+        constexpr const char* digits = "0123456789abcdef";
+        return answer + " begins with 0x" + digits[bytes[0] >> 4U] + digits[bytes[0] & 15U] +
+               ", must begin with 'I'";
+    }
+    std::uint8_t version = 0;
     std::uint8_t in_bytes = 0;
     std::uint8_t out_bytes = 0;
     std::uint8_t degrees_of_freedom = 0;
     std::uint8_t reserved = 0;
-    detail::Taking{bytes.subspan(2)}(info.firmware, info.counts_per_rev, info.max_torque_uNm, info.rate_hz,
-                                     info.watchdog_ms, info.capabilities, in_bytes, out_bytes,
+    detail::Taking{bytes.subspan(1)}(version, info.firmware, info.counts_per_rev, info.max_torque_uNm,
+                                     info.rate_hz, info.watchdog_ms, info.capabilities, in_bytes, out_bytes,
                                      degrees_of_freedom, reserved, info.uid);
-    const bool fits = in_bytes == in_size && out_bytes == out_size && degrees_of_freedom == 1 &&
-                      reserved == 0 && (info.capabilities & ~(has_transducer | measures_velocity)) == 0;
-    const bool possible = fits && info.counts_per_rev > 0 && info.max_torque_uNm > 0 && info.rate_hz > 0 &&
-                          info.watchdog_ms > 0;
-    return possible ? Decoded::Ok : Decoded::WrongField;
+    const auto wrong = [&](const char* field, Number value, const std::string& right) {
+        return answer + ": " + field + " is " + std::to_string(value) + ", must be " + right;
+    };
+    for (const auto& [field, value, right] : std::initializer_list<std::tuple<const char*, Number, Number>>{
+             {"version", version, protocol_version},
+             {"in_size", in_bytes, in_size},
+             {"out_size", out_bytes, out_size},
+             {"dof", degrees_of_freedom, 1},
+             {"the reserved byte", reserved, 0},
+             {"capabilities beyond bits 0 and 1", info.capabilities & ~(has_transducer | measures_velocity),
+              0}}) {
+        if (value != right) {
+            return wrong(field, value, std::to_string(right));
+        }
+    }
+    for (const auto& [field, value] :
+         std::initializer_list<std::pair<const char*, Number>>{{"counts_per_rev", info.counts_per_rev},
+                                                               {"max_torque_uNm", info.max_torque_uNm},
+                                                               {"rate_hz", info.rate_hz},
+                                                               {"watchdog_ms", info.watchdog_ms}}) {
+        if (value <= 0) {
+            return wrong(field, value, "> 0");
+        }
+    }
+    return "";
 }
 
 [[nodiscard]] inline std::array<std::uint8_t, out_size> encode(const OutPacket& packet) noexcept {

@@ -8,9 +8,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/reading_guard.hpp"
+#include "palpate/rendering/scale.hpp"
 
 namespace palpate {
 
@@ -32,6 +34,21 @@ struct GuardSettings {
     /// of the device's damping and friction, and on what the object stores beyond its domain.
     bool certified = false;
 };
+
+/// Returns the default guards for a device, at a model's scale.
+[[nodiscard]] inline GuardSettings guards_for(const ModelScale& scale, const DeviceProfile& device) noexcept {
+    GuardSettings guards;
+    guards.force_limit = device.force_limit;
+    guards.largest_speed *= scale.length;
+    // A slower motion can stay within one encoder step.
+    guards.frozen_speed =
+        std::max(guards.frozen_speed * scale.length, 3.0 * device.encoder_step / device.period_s);
+    guards.buzz_force *= scale.length * scale.stiffness();
+    guards.device_damping = device.viscous_damping;
+    guards.device_friction = device.coulomb_friction;
+    guards.encoder_step = device.encoder_step;
+    return guards;
+}
 
 inline constexpr double longest_guard_s =
     3600.0;  ///< of ramp_s and frozen_s; whole samples must fit an integer

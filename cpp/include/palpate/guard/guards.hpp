@@ -44,7 +44,7 @@ struct Guards {
 [[nodiscard]] inline double most_energy(const ForceModel& given, const Scheme& scheme, double force_limit) {
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const double held = energy_range(model, force_limit).span();
-    if (scheme.structure == StructureKind::Direct) {
+    if (!has_coupling(scheme.structure)) {
         return held;
     }
     const HysteresisNetwork* both = model.hysteresis();
@@ -67,7 +67,7 @@ struct Guards {
         stored.upper = domain.upper[0];
     }
     stored.force_limit = force_limit;
-    if (scheme.structure != StructureKind::Direct) {
+    if (has_coupling(scheme.structure)) {
         stored.stiffness = scheme.coupling.stiffness;
     }
     stored.mass = has_mass(scheme.structure) ? scheme.inertia.mass : 0.0;

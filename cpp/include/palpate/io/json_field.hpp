@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include "palpate/fields/field_table.hpp"
+#include "palpate/io/json_text.hpp"
 
 namespace palpate::detail {
 
@@ -18,12 +22,12 @@ namespace palpate::detail {
 /// std::invalid_argument with path, value and what would be right.
 class JsonField {
   public:
-    using Json = nlohmann::json;
-
     JsonField(const Json& value, std::string path) : value_{value}, path_{std::move(path)} {}
 
     [[noreturn]] void refuse(const std::string& right) const {
-        std::string shown = value_.dump();
+        std::string shown = value_.is_number_float() && !std::isfinite(value_.get<double>())
+                                ? readable(value_.get<double>())  // no JSON
+                                : value_.dump();
         shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
         throw std::invalid_argument((path_.empty() ? "the file holds " : path_ + " is ") + shown +
                                     ": must be " + right);
@@ -53,14 +57,10 @@ class JsonField {
         return {*found, path};
     }
     /// An object with no key but these.
-    const JsonField& only(std::initializer_list<std::string_view> keys) const {
+    const JsonField& only(const std::vector<std::string_view>& keys) const {
         require(value_.is_object(), "an object");
         for (const auto& item : value_.items()) {
-            bool known = false;
-            for (const std::string_view key : keys) {
-                known = known || item.key() == key;
-            }
-            if (!known) {
+            if (std::find(keys.begin(), keys.end(), item.key()) == keys.end()) {
                 const std::string key = Json(item.key()).dump();  // without control characters
                 throw std::invalid_argument((path_.empty() ? "" : path_ + ".") +
                                             key.substr(1, key.size() - 2) +
@@ -78,18 +78,15 @@ class JsonField {
         return fields;
     }
 
-    [[nodiscard]] double number() const {
+    [[nodiscard]] double number(Rule rule = Rule::Finite) const {
         require(value_.is_number(), "a number");
-        return value_.get<double>();
+        const auto number = value_.get<double>();
+        require(std::isfinite(number), "a finite number");
+        require(obeys(number, rule), text(rule));
+        return number;
     }
-    [[nodiscard]] double positive() const {
-        require(number() > 0.0, "> 0");
-        return number();
-    }
-    [[nodiscard]] double not_negative() const {
-        require(number() >= 0.0, ">= 0");
-        return number();
-    }
+    [[nodiscard]] double positive() const { return number(Rule::Positive); }
+    [[nodiscard]] double not_negative() const { return number(Rule::NotNegative); }
     [[nodiscard]] std::uint64_t count(std::uint64_t least) const {
         require(value_.is_number_integer(), "a whole number");
         require(number() >= static_cast<double>(least), ">= " + std::to_string(least));
@@ -103,15 +100,22 @@ class JsonField {
         require(value_.is_string(), "text");
         return value_.get<std::string>();
     }
-    [[nodiscard]] std::string one_of(std::initializer_list<const char*> choices) const {
+    /// The index of a text among `choices`.
+    [[nodiscard]] std::size_t one_of(std::span<const std::string_view> choices) const {
         std::string right;
-        for (const char* choice : choices) {
-            if (value_.is_string() && value_.get<std::string>() == choice) {
-                return choice;
+        for (std::size_t k = 0; k < choices.size(); ++k) {
+            if (value_.is_string() && value_.get<std::string>() == choices[k]) {
+                return k;
             }
-            right += (right.empty() ? "'" : ", '") + std::string(choice) + "'";
+            right += (k == 0                    ? "'"
+                      : k + 1 == choices.size() ? " or '"
+                                                : ", '") +
+                     std::string(choices[k]) + "'";
         }
-        refuse(choices.size() > 1 ? "one of " + right : right);
+        refuse(right);
+    }
+    [[nodiscard]] std::string one_of(const std::vector<std::string_view>& choices) const {
+        return std::string(choices[one_of(std::span{choices})]);
     }
     [[nodiscard]] std::vector<double> numbers() const {
         std::vector<double> values;
@@ -122,6 +126,52 @@ class JsonField {
     }
     void require_object() const { require(value_.is_object(), "an object"); }
     [[nodiscard]] const Json& value() const { return value_; }
+
+    /// Free content may hold anything but numbers that are not finite, which no JSON file can hold.
+    void require_finite() const {
+        if (value_.is_object()) {
+            for (const auto& item : value_.items()) {
+                (*this)[item.key().c_str()].require_finite();
+            }
+        } else if (value_.is_array()) {
+            for (const JsonField& item : items()) {
+                item.require_finite();
+            }
+        } else if (value_.is_number()) {
+            (void)number();
+        }
+    }
+
+    /// A value of the type of a field, with its rule. A struct is an object of exactly its stored fields.
+    template <class T>
+    [[nodiscard]] T as(Rule rule = Rule::Any, std::span<const std::string_view> choices = {}) const {
+        if constexpr (HasFields<T>) {
+            std::vector<std::string_view> names;
+            for_each_field<T>([&](const auto& field) {
+                if (field.stored) {
+                    names.emplace_back(field.name);
+                }
+            });
+            (void)only(names);
+            T read;
+            for_each_field<T>([&](const auto& field) {
+                if (field.stored) {
+                    auto& value = field.of(read);
+                    value = (*this)[field.name].template as<std::remove_cvref_t<decltype(value)>>(
+                        field.rule, field.words);
+                }
+            });
+            return read;
+        } else if constexpr (HasWords<T>) {
+            return static_cast<T>(one_of(words_of<T>));
+        } else if constexpr (std::is_same_v<T, bool>) {
+            return flag();
+        } else if constexpr (std::is_arithmetic_v<T>) {
+            return static_cast<T>(number(rule));
+        } else {
+            return choices.empty() ? words() : std::string(choices[one_of(choices)]);
+        }
+    }
 
   private:
     const Json& value_;

@@ -16,13 +16,14 @@
 
 namespace palpate {
 
+using Json = nlohmann::ordered_json;
+
 inline constexpr int deepest_json = 100;  ///< lists and objects inside each other
 
 /// Parses JSON as RFC 8259 asks for, and refuses what readers of other languages read differently: a byte order mark,
 /// NUL bytes, repeated keys, unpaired surrogates, numbers that no double holds, more than `deepest_json` levels.
 /// Throws std::invalid_argument with one sentence.
-[[nodiscard]] inline nlohmann::json parse_json(std::string_view text) {
-    using Json = nlohmann::json;
+[[nodiscard]] inline Json parse_json(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) {
         throw std::invalid_argument("the file begins with a byte order mark: save it as UTF-8 without one");
     }
@@ -54,13 +55,14 @@ inline constexpr int deepest_json = 100;  ///< lists and objects inside each oth
         const std::string reason = error.what();
         const std::size_t begin = reason.find("] ") + 2;
         // What follows quotes raw bytes of the file, which must not reach a terminal.
-        throw std::invalid_argument("this is not JSON: " +
-                                    reason.substr(begin, reason.find("; last read") - begin));
+        throw std::invalid_argument(
+            "this is not JSON: " + reason.substr(begin, reason.find("; last read") - begin) +
+            "; a model is a .json file that palpate identify writes");
     }
 }
 
 /// Reads a JSON file. Throws std::invalid_argument: one sentence that begins with the file's name.
-[[nodiscard]] inline nlohmann::json read_json(const std::string& path) {
+[[nodiscard]] inline Json read_json(const std::string& path) {
     std::error_code none;
     std::ifstream stream;
     if (std::filesystem::is_regular_file(path, none)) {  // a pipe without a writer would block

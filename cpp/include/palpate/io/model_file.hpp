@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "palpate/io/json_field.hpp"
 #include "palpate/io/json_text.hpp"
 #include "palpate/io/plan_file.hpp"
@@ -89,8 +87,9 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     domain["lower"].require_length(d, "one for each dimension");
     domain["upper"].require_length(d, "one for each dimension");
     for (std::size_t k = 0; k < d; ++k) {
-        domain["lower"].items()[k].require(read.lower[k] < read.upper[k],
-                                           "below domain.upper[" + std::to_string(k) + "]");
+        domain["lower"].items()[k].require(
+            read.lower[k] < read.upper[k],
+            "below domain.upper[" + std::to_string(k) + "] = " + readable(read.upper[k]));
     }
     if (const JsonField period = beyond["period"]; !period.is_null()) {
         const double travel = read.upper[0] - read.lower[0];
@@ -162,7 +161,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
 }  // namespace detail
 
 /// The model in the text of a model file. Throws std::invalid_argument: field path, value, what would be right.
-[[nodiscard]] inline ModelFile parse_model(const nlohmann::json& content) {
+[[nodiscard]] inline ModelFile parse_model(const Json& content) {
     const detail::JsonField file{content, ""};
     file.require_object();
     // A file of another version may differ in every other field.
@@ -205,13 +204,14 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         detail::read_certificate(file["certificate"], read.plan, read.planned(), read.position_unit);
     if (content.contains("notes")) {
         file["notes"].require_object();
+        file["notes"].require_finite();
     }
     return read;
 }
 
 /// Reads a model file. Throws std::invalid_argument: one sentence that begins with the file's name.
 [[nodiscard]] inline ModelFile load_model_file(const std::string& path) {
-    const nlohmann::json content = read_json(path);
+    const Json content = read_json(path);
     try {
         return parse_model(content);
     } catch (const std::invalid_argument& error) {

@@ -19,18 +19,6 @@
 // The two parts of a model file that say how it is rendered: the plan, and what is proved of it.
 namespace palpate::detail {
 
-template <class Enum, std::size_t n>
-[[nodiscard]] Enum read_name(const JsonField& field, const std::array<std::string_view, n>& names) {
-    std::string right;
-    for (std::size_t k = 0; k < n; ++k) {
-        if (field.value().is_string() && field.value().get<std::string>() == names[k]) {
-            return static_cast<Enum>(k);
-        }
-        right += (k == 0 ? "one of '" : ", '") + std::string(names[k]) + "'";
-    }
-    field.refuse(right);
-}
-
 /// Given where the structure has a use for it, null where it has none.
 inline void require_given(const JsonField& field, bool used, const char* structure_has) {
     field.require(field.is_null() != used, (used ? "given: " : "null: ") + std::string("the structure has ") +
@@ -44,20 +32,18 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     plan.only({"structure", "solver", "network", "coupling", "inertia", "compensated", "play_radius",
                "predict", "refused", "accepted_force_error"});
     Scheme scheme;
-    scheme.structure = read_name<StructureKind>(plan["structure"], structure_names);
+    scheme.structure = plan["structure"].as<StructureKind>();
     if (const JsonField solver = plan["solver"]; !solver.is_null()) {
         (void)solver.words();
     }
     const JsonField coupling = plan["coupling"];
     if (!coupling.is_null()) {
-        coupling.only({"stiffness", "damping"});
-        scheme.coupling = {coupling["stiffness"].positive(), coupling["damping"].not_negative()};
+        scheme.coupling = coupling.as<VirtualCoupling>();
     }
-    require_given(coupling, scheme.structure != StructureKind::Direct, "coupling");
+    require_given(coupling, has_coupling(scheme.structure), "coupling");
     const JsonField inertia = plan["inertia"];
     if (!inertia.is_null()) {
-        inertia.only({"mass", "damping"});
-        scheme.inertia = {inertia["mass"].positive(), inertia["damping"].not_negative()};
+        scheme.inertia = inertia.as<Inertia>();
     }
     require_given(inertia, has_mass(scheme.structure), "inertia");
     scheme.compensated = plan["compensated"].flag();
@@ -76,50 +62,6 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     return scheme;
 }
 
-[[nodiscard]] inline DeviceProfile read_device(const JsonField& device) {
-    device.only({"id", "position_unit", "period_s", "jitter_s", "inertia", "viscous_damping",
-                 "coulomb_friction", "encoder_step", "force_step", "delay_s", "force_limit"});
-    DeviceProfile profile;
-    profile.id = device["id"].words();
-    profile.position_unit = device["position_unit"].one_of({"rad", "m"});
-    profile.period_s = device["period_s"].positive();
-    profile.jitter_s = device["jitter_s"].not_negative();
-    profile.inertia = device["inertia"].positive();
-    profile.viscous_damping = device["viscous_damping"].not_negative();
-    profile.coulomb_friction = device["coulomb_friction"].not_negative();
-    profile.encoder_step = device["encoder_step"].not_negative();
-    profile.force_step = device["force_step"].not_negative();
-    profile.delay_s = device["delay_s"].not_negative();
-    device["delay_s"].require(profile.delay_s <= longest_delay_s(profile.period_s),
-                              "at most " + readable(longest_delay_s(profile.period_s)));
-    profile.force_limit = device["force_limit"].positive();
-    return profile;
-}
-
-[[nodiscard]] inline ForceBounds read_bounds(const JsonField& bounds, bool hysteresis) {
-    bounds.only({"slope_min", "slope_max", "steepest", "sliding", "loss_min", "loss_max", "loss_per_play",
-                 "mean_force", "drag"});
-    ForceBounds read;
-    read.hysteresis = hysteresis;
-    read.slope = {bounds["slope_min"].number(), bounds["slope_max"].number()};
-    read.steepest = bounds["steepest"].number();
-    read.sliding = bounds["sliding"].number();
-    read.loss = {bounds["loss_min"].number(), bounds["loss_max"].number()};
-    read.loss_per_play = bounds["loss_per_play"].number();
-    read.mean_force = bounds["mean_force"].number();
-    read.drag = bounds.value().contains("drag") ? bounds["drag"].not_negative() : 0.0;
-    return read;
-}
-
-[[nodiscard]] inline Inequality read_inequality(const JsonField& line) {
-    line.only({"id", "left", "right"});
-    Inequality read;
-    read.id = line["id"].words();
-    read.left = line["left"].number();
-    read.right = line["right"].number();
-    return read;
-}
-
 /// The certificate of a plan, recomputed from the rendered model and the device: one that says anything else is
 /// refused.
 [[nodiscard]] inline std::optional<Certificate> read_certificate(const JsonField& file,
@@ -136,17 +78,19 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     read.scheme = *plan;
     read.fingerprint = file["fingerprint"].words();
     read.model = file["model"].words();
-    file["structure"].require(read_name<StructureKind>(file["structure"], structure_names) == plan->structure,
-                              "that of the plan");
-    read.device = read_device(file["device"]);
-    file["device"]["position_unit"].require(
-        position_unit.empty() || position_unit == read.device.position_unit,
-        "the unit of the model's position");
-    read.bounds = read_bounds(file["bounds"], model.hysteresis() != nullptr);
+    file["structure"].require(file["structure"].as<StructureKind>() == plan->structure, "that of the plan");
+    const JsonField device = file["device"];
+    read.device = device.as<DeviceProfile>();
+    const double longest = longest_delay_s(read.device.period_s);
+    device["delay_s"].require(read.device.delay_s <= longest, "at most " + readable(longest));
+    device["position_unit"].require(position_unit.empty() || position_unit == read.device.position_unit,
+                                    "the unit of the model's position");
+    read.bounds = file["bounds"].as<ForceBounds>();
+    read.bounds.hysteresis = model.hysteresis() != nullptr;
     for (const JsonField& line : file["inequalities"].items()) {
-        read.inequalities.push_back(read_inequality(line));
+        read.inequalities.push_back(line.as<Inequality>());
     }
-    read.verdict = read_name<Verdict>(file["verdict"], verdict_names);
+    read.verdict = file["verdict"].as<Verdict>();
     read.longest_period_s = file["longest_period_s"].not_negative();
     return checked(read, model);
 }

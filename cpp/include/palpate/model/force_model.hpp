@@ -128,7 +128,8 @@ class ForceModel {
                                              const Domain& domain, std::optional<double> play_radius) {
         detail::require(domain.lower.size() == 1 && domain.upper.size() == 1,
                         "a hysteresis network has one input");
-        const double radius = play_radius.value_or(0.01 * std::abs(domain.upper[0] - domain.lower[0]));
+        const double radius =
+            play_radius.value_or(usual_play_radius(std::abs(domain.upper[0] - domain.lower[0])));
         return {network, loss, domain, radius};
     }
 

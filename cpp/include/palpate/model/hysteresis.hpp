@@ -28,6 +28,15 @@ struct LossParameters {
     return std::min(position + radius, std::max(position - radius, previous));
 }
 
+/// Play radius of a model that does not give its own: 1 % of the travel, and wide enough that the hand switches it and
+/// not the noise of the encoder.
+inline constexpr double play_share_of_travel = 0.01;
+inline constexpr double fewest_encoder_steps_in_play = 4.0;
+
+[[nodiscard]] inline double usual_play_radius(double travel, double encoder_step = 0.0) noexcept {
+    return std::max(fewest_encoder_steps_in_play * encoder_step, play_share_of_travel * travel);
+}
+
 /// A force that differs between the way in and the way out,
 ///
 ///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1].

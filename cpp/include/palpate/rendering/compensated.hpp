@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "palpate/model/environment.hpp"
-#include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 #include "palpate/solver/resolvent.hpp"

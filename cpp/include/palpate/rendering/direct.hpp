@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "palpate/model/environment.hpp"
+#include "palpate/model/velocity_network.hpp"
 #include "palpate/rendering/structure.hpp"
 
 namespace palpate {
@@ -28,6 +32,121 @@ class Direct {
   private:
     E environment_;
     typename E::State state_;
+};
+
+/// F = f(x, v), v = (x_k - x_{k-1}) / T: direct rendering of a force of position and velocity. The difference is
+/// that of two samples and no more, because the proof of its certificate is about that one.
+class DirectVelocity {
+  public:
+    DirectVelocity(VelocityNetwork force, double period_s) : force_{std::move(force)}, period_s_{period_s} {}
+
+    void reset(double position) noexcept { last_ = position; }
+
+    [[nodiscard]] Rendered step(double position) noexcept {
+        const double velocity = (position - last_) / period_s_;
+        const double force = force_.force(position, velocity);
+        if (!std::isfinite(position) || !std::isfinite(force)) {
+            return detail::refused(position);
+        }
+        last_ = position;
+        return {force, position, 1, Status::Ok, force_.extrapolated(position, velocity)};
+    }
+
+  private:
+    VelocityNetwork force_;
+    double period_s_;
+    double last_ = 0.0;
+};
+
+static_assert(Structure<DirectVelocity>);
+
+/// Largest number of samples that a prediction uses.
+inline constexpr int most_prediction_taps = 16;
+
+/// Weights w_1 to w_m of the steps d_{k-j} = x_{k-j+1} - x_{k-j} in the advance of m taps:
+/// w_j = (m - j + 1) / (m (m + 1)), with the sum 1/2.
+[[nodiscard]] constexpr double prediction_weight(int taps, int j) noexcept {
+    return static_cast<double>(taps - j + 1) / (taps * (taps + 1.0));
+}
+
+/// Predicts the position half a sample ahead, where a force that is held for a sample belongs on average:
+///
+///     x_hat = x_k + (x_k - mean(x_{k-1}, ..., x_{k-m})) / (m + 1) = x_k + sum of w_j d_{k-j}.
+///
+/// At constant velocity it is exact for every m. More taps need less damping and react later (docs/certificate.md).
+class HalfSamplePrediction {
+  public:
+    /// `taps`: m, from 1 to `most_prediction_taps`.
+    explicit HalfSamplePrediction(int taps) noexcept
+        : taps_{static_cast<std::size_t>(taps)}, share_{1.0 / (taps * (taps + 1.0))} {}
+
+    /// The object rests at a position: so does the past.
+    void reset(double position) noexcept { past_.fill(position); }
+
+    /// x_hat, from a position and the m before it.
+    [[nodiscard]] double ahead(double position) const noexcept {
+        double moved = 0.0;
+        for (std::size_t j = 0; j < taps_; ++j) {
+            moved += position - past_[j];
+        }
+        return position + share_ * moved;
+    }
+
+    /// Takes a position into the past.
+    void advance(double position) noexcept {
+        past_[next_] = position;
+        next_ = next_ + 1 == taps_ ? 0 : next_ + 1;
+    }
+
+  private:
+    std::size_t taps_;
+    double share_;
+    std::size_t next_ = 0;
+    std::array<double, most_prediction_taps> past_{};
+};
+
+/// F = f(x_hat), x_hat the position predicted half a sample ahead. The memory of the environment, the play of a
+/// hysteresis, follows the measured position: the force is that of a trial move from there to x_hat.
+template <Environment E>
+class PredictedDirect {
+  public:
+    PredictedDirect(E environment, int taps) : environment_{std::move(environment)}, prediction_{taps} {
+        reset(0.0);
+    }
+
+    void reset(double position) noexcept {
+        state_ = environment_.start(position);
+        prediction_.reset(position);
+    }
+
+    [[nodiscard]] Rendered step(double position) noexcept {
+        const double ahead = prediction_.ahead(position);
+        typename E::State state = state_;
+        environment_.advance(position, state);
+        const EnvironmentSample sample = environment_.at(ahead, state);
+        if (!std::isfinite(ahead) || !std::isfinite(sample.force)) {
+            return detail::refused(position);
+        }
+        state_ = state;
+        prediction_.advance(position);
+        return {sample.force, ahead, 1, Status::Ok, sample.extrapolated};
+    }
+
+  private:
+    E environment_;
+    typename E::State state_;
+    HalfSamplePrediction prediction_;
+};
+
+struct DirectStructure {
+    static constexpr StructureTraits traits{.name = "direct", .predicts = true};
+
+    template <Environment E, class SolverOf, class Visit>
+    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,
+                      Visit& visit) {
+        return numbers.predict > 0 ? visit(PredictedDirect{std::move(environment), numbers.predict})
+                                   : visit(Direct{std::move(environment)});
+    }
 };
 
 }  // namespace palpate

@@ -7,7 +7,6 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
@@ -52,8 +51,7 @@ class EnergyConsistent {
     /// p of every step behind the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
-        return 2.0 * inertia.mass / (period * period) + inertia.damping / period + coupling.stiffness +
-               coupling.damping / period;
+        return inertia.midpoint_slope(period) + coupling.stiffness + coupling.damping / period;
     }
 
     void reset(double position) noexcept {
@@ -229,6 +227,21 @@ class EnergyConsistent {
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}
     double velocity_ = 0.0;  ///< v_{k-1}
+};
+
+struct EnergyConsistentStructure {
+    static constexpr StructureTraits traits{
+        .name = "energy-consistent", .coupling = true, .mass = true, .solved = true, .keeps_loss = true};
+
+    template <Environment E, class SolverOf, class Visit>
+    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
+                      Visit& visit) {
+        const double p =
+            EnergyConsistent<E>::load_line_slope(numbers.inertia, numbers.coupling, numbers.period_s);
+        return visit(EnergyConsistent{std::move(environment), numbers.inertia, numbers.coupling,
+                                      numbers.period_s, 1e-2 * numbers.finest_width, true,
+                                      numbers.force_limit, solver_of(p)});
+    }
 };
 
 }  // namespace palpate

@@ -5,7 +5,6 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 
 namespace palpate {
@@ -19,6 +18,14 @@ namespace palpate {
                                                     double period) noexcept {
     const double damping = inertia.damping + coupling.damping;
     return (4.0 * inertia.mass - 2.0 * damping * period) / (period * period) - coupling.stiffness;
+}
+
+/// Object with B_o = ratio m / T for which the slope limit is `limit`: the inverse of `explicit_slope_limit`.
+[[nodiscard]] constexpr Inertia explicit_object(double limit, const VirtualCoupling& coupling, double ratio,
+                                                double period) noexcept {
+    const double mass = ((limit + coupling.stiffness) * period * period + 2.0 * coupling.damping * period) /
+                        (4.0 - 2.0 * ratio);
+    return {mass, ratio * mass / period};
 }
 
 /// m v' = F_c - f(x) - B_o v with the paper's delayed integrator (figure 14): everything on the right is one
@@ -83,6 +90,21 @@ class Explicit {
     double position_ = 0.0;  ///< y_{k-1}
     double velocity_ = 0.0;  ///< v_{k-1}
     double force_ = 0.0;     ///< F_{k-1}
+};
+
+struct ExplicitStructure {
+    static constexpr StructureTraits traits{.name = "explicit", .coupling = true, .mass = true};
+
+    /// Slopes of the model from this one on are sure to diverge.
+    [[nodiscard]] static double slope_limit(const StructureNumbers& numbers) noexcept {
+        return explicit_slope_limit(numbers.inertia, numbers.coupling, numbers.period_s);
+    }
+
+    template <Environment E, class SolverOf, class Visit>
+    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,
+                      Visit& visit) {
+        return visit(Explicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s});
+    }
 };
 
 }  // namespace palpate

@@ -7,7 +7,6 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
-#include "palpate/rendering/inertia.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
@@ -52,8 +51,7 @@ class Implicit {
     /// p of every step behind the coupling; with a coupling of zeros that of the object alone.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
-        return coupling.stiffness + coupling.damping / period +
-               (inertia.mass / (period * period) + inertia.damping / period);
+        return coupling.load_line_slope(period) + inertia.load_line_slope(period);
     }
 
     [[nodiscard]] const Solver& solver() const noexcept { return coupled_; }
@@ -132,6 +130,20 @@ class Implicit {
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}
     double before_ = 0.0;    ///< y_{k-2}
+};
+
+struct ImplicitStructure {
+    static constexpr StructureTraits traits{
+        .name = "implicit", .coupling = true, .mass = true, .solved = true};
+
+    template <Environment E, class SolverOf, class Visit>
+    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
+                      Visit& visit) {
+        const double p = Implicit<E>::load_line_slope(numbers.inertia, numbers.coupling, numbers.period_s);
+        const double alone = Implicit<E>::load_line_slope(numbers.inertia, {0.0, 0.0}, numbers.period_s);
+        return visit(Implicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s,
+                              solver_of(p), numbers.force_limit, solver_of(alone)});
+    }
 };
 
 }  // namespace palpate

@@ -6,7 +6,9 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/model/limited_environment.hpp"
 #include "palpate/rendering/structure.hpp"
+#include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/solver/newton.hpp"
 
 namespace palpate {
@@ -30,7 +32,7 @@ class Massless {
 
     /// p of every step.
     [[nodiscard]] static double load_line_slope(VirtualCoupling coupling, double period) noexcept {
-        return coupling.stiffness + coupling.damping / period;
+        return coupling.load_line_slope(period);
     }
 
     [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
@@ -45,7 +47,7 @@ class Massless {
     [[nodiscard]] Rendered step(double device) noexcept {
         const double damping = coupling_.damping / period_;
         const LoadLine line{
-            coupling_.stiffness + damping,
+            coupling_.load_line_slope(period_),
             (coupling_.stiffness * device + damping * (device - device_)) + damping * position_};
         const Solution solution = solver_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
@@ -77,6 +79,21 @@ class Massless {
     typename Solver::Memory memory_;
     double device_ = 0.0;    ///< x_{k-1}
     double position_ = 0.0;  ///< y_{k-1}
+};
+
+struct MasslessStructure {
+    static constexpr StructureTraits traits{.name = "massless", .coupling = true, .solved = true};
+
+    template <Environment E, class SolverOf, class Visit>
+    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
+                      Visit& visit) {
+        const double p = numbers.coupling.load_line_slope(numbers.period_s);
+        if (std::isfinite(numbers.force_limit)) {
+            return visit(Massless{LimitedEnvironment{std::move(environment), numbers.force_limit},
+                                  numbers.coupling, numbers.period_s, LimitedResolvent{solver_of(p)}});
+        }
+        return visit(Massless{std::move(environment), numbers.coupling, numbers.period_s, solver_of(p)});
+    }
 };
 
 }  // namespace palpate

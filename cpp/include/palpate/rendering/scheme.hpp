@@ -1,60 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <cstdint>
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/model/limited_environment.hpp"
 #include "palpate/rendering/compensated.hpp"
-#include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/direct_velocity.hpp"
-#include "palpate/rendering/energy_consistent.hpp"
-#include "palpate/rendering/explicit.hpp"
-#include "palpate/rendering/implicit.hpp"
-#include "palpate/rendering/inertia.hpp"
-#include "palpate/rendering/massless.hpp"
-#include "palpate/rendering/predicted.hpp"
-#include "palpate/solver/limited_resolvent.hpp"
+#include "palpate/rendering/structures.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 #include "palpate/solver/resolvent.hpp"
 #include "palpate/solver/sliding_resolvent.hpp"
 
 namespace palpate {
-
-enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
-
-inline constexpr std::array<std::string_view, 5> structure_names{"direct", "massless", "implicit", "explicit",
-                                                                 "energy-consistent"};
-
-[[nodiscard]] constexpr std::string_view name_of(StructureKind structure) noexcept {
-    return structure_names[static_cast<std::size_t>(structure)];
-}
-
-/// Whether an object has mass in this structure.
-[[nodiscard]] constexpr bool has_mass(StructureKind structure) noexcept {
-    return structure != StructureKind::Direct && structure != StructureKind::Massless;
-}
-
-[[nodiscard]] inline StructureKind structure_named(std::string_view name) {
-    for (std::size_t k = 0; k < structure_names.size(); ++k) {
-        if (structure_names[k] == name) {
-            return static_cast<StructureKind>(k);
-        }
-    }
-    throw std::invalid_argument("structure is '" + std::string(name) +
-                                "', must be direct, massless, implicit, explicit or energy-consistent");
-}
 
 /// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are
 /// ignored.
@@ -62,52 +28,75 @@ struct Scheme {
     StructureKind structure = StructureKind::Massless;
     VirtualCoupling coupling;
     Inertia inertia;
-    bool compensated = false;  ///< take the coupling's spring out of the model beforehand
-    double play_radius = 0.0;  ///< r of a hysteresis model [m or rad]; 0 = the model's own
-    int predict = 0;           ///< m: samples used to predict the position half a sample ahead; 0 = none
+    bool compensated = false;
+    double play_radius = 0.0;
+    int predict = 0;
 };
+
+template <>
+inline constexpr auto fields_of<Scheme> = std::tuple{
+    Field<&Scheme::structure>{"structure", "How the model is connected to the device."},
+    within<&Scheme::coupling>(std::get<0>(fields_of<VirtualCoupling>), "coupling_stiffness"),
+    within<&Scheme::coupling>(std::get<1>(fields_of<VirtualCoupling>), "coupling_damping"),
+    within<&Scheme::inertia>(std::get<0>(fields_of<Inertia>), "mass"),
+    within<&Scheme::inertia>(std::get<1>(fields_of<Inertia>), "damping"),
+    Field<&Scheme::compensated>{"compensated", "The coupling's spring is taken out of the model beforehand."},
+    Field<&Scheme::play_radius>{"play_radius", "r of a hysteresis model [m or rad]; 0 = the model's own.",
+                                Rule::NotNegative},
+    Field<&Scheme::predict>{"predict",
+                            "m: samples used to predict the position half a sample ahead, 0 to 16; 0 = none.",
+                            Rule::NotNegative}};
+
+/// The same scheme with its standard numbers where the structure has no use for them.
+[[nodiscard]] inline Scheme used_part(Scheme scheme) noexcept {
+    if (!has_coupling(scheme.structure)) {
+        scheme.coupling = {0.0, 0.0};
+    }
+    if (!has_mass(scheme.structure)) {
+        scheme.inertia = {0.0, 0.0};
+    }
+    return scheme;
+}
+
+/// Steepest slope of a model from which a coupling can be taken out [share of its stiffness].
+inline constexpr double compensated_share = 0.9;
 
 /// Throws std::invalid_argument: the field, its value, what would be right.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
-    const auto require = [](bool holds, const char* field, double value, const char* right) {
-        detail::require(holds, std::string(field) + " is " + readable(value) + ", must be " + right);
-    };
-    const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
-    const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
+    const std::string structure{name_of(scheme.structure)};
+    const StructureTraits& traits = traits_of(scheme.structure);
     require_renderable(model);
-    detail::require(model.velocity() == nullptr || scheme.structure == StructureKind::Direct,
-                    "structure is " + std::string(name_of(scheme.structure)) +
+    detail::require(model.velocity() == nullptr || !traits.coupling,
+                    "structure is " + structure +
                         ", must be direct: of a force of position and velocity behind a coupling no bound is "
                         "known");
-    if (scheme.structure != StructureKind::Direct) {
-        require(positive(scheme.coupling.stiffness), "coupling_stiffness", scheme.coupling.stiffness, "> 0");
-        require(not_negative(scheme.coupling.damping), "coupling_damping", scheme.coupling.damping, ">= 0");
+    if (traits.coupling) {
+        check_fields(scheme.coupling, "coupling_");
     }
-    if (has_mass(scheme.structure)) {
-        require(positive(scheme.inertia.mass), "mass", scheme.inertia.mass, "> 0");
-        require(not_negative(scheme.inertia.damping), "damping", scheme.inertia.damping, ">= 0");
+    if (traits.mass) {
+        check_fields(scheme.inertia);
     }
-    require(scheme.predict >= 0 && scheme.predict <= most_prediction_taps, "predict", scheme.predict,
-            "0 to 16");
-    detail::require(scheme.predict == 0 || scheme.structure == StructureKind::Direct,
-                    "predict is " + std::to_string(scheme.predict) + ", must be 0 for the structure " +
-                        std::string(name_of(scheme.structure)));
-    detail::require(
-        scheme.predict == 0 || model.velocity() == nullptr,
-        "predict is " + std::to_string(scheme.predict) + ", must be 0 for a force of position and velocity");
-    require(not_negative(scheme.play_radius), "play_radius", scheme.play_radius, ">= 0");
+    const std::string predict = "predict is " + std::to_string(scheme.predict);
+    detail::require(scheme.predict >= 0 && scheme.predict <= most_prediction_taps,
+                    predict + ", must be 0 to 16");
+    detail::require(scheme.predict == 0 || traits.predicts,
+                    predict + ", must be 0 for the structure " + structure);
+    detail::require(scheme.predict == 0 || model.velocity() == nullptr,
+                    predict + ", must be 0 for a force of position and velocity");
+    detail::require(obeys(scheme.play_radius, Rule::NotNegative),
+                    "play_radius is " + readable(scheme.play_radius) + ", must be >= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
                     "play_radius is 0, but the model leaves it to the rendering: must be > 0");
     if (scheme.compensated) {
-        detail::require(scheme.structure != StructureKind::Direct,
-                        "compensated is set for the direct structure, which has no coupling to compensate");
+        detail::require(traits.coupling, "compensated is set for the " + structure +
+                                             " structure, which has no coupling to compensate");
         detail::require(
             !model.hysteresis(),
             "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
         const double steepest = std::max(model.slope_bounds().upper, 0.0);
-        detail::require(steepest <= 0.9 * scheme.coupling.stiffness,
+        detail::require(steepest <= compensated_share * scheme.coupling.stiffness,
                         "coupling_stiffness is " + readable(scheme.coupling.stiffness) +
-                            ", must be at least " + readable(steepest / 0.9) +
+                            ", must be at least " + readable(steepest / compensated_share) +
                             " to compensate a model whose steepest slope is " + readable(steepest));
     }
 }
@@ -125,15 +114,17 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
 /// The same, and refuses what is sure to diverge at this period.
 inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
     validate(scheme, model);
-    if (scheme.structure == StructureKind::Explicit) {
-        const double steepest = steepest_slope(scheme, model);
-        const double limit = explicit_slope_limit(scheme.inertia, scheme.coupling, period_s);
-        detail::require(
-            steepest < limit,
-            "structure is explicit, which diverges: the model's steepest slope is " + readable(steepest) +
-                ", must be below " + readable(limit) +
-                " = (4 m - 2 (B_o + B_c) T) / T^2 - K_c; the implicit structure has no such limit");
-    }
+    with_kind(scheme.structure, [&](auto structure) {
+        if constexpr (requires(StructureNumbers numbers) { structure.slope_limit(numbers); }) {
+            const double steepest = steepest_slope(scheme, model);
+            const double limit =
+                structure.slope_limit({scheme.coupling, scheme.inertia, 0, period_s, 0.0, 0.0});
+            detail::require(steepest < limit, "structure is " + std::string(structure.traits.name) +
+                                                  ", which diverges: the model's steepest slope is " +
+                                                  readable(steepest) + ", must be below " + readable(limit) +
+                                                  "; the implicit structure has no such limit");
+        }
+    });
 }
 
 /// Calls `visit` with the structure that the scheme asks for, built over the model's environment. The one place
@@ -151,37 +142,12 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
         return visit(DirectVelocity{*force, period_s});
     }
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
-    const auto build = [&](auto environment, auto solver_of) {
-        using E = decltype(environment);
-        switch (scheme.structure) {
-            case StructureKind::Direct:
-                return scheme.predict > 0 ? visit(PredictedDirect{std::move(environment), scheme.predict})
-                                          : visit(Direct{std::move(environment)});
-            case StructureKind::Massless: {
-                const double p = Massless<E>::load_line_slope(scheme.coupling, period_s);
-                if (std::isfinite(force_limit)) {
-                    return visit(Massless{LimitedEnvironment{std::move(environment), force_limit},
-                                          scheme.coupling, period_s, LimitedResolvent{solver_of(p)}});
-                }
-                return visit(Massless{std::move(environment), scheme.coupling, period_s, solver_of(p)});
-            }
-            case StructureKind::Implicit: {
-                const double p = Implicit<E>::load_line_slope(scheme.inertia, scheme.coupling, period_s);
-                const double alone = Implicit<E>::load_line_slope(scheme.inertia, {0.0, 0.0}, period_s);
-                return visit(Implicit{std::move(environment), scheme.inertia, scheme.coupling, period_s,
-                                      solver_of(p), force_limit, solver_of(alone)});
-            }
-            case StructureKind::EnergyConsistent: {
-                const double p =
-                    EnergyConsistent<E>::load_line_slope(scheme.inertia, scheme.coupling, period_s);
-                return visit(EnergyConsistent{std::move(environment), scheme.inertia, scheme.coupling,
-                                              period_s, 1e-2 * model.finest_width(), true, force_limit,
-                                              solver_of(p)});
-            }
-            case StructureKind::Explicit:
-                break;
-        }
-        return visit(Explicit{std::move(environment), scheme.inertia, scheme.coupling, period_s});
+    const StructureNumbers numbers{scheme.coupling, scheme.inertia, scheme.predict,
+                                   period_s,        force_limit,    model.finest_width()};
+    const auto build = [&](auto environment, const auto& solver_of) {
+        return with_kind(scheme.structure, [&](auto structure) {
+            return structure.build(std::move(environment), numbers, solver_of, visit);
+        });
     };
     if (const HysteresisNetwork* both = model.hysteresis()) {
         return build(CompiledHysteresis{*both}, [&](double p) { return SlidingResolvent{*both, p}; });
@@ -204,10 +170,10 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
                           [&](const auto& structure) -> std::optional<std::string_view> {
                               if constexpr (requires { structure.solver(); }) {
                                   return structure.solver().tabulated() ? "table" : "newton";
-                              } else if (scheme.structure == StructureKind::EnergyConsistent) {
-                                  return "newton";
                               } else {
-                                  return std::nullopt;
+                                  return traits_of(scheme.structure).solved
+                                             ? std::optional<std::string_view>{"newton"}
+                                             : std::nullopt;
                               }
                           });
 }

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <concepts>
+#include <string_view>
 
+#include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/status.hpp"
 
@@ -24,6 +26,26 @@ template <class S>
 concept Structure = requires(S& structure, double position) {
     { structure.reset(position) } noexcept;
     { structure.step(position) } noexcept -> std::same_as<Rendered>;
+};
+
+/// Properties of a structure that do not depend on the model.
+struct StructureTraits {
+    std::string_view name;
+    bool coupling = false;    ///< the object stands behind a virtual coupling
+    bool mass = false;        ///< the object has mass and damping
+    bool solved = false;      ///< each step solves a load line
+    bool predicts = false;    ///< the force can be taken at a predicted position
+    bool keeps_loss = false;  ///< the step need not lose what the play of a hysteresis loses
+};
+
+/// Everything but the environment that a structure is built from.
+struct StructureNumbers {
+    VirtualCoupling coupling;
+    Inertia inertia;
+    int predict = 0;
+    double period_s = 1e-3;
+    double force_limit = 0.0;   ///< infinite for none
+    double finest_width = 0.0;  ///< of the model's wavelets [m or rad]
 };
 
 namespace detail {

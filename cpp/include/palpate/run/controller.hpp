@@ -11,21 +11,19 @@
 
 namespace palpate {
 
-/// Everything that happened in one tick.
+/// Result of one tick.
 struct Tick {
-    Reading reading;             ///< what the force was computed from
-    Rendered rendered;           ///< what the structure made of it
-    Command command;             ///< what was sent, after the guards
-    Status status = Status::Ok;  ///< the most serious thing that was not Ok on the way
+    Reading reading;             ///< input of the force
+    Rendered rendered;           ///< output of the structure
+    Command command;             ///< sent to the device, after the guards
+    Status status = Status::Ok;  ///< most serious one of the tick
 };
 
 /// One tick of rendering: read, compute, limit, send. No allocation, lock, exception, log or system call but
-/// the device's own. Whatever is wrong with a reading, the force sent is zero.
+/// the device exchange. If a reading is bad, the force sent is zero.
 template <Device D, Structure S>
 class Controller {
   public:
-    static constexpr bool paced_by_device = paces_host<D>;
-
     Controller(D& device, S structure, Guards guards)
         : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
 
@@ -55,12 +53,20 @@ class Controller {
         return tick;
     }
 
-    /// Zero force, and the device is let go. What happens afterwards can take its time.
+    /// Sends zero force and closes the device.
     void stop() noexcept {
         (void)device_.exchange({});
         device_.close();
     }
 
+    /// True if the device's clock paces the loop.
+    [[nodiscard]] bool paced_by_device() const noexcept {
+        if constexpr (requires { device_.sets_pace(); }) {
+            return device_.sets_pace();
+        } else {
+            return paces_host<D>;
+        }
+    }
     [[nodiscard]] S& structure() noexcept { return structure_; }
     [[nodiscard]] const ReadingGuard& reading_guard() const noexcept { return guards_.reading; }
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }

@@ -20,10 +20,10 @@
 
 namespace palpate {
 
-/// When a rendering ticks, and when it ends.
+/// Rate, duration and limits of a loop.
 struct LoopSettings {
     double rate_hz = 1000.0;         ///< 100 to 10 000
-    double duration_s = 10.0;        ///< infinity = until it is asked to stop
+    double duration_s = 10.0;        ///< infinity = until a stop is requested
     double lowest_rate_share = 0.8;  ///< of rate_hz: below it for half a second, the loop stops; 0 = never
     std::uint64_t tolerated = 5;     ///< ticks in a row without a sound sample; one more, and the loop stops
     /// A longer time between two ticks ends the loop: nothing is certified of it [s]
@@ -50,22 +50,22 @@ inline void validate(const LoopSettings& settings) {
             settings.lowest_rate_share, "0 to 1");
 }
 
-/// Why a loop ended.
-enum class Ending : std::uint8_t {
+/// Reason why a loop ended.
+enum class ExitReason : std::uint8_t {
     TimeUp,
-    Asked,
-    Guard,        ///< the samples, or the force made of them, are not to be believed
-    DeviceFault,  ///< the device said so, or stopped answering
+    StopRequested,
+    Guard,        ///< samples or forces were not plausible
+    DeviceFault,  ///< reported by the device, or it stopped answering
     RateTooLow,
-    NotCertified,  ///< a tick came later than the certificate holds for
+    NotCertified,  ///< a tick was later than the certificate allows
 };
 
-/// Whether a program that ran such a loop did what it was asked to.
-[[nodiscard]] constexpr bool is_orderly(Ending ending) noexcept {
-    return ending == Ending::TimeUp || ending == Ending::Asked;
+/// True if the loop ended as planned.
+[[nodiscard]] constexpr bool is_orderly(ExitReason reason) noexcept {
+    return reason == ExitReason::TimeUp || reason == ExitReason::StopRequested;
 }
 
-/// What a loop lets others see while it runs; each number by itself is true, not all of them of one tick.
+/// Progress of a running loop. Each number is valid by itself; they may belong to different ticks.
 struct LoopProgress {
     std::atomic<std::uint64_t> ticks{0};
     std::atomic<std::uint64_t> missed{0};
@@ -76,19 +76,18 @@ struct LoopProgress {
     RateCheck rate;
 };
 
-/// What a loop did.
+/// Result of a loop.
 struct LoopReport {
-    Ending ending = Ending::TimeUp;
+    ExitReason exit_reason = ExitReason::TimeUp;
     Status status = Status::Ok;  ///< of the last tick
     LoopTiming timing;
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double given_in_ramp =
-        0.0;             ///< most energy that the motor had given, net, during the ramp at the start [J]
-    double given = 0.0;  ///< the same since its end [J]
-    double most_stored = 0.0;  ///< upper bound of the energy that the rendering stored above its least [J]
-    std::uint64_t buzzes = 0;  ///< each made the object softer
+    double given_in_ramp = 0.0;  ///< largest net energy given by the motor during the ramp at the start [J]
+    double given = 0.0;          ///< the same after the ramp [J]
+    double most_stored = 0.0;    ///< upper bound of the energy that the rendering stored above its least [J]
+    std::uint64_t buzzes = 0;    ///< limit cycles, each of which softened the object
 };
 
 [[nodiscard]] inline TickRecord record_of(const Tick& tick, const Wake& wake, Nanoseconds first) noexcept {
@@ -111,31 +110,32 @@ struct LoopReport {
 
 namespace detail {
 
-/// Whether this many bad ticks in a row end the loop, and as what.
+/// True if the loop must stop after this many bad ticks in a row; sets `reason`.
 [[nodiscard]] inline bool ends(Status status, std::uint64_t bad_in_a_row, std::uint64_t tolerated,
-                               Ending& ending) noexcept {
+                               ExitReason& reason) noexcept {
     if (!is_final(status) && bad_in_a_row <= tolerated) {
         return false;
     }
     const bool device = status == Status::Fault || status == Status::Timeout || status == Status::Lost;
-    ending = device ? Ending::DeviceFault : Ending::Guard;
+    reason = device ? ExitReason::DeviceFault : ExitReason::Guard;
     return true;
 }
 
 }  // namespace detail
 
-/// The loop: wake, tick, hand over the record, until the time is up, somebody asks, a guard or the device
-/// stops it, or it cannot hold its rate. Whatever the reason, the last thing it does is to send zero force and
-/// to let the device go. `clock` has start() and wait(); `sink` has push(record). Neither this nor anything
-/// that it calls allocates, locks, throws, logs or calls the system, but for the clock and the device.
+/// Runs the loop (wake up, tick, hand over the record) until the time is up, a stop is requested, a guard or the device
+/// stops it, or its rate is too low. On every exit it sends zero force and closes the device. `clock` has start() and
+/// wait(); `sink` has push(record). It does not allocate, lock, throw, log or make a system call, except for the clock
+/// and the device exchange.
 template <class Control, class Clock, class Sink>
-void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, const std::atomic<bool>& asked,
-              Sink& sink, LoopProgress& progress, LoopReport& report) noexcept {
-    constexpr double centuries = 1e15;  // of ticks: what "without end" means to a counter
+void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
+              const std::atomic<bool>& stop_requested, Sink& sink, LoopProgress& progress,
+              LoopReport& report) noexcept {
+    constexpr double centuries = 1e15;  // ticks of an infinite duration
     const auto deadlines = static_cast<std::uint64_t>(
         std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, centuries));
     std::uint64_t bad_in_a_row = 0;
-    (void)controller.start();  // what the first sample says is judged by the first tick
+    (void)controller.start();  // the first tick checks the first sample
     clock.start();
     for (bool running = true; running;) {
         const Wake wake = clock.wait();
@@ -143,8 +143,8 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         const bool too_late = report.timing.ticks() > 0 && gap > settings.longest_period_s;
         report.timing.add(wake);
         if (too_late) {
-            report.ending = Ending::NotCertified;
-            break;  // the last force has stood for too long already: what follows is none
+            report.exit_reason = ExitReason::NotCertified;
+            break;  // the last force was held too long already
         }
         const Tick tick = controller.tick();
         const TickRecord record = record_of(tick, wake, report.timing.first);
@@ -161,24 +161,24 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock, c
         progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);
-        if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.ending)) {
+        if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.exit_reason)) {
             running = false;
         } else if (window_ended && progress.rate.rate_hz() < settings.lowest_rate_share * settings.rate_hz) {
-            report.ending = Ending::RateTooLow;
+            report.exit_reason = ExitReason::RateTooLow;
             running = false;
-        } else if (asked.load(std::memory_order_relaxed)) {
-            report.ending = Ending::Asked;
+        } else if (stop_requested.load(std::memory_order_relaxed)) {
+            report.exit_reason = ExitReason::StopRequested;
             running = false;
         } else if (report.timing.ticks() + report.timing.missed >= deadlines) {
-            report.ending = Ending::TimeUp;
+            report.exit_reason = ExitReason::TimeUp;
             running = false;
         }
     }
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
-    report.given_in_ramp = -controller.guards().at_start.least();
-    report.given = -controller.guards().observer.least();
+    report.given_in_ramp = 0.0 - controller.guards().at_start.least();  // not -0
+    report.given = 0.0 - controller.guards().observer.least();
     report.most_stored = controller.guards().tank.stored().most();
     report.buzzes = controller.guards().buzz.buzzes();
 }

@@ -1,85 +1,111 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <atomic>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "palpate/device/device.hpp"
+#include "palpate/fields/readable.hpp"
 #include "palpate/guard/guard_settings.hpp"
-#include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/rendering/probe.hpp"
-#include "palpate/rendering/scheme.hpp"
-#include "palpate/rendering/structure.hpp"
+#include "palpate/rendering/measuring.hpp"
+#include "palpate/rendering/scale.hpp"
 #include "palpate/run/controller.hpp"
-#include "palpate/run/record_sinks.hpp"
-#include "palpate/run/session.hpp"
-#include "palpate/run/session_text.hpp"
-#include "palpate/simulation/simulated_device.hpp"
-#include "palpate/simulation/test_rig.hpp"
+#include "palpate/run/live_device.hpp"
+#include "palpate/run/render.hpp"
+#include "palpate/run/summary.hpp"
 
 namespace palpate {
 
-/// A real object measured on an open device: somebody moves the handle (FreeMotion), or the device does so by
-/// itself (Probe, Pulses). Everything else is as in a rendering. Throws std::invalid_argument before anything moves.
-template <Device D, Structure S, class Watch>
-[[nodiscard]] SessionReport measure_live(D& device, S moves, const GuardSettings& guards,
-                                         const SessionSettings& settings, RecordSinks& sinks,
-                                         const std::atomic<bool>& asked, Watch watch) {
-    validate(settings.loop);
-    validate(guards);
-    const double period_s = 1.0 / settings.loop.rate_hz;
-    Controller controller{device, std::move(moves),
-                          Guards{.reading = reading_guard(guards, period_s),
-                                 .limit = force_limit(guards),
-                                 .ramp = force_ramp(guards, period_s),
-                                 .slew = slew_limit(guards, period_s)}};
-    return run_session(controller, settings, sinks, asked, watch);
-}
+/// Options of a measurement of a real object. Without `probe` and `push` a hand moves the handle.
+struct MeasureOptions : RunOptions {
+    RecordUnits units;
+    bool probe = false;  ///< the device moves the handle slowly between lower and upper
+    std::optional<double> lower, upper, speed, stiffness, force_limit;  ///< of the probe
+    std::optional<double> push;   ///< force of short pushes to either side [N or N*m]
+    bool keep = false;            ///< keep every tick in the summary
+    bool transducer = true;       ///< of the simulated device
+    double friction_share = 0.0;  ///< Coulomb friction of the simulated device, relative to its force limit
 
-/// A probe that suits a bench: its size follows the bench's, its range is given, its limit is the device's.
-[[nodiscard]] inline ProbeSettings probe_for(const Bench& bench, double lower, double upper) {
+    [[nodiscard]] bool moves() const noexcept { return probe || push; }
+};
+
+namespace detail {
+
+/// Returns the settings of the probe: the given ones, else the default ones at the scale of the device.
+[[nodiscard]] inline ProbeSettings chosen_probe(const MeasureOptions& options, const LiveDevice& device) {
     ProbeSettings probe;
-    probe.lower = lower;
-    probe.upper = upper;
-    probe.speed *= bench.length;
-    probe.stiffness *= bench.stiffness;
-    probe.damping *= bench.stiffness;
-    probe.force_limit = bench.device.force_limit;
+    probe.lower = options.lower.value_or(probe.lower);
+    probe.upper = options.upper.value_or(probe.upper);
+    probe.speed = options.speed.value_or(probe.speed * device.scale.length);
+    probe.stiffness = options.stiffness.value_or(probe.stiffness * device.scale.stiffness());
+    probe.damping *= device.scale.stiffness();
+    probe.force_limit = options.force_limit.value_or(device.profile.force_limit);
+    validate(probe);
+    require(device.profile.makes(probe.force_limit), "force_limit is " + readable(probe.force_limit) +
+                                                         ", the device makes " +
+                                                         readable(device.profile.force_limit));
+    probe.force_limit = std::min(probe.force_limit, device.profile.force_limit);
     return probe;
 }
 
-/// The head of a recording of a real object.
-[[nodiscard]] inline Metadata measured_metadata(const std::string& created_by, const std::string& device,
-                                                const std::optional<ProbeSettings>& probe, bool transducer,
-                                                double rate_hz) {
-    return {
-        {"created_by", created_by},
-        {"device", device},
-        {"force", transducer ? "of the object against the handle, from the device's force transducer"
-                             : "what the motor held against the object: the friction of the device is in it"},
-        {"moved_by", probe ? "the device itself: a sweep from " + readable(probe->lower) + " to " +
-                                 readable(probe->upper) + " at " + readable(probe->speed) +
-                                 " a second, no force above " + readable(probe->force_limit)
-                           : "a hand"},
-        {"rate_hz", readable(rate_hz)}};
-}
+}  // namespace detail
 
-/// A model as a thing that can be mounted on the simulated device of its bench, at rest at `start`.
-[[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, const Bench& bench,
-                                                             double start) {
-    SchemeChoices direct;
-    direct.structure = StructureKind::Direct;
-    return with_structure(model, bench.scheme(model, direct), bench.device.period_s, bench.device.force_limit,
-                          [start](auto structure) -> std::function<double(double)> {
-                              structure.reset(start);
-                              return [structure](double position) mutable {
-                                  return structure.step(position).force;
-                              };
-                          });
+/// Measures a real object on a device that is not open yet. The object moves by a hand, a probe or pushes.
+[[nodiscard]] inline Summary measure(const MeasureOptions& options, LiveDevice& device,
+                                     const std::atomic<bool>& stop_requested, const Watch& watch) {
+    SessionSettings session{.loop = options.loop, .real_time = options.real_time};
+    session.loop.rate_hz = device.rate_hz;
+    validate(session.loop);
+    const double period_s = 1.0 / device.rate_hz;
+    GuardSettings guards = guards_for(device.scale, device.profile);
+    std::string moved_by = "a hand";
+    std::optional<ProbeSettings> probe;
+    if (options.probe) {
+        probe = detail::chosen_probe(options, device);
+        guards.force_limit = probe->force_limit;
+        moved_by = "the device itself: a sweep from " + readable(probe->lower) + " to " +
+                   readable(probe->upper) + " at " + readable(probe->speed) + " a second, no force above " +
+                   readable(probe->force_limit);
+    }
+    if (!options.moves()) {
+        guards.ramp_s = 0.0;  // no force to increase
+    }
+    validate(guards);
+    Metadata metadata{{"created_by", options.created_by}};
+    metadata.insert(metadata.end(), device.metadata.begin(), device.metadata.end());
+    metadata.insert(
+        metadata.end(),
+        {{"force", device.transducer ? "of the object against the handle, from the device's force transducer"
+                                     : "of the motor against the object, including the device's friction"},
+         {"moved_by", moved_by},
+         {"rate_hz", readable(device.rate_hz)}});
+    const Opened opened = device.open();
+    detail::require(static_cast<bool>(opened), opened.reason);
+    RecordSinks sinks;
+    sinks.real_object = !options.push;
+    sinks.keeps = options.keep;
+    const std::string note = detail::open_sinks(options, options.units, metadata, sinks);
+    const auto run = [&](auto structure) {
+        Controller controller{device, std::move(structure),
+                              Guards{.reading = reading_guard(guards, period_s),
+                                     .limit = force_limit(guards),
+                                     .ramp = force_ramp(guards, period_s),
+                                     .slew = slew_limit(guards, period_s)}};
+        return run_session(controller, session, sinks, stop_requested, watch);
+    };
+    SessionReport report = probe          ? run(Probe{*probe, period_s})
+                           : options.push ? run(Pulses{{*options.push}, period_s})
+                                          : run(FreeMotion{});
+    Summary summary = detail::finish(
+        options, session.loop, options.units, metadata, sinks, std::move(report),
+        {.encoder_step = guards.encoder_step, .position_unit = options.units.position}, device);
+    if (!note.empty()) {
+        summary.notes.push_back(note);
+    }
+    return summary;
 }
 
 }  // namespace palpate

@@ -15,7 +15,6 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/loop.hpp"
 #include "palpate/run/session.hpp"
-#include "palpate/simulation/test_rig.hpp"
 
 namespace palpate {
 
@@ -30,7 +29,7 @@ namespace palpate {
     return text;
 }
 
-/// How punctual a loop was, in one line.
+/// Returns the timing of a loop in one line.
 [[nodiscard]] inline std::string timing_text(const LoopTiming& timing, double wanted_hz) {
     return readable(timing.rate_hz()) + " Hz of " + readable(wanted_hz) + " Hz over " +
            std::to_string(timing.ticks()) + " ticks; period " + percentiles(timing.period) + "; late by " +
@@ -38,24 +37,24 @@ namespace palpate {
            "; longest gap " + readable(1e-3 * static_cast<double>(timing.period.largest())) + " us";
 }
 
-/// Why a loop ended, as a sentence.
-[[nodiscard]] inline std::string ending_text(const LoopReport& report, const LoopSettings& settings) {
+/// Returns the exit reason of a loop as a sentence.
+[[nodiscard]] inline std::string exit_text(const LoopReport& report, const LoopSettings& settings) {
     const StatusText& status = text(report.status);
-    switch (report.ending) {
-        case Ending::TimeUp:
+    switch (report.exit_reason) {
+        case ExitReason::TimeUp:
             return "ran its time";
-        case Ending::Asked:
-            return "stopped because it was asked to";
-        case Ending::Guard:
+        case ExitReason::StopRequested:
+            return "stopped on request";
+        case ExitReason::Guard:
             return std::string("stopped by a guard: ") + status.word + ", " + status.meaning;
-        case Ending::DeviceFault:
+        case ExitReason::DeviceFault:
             return std::string("stopped by a fault of the device: ") + status.word + ", " + status.meaning;
-        case Ending::NotCertified:
+        case ExitReason::NotCertified:
             return "stopped because a tick came " +
                    readable(1e-6 * static_cast<double>(report.timing.period.largest())) +
                    " ms after the one before: the certificate holds up to " +
                    readable(1e3 * settings.longest_period_s) + " ms";
-        case Ending::RateTooLow:
+        case ExitReason::RateTooLow:
             break;
     }
     return "stopped because the loop did not hold its rate: less than " +
@@ -93,15 +92,6 @@ namespace palpate {
     return text;
 }
 
-/// What a flight record says of a simulated device.
-[[nodiscard]] inline Metadata simulated_metadata(const Bench& bench) {
-    return {{"simulated", "yes: device and hand; nothing here was measured"},
-            {"device", bench.device.id},
-            {"hand", "spring " + readable(bench.hand.stiffness) + ", damper " + readable(bench.hand.damping) +
-                         ", to a point between " + readable(bench.hand.lower) + " and " +
-                         readable(bench.hand.upper) + " at " + readable(bench.hand.frequency_hz) + " Hz"}};
-}
-
 /// The head of a flight record.
 [[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const Metadata& device,
                                               const std::string& model, const Scheme& scheme,
@@ -120,22 +110,21 @@ namespace palpate {
     return metadata;
 }
 
-/// Writes how it ended into the recording and gives the file its name; `name` becomes the one that it has. Returns
-/// a sentence for everything that is not as it was asked for.
+/// Writes the exit reason and the timing into the recording and renames the file; `name` becomes its name. Returns a
+/// sentence for each difference from the request.
 [[nodiscard]] inline std::vector<std::string> finish_record(RecordingFile& file, const SessionReport& report,
                                                             const LoopSettings& settings, std::string& name) {
     std::vector<std::string> warnings;
     const int disk = file.error();
-    std::string ending = ending_text(report.loop, settings) + "; zero force sent, device closed";
+    std::string ended = exit_text(report.loop, settings) + "; zero force sent, device closed";
     if (disk != 0) {
-        ending +=
-            std::string("; incomplete, the disk took no more: ") + std::generic_category().message(disk);
+        ended += std::string("; incomplete, the disk took no more: ") + std::generic_category().message(disk);
         warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +
                            std::to_string(file.refused()) + " rows are missing at its end");
     }
     const std::string timing = timing_text(report.loop.timing, settings.rate_hz) + "; lost records " +
                                std::to_string(report.lost_records);
-    if (std::string reason = file.finish(ending, timing); !reason.empty()) {
+    if (std::string reason = file.finish(ended, timing); !reason.empty()) {
         name = file.file().part();
         warnings.push_back(std::move(reason));
     }

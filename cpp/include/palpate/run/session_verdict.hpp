@@ -25,12 +25,12 @@ struct SessionFinding {
     std::string sentence;
 };
 
-/// What a session is judged by beside its report and its sinks.
+/// Expectations that a session is judged by.
 struct SessionExpectation {
-    bool recorded = false;      ///< a recording was asked for
+    bool recorded = false;      ///< a recording was requested
     double encoder_step = 0.0;  ///< of the device [m or rad]; 0 = not quantised
-    Range domain;               ///< positions of the rendered model; NaN where a real object is measured
-    std::string position_unit;
+    Range domain{};               ///< positions of the rendered model; NaN where a real object is measured
+    std::string position_unit{};
     std::vector<std::string> warnings{};  ///< from `finish_record`
 };
 
@@ -140,8 +140,8 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
                                                                const RecordSinks& sinks,
                                                                const SessionExpectation& expected) {
     std::vector<SessionFinding> findings;
-    if (!is_orderly(report.loop.ending)) {
-        findings.push_back({"no", ending_text(report.loop, settings)});
+    if (!is_orderly(report.loop.exit_reason)) {
+        findings.push_back({"no", exit_text(report.loop, settings)});
     }
     const auto usable_rows = report.loop.ticks_by_status[static_cast<std::size_t>(Status::Ok)];
     if (expected.recorded && sinks.file.written() == 0) {
@@ -154,7 +154,7 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     for (const std::string& warning : expected.warnings) {
         findings.push_back({"usable", warning});
     }
-    if (is_orderly(report.loop.ending)) {  // a run that was stopped early says nothing about the motion
+    if (is_orderly(report.loop.exit_reason)) {  // a run that was stopped early says nothing about the motion
         detail::judge_forces(report.loop, sinks, expected, findings);
         detail::judge_motion(sinks, expected, findings);
     }

@@ -1,27 +1,64 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "palpate/fields/readable.hpp"
+#include "palpate/rendering/scheme.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/run/controller.hpp"
-#include "palpate/simulation/hands.hpp"
+#include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/plant.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 
 namespace palpate {
 
-/// Where a closed loop starts, how finely it is integrated, and what guards it.
-struct ClosedLoopSettings {
-    int substeps = 20;            ///< of a tick
-    double start_position = 0.0;  ///< [m or rad]
-    double start_velocity = 0.0;  ///< of handle and hand [m/s or rad/s]
-    Guards guards{};              ///< default: the device's force limit and nothing else
+/// One tick in virtual time, and the simulated device before and after it.
+struct SimulatedTick {
+    std::size_t number;
+    Tick tick;
+    Motion start;         ///< the handle when the tick began
+    Motion end;           ///< the handle when it ended
+    double force_before;  ///< of the device when the tick began [N or N*m]
+    double force;         ///< of the device when it ended [N or N*m]
 };
 
-/// How a closed loop ended.
+/// Runs a controller on a simulated device in virtual time. `watch(SimulatedTick)` is called after every tick; the loop
+/// ends when it returns false. Returns the number of ticks.
+template <Device D, Structure S, class Watch>
+std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_t ticks, Watch&& watch) {
+    (void)device.open();
+    Controller controller{device, std::move(structure), guards};
+    (void)controller.start();
+    SimulatedTick now{0, {}, {}, device.handle(), 0.0, device.applied_force()};
+    for (bool goes_on = true; now.number < ticks && goes_on; ++now.number) {
+        now.start = now.end;
+        now.force_before = now.force;
+        now.tick = controller.tick();
+        now.end = device.handle();
+        now.force = device.applied_force();
+        goes_on = watch(std::as_const(now));
+    }
+    return now.number;
+}
+
+/// Start of a closed loop with energy account, its integration and its guards.
+struct ClosedLoopSettings {
+    int substeps = usual_substeps;  ///< of a tick
+    double start_position = 0.0;    ///< [m or rad]
+    double start_velocity = 0.0;    ///< of handle and hand [m/s or rad/s]
+    Guards guards{};                ///< default: no limit but the device's
+};
+
+/// End of a closed loop with energy account.
 struct ClosedLoopEnd {
     EnergyAccount energy;
     Motion met;             ///< the handle when the object's first force began to act on it
@@ -29,30 +66,160 @@ struct ClosedLoopEnd {
     std::size_t ticks = 0;  ///< that were watched
 };
 
-/// Object, device and hand in virtual time, every joule accounted for. `watch(tick, handle, account)` is called
-/// after every tick and says whether to go on.
+/// Runs a structure on a simulated device with an energy account. `watch(tick, handle, account)` is called after every
+/// tick; the loop ends when it returns false.
 template <Structure S, SimulatedHand H, class Watch>
 [[nodiscard]] ClosedLoopEnd closed_loop(S structure, const DeviceProfile& profile, H hand, std::size_t ticks,
                                         const ClosedLoopSettings& settings, Watch watch) {
     SimulatedHandle<H, Midpoint> device{profile, std::move(hand), settings.substeps, settings.start_position,
                                         settings.start_velocity};
-    (void)device.open();
-    Controller controller{device, std::move(structure), settings.guards};
-    (void)controller.start();
     const auto delay = static_cast<std::size_t>(profile.late_samples());
     ClosedLoopEnd end;
-    end.met = device.handle();
-    bool goes_on = true;
-    for (; end.ticks < ticks && goes_on; ++end.ticks) {
-        if (end.ticks == delay) {
-            end.met = device.handle();
-        }
-        const Tick tick = controller.tick();
-        goes_on = watch(tick, device.handle(), device.plant().account());
-    }
+    end.ticks =
+        closed_loop(device, std::move(structure), settings.guards, ticks, [&](const SimulatedTick& now) {
+            if (now.number == 0 || now.number == delay) {
+                end.met = now.start;
+            }
+            return watch(now.tick, now.end, device.plant().account());
+        });
     end.energy = device.plant().account();
     end.handle = device.handle();
     return end;
+}
+
+/// A simulated rendering, one row for each tick.
+struct Trace {
+    std::vector<double> time;                  ///< [s]
+    std::vector<double> position;              ///< measured by the encoder
+    std::vector<double> velocity;              ///< differenced by the device
+    std::vector<double> handle_start;          ///< true position when the encoder was read
+    std::vector<double> handle_middle;         ///< true position in the middle of the tick
+    std::vector<double> handle_end;            ///< true position at the end of the tick that holds the force
+    std::vector<double> environment_position;  ///< y
+    std::vector<double> force;                 ///< commanded
+    std::vector<double> applied;               ///< force of the device at the end of the tick
+    std::vector<double> mean_applied;          ///< mean force over the tick, which a fractional delay divides
+    std::vector<int> evaluations;
+    std::vector<Status> status;
+    std::vector<std::uint8_t> extrapolated;  ///< 1 where y lay outside the model's data
+};
+
+/// Largest number of ticks of `simulate`: one hour at 1 kHz, about 270 MB.
+inline constexpr std::size_t most_simulated_ticks = 3'600'000;
+
+/// Returns the ticks of a simulated time. Throws std::invalid_argument if that is not 1 to `most_simulated_ticks`.
+[[nodiscard]] inline std::size_t simulated_ticks(double duration_s, double period_s) {
+    const double ticks = std::round(duration_s / period_s);
+    detail::require(duration_s > 0.0 && ticks >= 1.0, "duration_s is " + readable(duration_s) +
+                                                          ", must be at least one period, " +
+                                                          readable(period_s) + " s");
+    detail::require(ticks <= static_cast<double>(most_simulated_ticks),
+                    "duration_s is " + readable(duration_s) + ", which is " + readable(ticks) +
+                        " periods of " + readable(period_s) + " s: must be at most " +
+                        std::to_string(most_simulated_ticks) + " periods");
+    return static_cast<std::size_t>(ticks);
+}
+
+/// Renders a model on a simulated device with a hand on it, in virtual time. `each(tick)` is called at every tick; an
+/// exception from it ends the work.
+template <class Each>
+[[nodiscard]] Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
+                             const Hand& hand, std::size_t ticks, int substeps, double start_position,
+                             Each&& each) {
+    validate(scheme, model, profile.period_s);
+    detail::require(
+        ticks <= most_simulated_ticks,
+        "ticks is " + std::to_string(ticks) + ", must be at most " + std::to_string(most_simulated_ticks));
+    const double late = profile.delay_fraction();
+    Trace trace;
+    const auto add = [&](const SimulatedTick& now) {
+        each(now.number);
+        trace.time.push_back(static_cast<double>(now.number) * profile.period_s);
+        trace.position.push_back(now.tick.reading.position);
+        trace.velocity.push_back(now.tick.reading.velocity);
+        trace.handle_start.push_back(now.start.position);
+        trace.handle_middle.push_back(0.5 * (now.start.position + now.end.position) +
+                                      0.125 * profile.period_s * (now.start.velocity - now.end.velocity));
+        trace.handle_end.push_back(now.end.position);
+        trace.environment_position.push_back(now.tick.rendered.environment_position);
+        trace.force.push_back(now.tick.command.force);
+        trace.applied.push_back(now.force);
+        trace.mean_applied.push_back(late * now.force_before + (1.0 - late) * now.force);
+        trace.evaluations.push_back(now.tick.rendered.evaluations);
+        trace.status.push_back(now.tick.status);
+        trace.extrapolated.push_back(static_cast<std::uint8_t>(now.tick.rendered.extrapolated));
+        return true;
+    };
+    with_structure(model, scheme, profile.period_s, profile.force_limit, [&](auto structure) {
+        SimulatedDevice device{profile, hand, substeps, start_position};
+        return closed_loop(device, std::move(structure), Guards{.limit = {profile.force_limit}}, ticks, add);
+    });
+    return trace;
+}
+
+[[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
+                                    const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
+                                    int substeps = usual_substeps, double start_position = 0.0) {
+    return simulate(model, scheme, profile, hand, ticks, substeps, start_position, [](std::size_t) {});
+}
+
+/// Returns the force rendered along a recorded motion of the device. `each(k)` is called before every sample; an
+/// exception from it ends the work.
+template <class Each>
+[[nodiscard]] std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
+                                                  std::span<const double> position, double period_s,
+                                                  Each&& each) {
+    validate(scheme, model, period_s);
+    return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),
+                          [&](auto&& structure) {
+                              std::vector<Rendered> rendered;
+                              rendered.reserve(position.size());
+                              if (!position.empty()) {
+                                  structure.reset(position.front());
+                              }
+                              for (const double x : position) {
+                                  each(rendered.size());
+                                  rendered.push_back(structure.step(x));
+                              }
+                              return rendered;
+                          });
+}
+
+[[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
+                                                         std::span<const double> position, double period_s) {
+    return motion_driven(model, scheme, position, period_s, [](std::size_t) {});
+}
+
+/// Returns the motion of the environment driven by a recorded force (paper figures 12 and 14). `each` as above.
+template <class Each>
+[[nodiscard]] std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
+                                                 std::span<const double> force, double period_s,
+                                                 double start_position, Each&& each) {
+    return with_structure(
+        model, scheme, period_s, std::numeric_limits<double>::infinity(),
+        [&](auto&& structure) -> std::vector<Rendered> {
+            if constexpr (requires { structure.drive(0.0); }) {
+                std::vector<Rendered> rendered;
+                rendered.reserve(force.size());
+                structure.reset(start_position);
+                for (const double f : force) {
+                    each(rendered.size());
+                    rendered.push_back(structure.drive(f));
+                }
+                return rendered;
+            } else {
+                throw std::invalid_argument(
+                    "structure is " +
+                    std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
+                    ", must be implicit or explicit: only an inertia turns force into motion");
+            }
+        });
+}
+
+[[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
+                                                        std::span<const double> force, double period_s,
+                                                        double start_position) {
+    return force_driven(model, scheme, force, period_s, start_position, [](std::size_t) {});
 }
 
 }  // namespace palpate

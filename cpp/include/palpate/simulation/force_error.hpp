@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "palpate/simulation/virtual_time.hpp"
+#include "palpate/simulation/closed_loop.hpp"
 
 namespace palpate {
 

@@ -17,6 +17,7 @@
 
 namespace palpate {
 
+inline constexpr int usual_substeps = 20;   ///< of one tick of 1 ms of a simulated device
 inline constexpr int most_substeps = 1000;  ///< of one tick of a simulated device
 
 /// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
@@ -29,8 +30,8 @@ inline constexpr int most_substeps = 1000;  ///< of one tick of a simulated devi
 template <SimulatedHand H, class Plant>
 class SimulatedHandle {
   public:
-    explicit SimulatedHandle(DeviceProfile profile, H hand = {}, int substeps = 20, double start = 0.0,
-                             double start_velocity = 0.0)
+    explicit SimulatedHandle(DeviceProfile profile, H hand = {}, int substeps = usual_substeps,
+                             double start = 0.0, double start_velocity = 0.0)
         : profile_{std::move(profile)}, hand_{hand}, substeps_{substeps}, start_{start, start_velocity} {
         validate(profile_);
         if (substeps < 1 || substeps > most_substeps) {
@@ -136,9 +137,9 @@ using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
 static_assert(Device<SimulatedDevice>);
 static_assert(Device<SimulatedRig>);
 
-/// Substeps of a tick that keep the inner step of the simulation at 1/20 ms, whatever the rate.
+/// Returns the substeps of a tick that keep the inner step of the simulation independent of the rate.
 [[nodiscard]] inline int simulated_substeps(double period_s) noexcept {
-    return std::max(1, static_cast<int>(std::lround(20e3 * period_s)));
+    return std::max(1, static_cast<int>(std::lround(usual_substeps * (period_s / 1e-3))));
 }
 
 }  // namespace palpate

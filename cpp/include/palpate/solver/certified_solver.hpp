@@ -14,7 +14,6 @@
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/model/parameters.hpp"
-#include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 #include "palpate/status.hpp"

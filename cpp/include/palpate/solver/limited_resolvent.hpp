@@ -7,7 +7,6 @@
 
 #include "palpate/model/environment.hpp"
 #include "palpate/model/limited_environment.hpp"
-#include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
 
 namespace palpate {

@@ -8,7 +8,6 @@
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/solver/certified_solver.hpp"
-#include "palpate/solver/load_line.hpp"
 #include "palpate/solver/newton.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 #include "palpate/solver/resolvent.hpp"

@@ -4,16 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <string_view>
+#include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 #include "palpate/model/fingerprint.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/scheme.hpp"
@@ -31,103 +32,87 @@ enum class Verdict : std::uint8_t {
     Refused,
 };
 
-inline constexpr std::array<std::string_view, 3> verdict_names{"certified", "stable-locally", "refused"};
-
-[[nodiscard]] constexpr std::string_view name_of(Verdict verdict) noexcept {
-    return verdict_names[static_cast<std::size_t>(verdict)];
-}
+template <>
+inline constexpr auto words_of<Verdict> =
+    std::array<std::string_view, 3>{"certified", "stable-locally", "refused"};
 
 /// What is proved of a model, rendered by a scheme, on a device: every inequality with both its sides.
 struct Certificate {
+    std::string model;
     Scheme scheme;
     DeviceProfile device;
-    std::string model;   ///< its fingerprint; empty where only bounds were certified
-    ForceBounds bounds;  ///< of the force that is rendered, compensation included
+    ForceBounds bounds;
     std::vector<Inequality> inequalities;
     Verdict verdict = Verdict::Refused;
-    std::string why;                ///< one sentence
-    double longest_period_s = 0.0;  ///< up to which all inequalities hold; 0 where they do not
-    std::string fingerprint;        ///< of every number and name above, as `fingerprint_of` computes it
+    double longest_period_s = 0.0;
+    std::string fingerprint;
+    std::string why;
 
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
 };
 
-/// 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of the
-/// device, bounds, sides of each line, verdict. Detects a certificate that was edited; it is no signature.
-[[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
-    detail::NumberHash hash;
-    hash.add(certificate.model);
-    const Scheme& scheme = certificate.scheme;
-    hash.add(static_cast<std::uint64_t>(scheme.structure));
-    const bool coupled = scheme.structure != StructureKind::Direct;
-    const bool heavy = has_mass(scheme.structure);
-    for (const double number :
-         {coupled ? scheme.coupling.stiffness : 0.0, coupled ? scheme.coupling.damping : 0.0,
-          heavy ? scheme.inertia.mass : 0.0, heavy ? scheme.inertia.damping : 0.0,
-          scheme.compensated ? 1.0 : 0.0, scheme.play_radius, static_cast<double>(scheme.predict)}) {
-        hash.add(number);
-    }
-    const DeviceProfile& device = certificate.device;
-    hash.add(device.id);
-    hash.add(device.position_unit);
-    for (const double number :
-         {device.period_s, device.inertia, device.viscous_damping, device.coulomb_friction,
-          device.encoder_step, device.force_step, device.delay_s, device.force_limit, device.jitter_s}) {
-        hash.add(number);
-    }
-    const ForceBounds& bounds = certificate.bounds;
-    for (const double number :
-         {bounds.slope.lower, bounds.slope.upper, bounds.steepest, bounds.sliding, bounds.loss.lower,
-          bounds.loss.upper, bounds.loss_per_play, bounds.mean_force, bounds.drag}) {
-        hash.add(number);
-    }
-    for (const Inequality& line : certificate.inequalities) {
-        hash.add(line.id);
-        hash.add(line.left);
-        hash.add(line.right);
-    }
-    hash.add(static_cast<std::uint64_t>(certificate.verdict));
-    hash.add(certificate.longest_period_s);
-    return hash.text();
-}
+template <>
+inline constexpr auto fields_of<Certificate> = std::tuple{
+    Field<&Certificate::model>{"model", "Fingerprint of the model; empty where only bounds were certified."},
+    Field<&Certificate::scheme>{"scheme", "How the model is rendered."},
+    Field<&Certificate::device>{"device", "The device it holds for."},
+    Field<&Certificate::bounds>{"bounds", "Of the force that is rendered, compensation included."},
+    Field<&Certificate::inequalities>{"inequalities", "Every line with both its sides."},
+    Field<&Certificate::verdict>{"verdict", "certified, stable-locally or refused."},
+    Field<&Certificate::longest_period_s>{
+        "longest_period_s",
+        "Time between two samples up to which every inequality holds [s]; 0 where one does not.",
+        Rule::NotNegative},
+    Field<&Certificate::fingerprint>{"fingerprint",
+                                     "16 hexadecimal digits over every stored number and name before it."},
+    Field<&Certificate::why>{"why", "One sentence.", Rule::Any, false}};
 
 namespace detail {
 
-/// The inequalities of a structure behind a coupling, of a force of position.
-[[nodiscard]] inline std::vector<Inequality> inequalities_behind_a_coupling(const ForceBounds& bounds,
-                                                                            const Scheme& scheme,
-                                                                            const DeviceProfile& device) {
-    switch (scheme.structure) {
-        case StructureKind::Massless:
-            return massless_inequalities(bounds, scheme.coupling, device);
-        case StructureKind::Implicit:
-            return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
-        case StructureKind::EnergyConsistent:
-            return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
-        default:
-            return explicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
+template <class T>
+void hash_value(NumberHash& hash, const T& value) {
+    if constexpr (HasFields<T>) {
+        for_each_field<T>([&](const auto& field) {
+            if (field.stored) {
+                hash_value(hash, field.of(value));
+            }
+        });
+    } else if constexpr (std::is_enum_v<T>) {
+        hash.add(static_cast<std::uint64_t>(value));
+    } else if constexpr (std::is_arithmetic_v<T>) {
+        hash.add(static_cast<double>(value));
+    } else if constexpr (std::is_same_v<T, std::string>) {
+        hash.add(std::string_view{value});
+    } else {
+        for (const auto& item : value) {
+            hash_value(hash, item);
+        }
     }
 }
 
 }  // namespace detail
 
+/// 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of the
+/// device, bounds, sides of each line, verdict. Detects a certificate that was edited; it is no signature.
+[[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
+    detail::NumberHash hash;
+    for_each_field<Certificate>([&](const auto& field) {
+        const auto& value = field.of(certificate);
+        if constexpr (std::is_same_v<decltype(value), const Scheme&>) {
+            detail::hash_value(hash, used_part(value));
+        } else if (field.stored && field.name != std::string_view{"fingerprint"}) {
+            detail::hash_value(hash, value);
+        }
+    });
+    return hash.text();
+}
+
 /// The inequalities of a scheme, whatever they say. Fields that the structure has no use for are ignored.
 [[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
                                                              const DeviceProfile& device) {
-    if (scheme.structure == StructureKind::Direct) {
-        if (bounds.drag > 0.0) {
-            std::vector<Inequality> lines = velocity_inequalities(bounds, device);
-            if (scheme.predict > 0) {
-                lines.push_back({"velocity-prediction", "prediction of a force of velocity", "B_v = 0", 0.0,
-                                 bounds.drag, Basis::None, "docs/certificate.md"});
-            }
-            return lines;
-        }
-        return bounds.hysteresis ? hysteresis_inequalities(bounds, device, scheme.predict)
-                                 : direct_inequalities(bounds, device, scheme.predict);
-    }
-    std::vector<Inequality> lines = detail::inequalities_behind_a_coupling(bounds, scheme, device);
-    if (bounds.drag > 0.0) {
+    std::vector<Inequality> lines = with_kind(
+        scheme.structure, [&](auto structure) { return inequalities(structure, bounds, scheme, device); });
+    if (bounds.drag > 0.0 && has_coupling(scheme.structure)) {
         lines.push_back({"velocity-coupling", "force of velocity behind a coupling", "B_v = 0", 0.0,
                          bounds.drag, Basis::None, "use direct rendering"});
     }
@@ -147,10 +132,7 @@ namespace detail {
         later.jitter_s = factor * T - device.period_s;
         return inequalities_of(bounds, scheme, later);
     };
-    const auto holds = [&](double factor) {
-        const std::vector<Inequality> later = lines_at(factor);
-        return std::all_of(later.begin(), later.end(), [](const Inequality& line) { return line.holds(); });
-    };
+    const auto holds = [&](double factor) { return all_hold(lines_at(factor)); };
     double guess = most;
     const std::vector<Inequality> doubled = lines_at(2.0);
     for (std::size_t k = 0; k < lines.size(); ++k) {
@@ -181,9 +163,8 @@ namespace detail {
 
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
     const Inequality* least = nullptr;
-    const auto room = [](const Inequality& line) { return line.margin() / std::abs(line.left); };
     for (const Inequality& line : lines) {
-        if (line.left != 0.0 && (least == nullptr || room(line) < room(*least))) {
+        if (line.left != 0.0 && (least == nullptr || line.reserve() < least->reserve())) {
             least = &line;
         }
     }
@@ -200,8 +181,8 @@ namespace detail {
                            ? "every inequality is proved and holds"
                            : "the linearised system is stable; energy is not accounted for";
     if (const Inequality* least = tightest(lines)) {
-        text += "; the tightest, " + least->name + ", has " +
-                readable(100.0 * least->margin() / std::abs(least->left)) + " % to spare";
+        text +=
+            "; the tightest, " + least->name + ", has " + readable(100.0 * least->reserve()) + " % to spare";
     }
     return text;
 }
@@ -216,20 +197,22 @@ namespace detail {
 /// What is proved of any rendered force within bounds. Wider bounds never prove more.
 [[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
                                                   const DeviceProfile& device) {
-    Certificate certificate{scheme, device, "", bounds, {}, Verdict::Refused, "", 0.0, ""};
-    std::vector<Inequality> lines = inequalities_of(certificate.bounds, scheme, device);
-    const auto all = [&](const auto& condition) {
-        return std::all_of(lines.begin(), lines.end(), condition);
-    };
-    if (!certificate.bounds.finite()) {
+    Certificate certificate;
+    certificate.scheme = scheme;
+    certificate.device = device;
+    certificate.bounds = bounds;
+    std::vector<Inequality> lines = inequalities_of(bounds, scheme, device);
+    if (!finite(bounds)) {
         certificate.why = "a bound of the model is not a finite number";
         certificate.inequalities = std::move(lines);
         return certificate;
     }
-    if (all([](const Inequality& line) { return line.holds(); })) {
-        const bool proved = all([](const Inequality& line) { return line.rests_on != Basis::Linear; });
+    if (all_hold(lines)) {
+        const bool proved = std::all_of(lines.begin(), lines.end(), [](const Inequality& line) {
+            return line.rests_on != Basis::Linear;
+        });
         certificate.verdict = proved ? Verdict::Certified : Verdict::StableLocally;
-        certificate.longest_period_s = detail::longest_period(lines, certificate.bounds, scheme, device);
+        certificate.longest_period_s = detail::longest_period(lines, bounds, scheme, device);
     }
     certificate.why = detail::reason(lines, certificate.verdict);
     certificate.inequalities = std::move(lines);
@@ -250,7 +233,7 @@ namespace detail {
     const double limit =
         has_mass(scheme.structure) ? std::numeric_limits<double>::infinity() : device.force_limit;
     ForceBounds bounds = rendered_bounds(force_bounds(model, scheme.play_radius, limit), scheme);
-    if (scheme.structure == StructureKind::EnergyConsistent && model.hysteresis() != nullptr) {
+    if (traits_of(scheme.structure).keeps_loss && model.hysteresis() != nullptr) {
         bounds.mean_force = detail::mean_push({model.hysteresis()->force(), nullptr, bounds.sliding}, limit);
     }
     return bounds;

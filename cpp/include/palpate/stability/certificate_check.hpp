@@ -6,7 +6,8 @@
 #include <cstddef>
 #include <stdexcept>
 #include <string>
-#include <tuple>
+#include <string_view>
+#include <type_traits>
 
 #include "palpate/model/force_model.hpp"
 #include "palpate/stability/certificate.hpp"
@@ -30,28 +31,19 @@ namespace detail {
 /// A bound that is stored must hold for the model; it may be wider than what is computed today, because an older
 /// release bounded less sharply and what it proved is still true.
 [[nodiscard]] inline std::string tighter_than_true(const ForceBounds& stored, const ForceBounds& now) {
-    const auto sentence = [](const char* name, double bound, const char* side, double true_bound) {
-        return std::string("certificate.bounds.") + name + " is " + readable(bound) + ": must be " + side +
-               " " + readable(true_bound) + ", which is what model and device give; plan it again";
-    };
-    for (const auto& [name, left, right] : {std::tuple{"slope_min", stored.slope.lower, now.slope.lower},
-                                            {"loss_min", stored.loss.lower, now.loss.lower}}) {
-        if (!(left <= right || agree(left, right))) {
-            return sentence(name, left, "at most", right);
+    std::string wrong;
+    for_each_field<ForceBounds>([&](const auto& field) {
+        const auto bound = static_cast<double>(field.of(stored));
+        const auto true_bound = static_cast<double>(field.of(now));
+        const bool lower = std::string_view{field.name}.ends_with("_min");
+        if (wrong.empty() && !(lower ? bound <= true_bound : bound >= true_bound) &&
+            !agree(bound, true_bound)) {
+            wrong = std::string("certificate.bounds.") + field.name + " is " + readable(bound) +
+                    ": must be " + (lower ? "at most " : "at least ") + readable(true_bound) +
+                    ", which is what model and device give; plan it again";
         }
-    }
-    for (const auto& [name, left, right] : {std::tuple{"slope_max", stored.slope.upper, now.slope.upper},
-                                            {"steepest", stored.steepest, now.steepest},
-                                            {"sliding", stored.sliding, now.sliding},
-                                            {"loss_max", stored.loss.upper, now.loss.upper},
-                                            {"loss_per_play", stored.loss_per_play, now.loss_per_play},
-                                            {"mean_force", stored.mean_force, now.mean_force},
-                                            {"drag", stored.drag, now.drag}}) {
-        if (!(left >= right || agree(left, right))) {
-            return sentence(name, left, "at least", right);
-        }
-    }
-    return "";
+    });
+    return wrong;
 }
 
 [[nodiscard]] inline std::string line_disagrees(const std::string& path, const Inequality& stored,
@@ -74,28 +66,25 @@ namespace detail {
 [[nodiscard]] inline std::string device_difference(const DeviceProfile& certified,
                                                    const DeviceProfile& device) {
     const std::string opening = "the certificate is for the device " + certified.id;
-    if (device.id != certified.id) {
-        return opening + ", and this is " + device.id + "; plan it again for this one";
-    }
-    if (device.position_unit != certified.position_unit) {
-        return opening + " in " + certified.position_unit + ", and here it moves in " + device.position_unit;
-    }
-    for (const auto& [name, before, now] :
-         {std::tuple{"period_s", certified.period_s, device.period_s},
-          {"jitter_s", certified.jitter_s, device.jitter_s},
-          {"inertia", certified.inertia, device.inertia},
-          {"viscous_damping", certified.viscous_damping, device.viscous_damping},
-          {"coulomb_friction", certified.coulomb_friction, device.coulomb_friction},
-          {"encoder_step", certified.encoder_step, device.encoder_step},
-          {"force_step", certified.force_step, device.force_step},
-          {"delay_s", certified.delay_s, device.delay_s},
-          {"force_limit", certified.force_limit, device.force_limit}}) {
-        if (!agree(before, now)) {
-            return opening + " with " + name + " = " + readable(before) + ", and here it is " +
-                   readable(now) + "; plan it again";
+    std::string wrong;
+    for_each_field<DeviceProfile>([&](const auto& field) {
+        const auto& before = field.of(certified);
+        const auto& now = field.of(device);
+        if (!wrong.empty()) {
+            return;
         }
-    }
-    return "";
+        if constexpr (std::is_same_v<decltype(before), const std::string&>) {
+            if (&before == &certified.id && before != now) {
+                wrong = opening + ", and this is " + now + "; plan it again for this one";
+            } else if (before != now) {
+                wrong = opening + " in " + before + ", and here it moves in " + now;
+            }
+        } else if (!agree(before, now)) {
+            wrong = opening + " with " + field.name + " = " + readable(before) + ", and here it is " +
+                    readable(now) + "; plan it again";
+        }
+    });
+    return wrong;
 }
 
 /// Computes a stored certificate again and returns the result, with its texts. The stored sides, verdict and period

@@ -8,10 +8,9 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/dynamics/coupling.hpp"
-#include "palpate/rendering/inertia.hpp"
+#include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/coupling_need.hpp"
 #include "palpate/stability/direct_inequalities.hpp"
-#include "palpate/stability/encoder_gain.hpp"
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/inequality.hpp"
 
@@ -120,7 +119,7 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 [[nodiscard]] inline std::vector<Inequality> massless_inequalities(const ForceBounds& bounds,
                                                                    VirtualCoupling coupling,
                                                                    const DeviceProfile& device) {
-    const double p = coupling.stiffness + coupling.damping / device.period_s;
+    const double p = coupling.load_line_slope(device.period_s);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
     lines.push_back(
@@ -161,8 +160,8 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                                                                    const DeviceProfile& device) {
     const double T = device.period_s;
     const double damped = 2.0 * inertia.damping / T;
-    const double alone = (inertia.damping + inertia.mass / T) / T;
-    const double coupled = coupling.stiffness + coupling.damping / T;
+    const double alone = inertia.load_line_slope(T);
+    const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
     if (detail::limit_acts(device)) {
@@ -197,8 +196,8 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                                                                             const DeviceProfile& device) {
     const double T = device.period_s;
     const bool limited = detail::limit_acts(device);
-    const double alone = (inertia.damping + 2.0 * inertia.mass / T) / T;
-    const double coupled = coupling.stiffness + coupling.damping / T;
+    const double alone = inertia.midpoint_slope(T);
+    const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
     lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
@@ -208,6 +207,22 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                      "docs/certificate.md", true});
     detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     return lines;
+}
+
+[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    return massless_inequalities(bounds, scheme.coupling, device);
+}
+
+[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
+}
+
+[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
+                                                          const ForceBounds& bounds, const Scheme& scheme,
+                                                          const DeviceProfile& device) {
+    return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
 }
 
 }  // namespace palpate

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
+#include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/held_force.hpp"
 #include "palpate/stability/inequality.hpp"
@@ -117,6 +118,20 @@ namespace detail {
                     " + B_v T / period"),
             detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.drag / device.period_s, 0.0,
                                         "L_x Delta / 2 + B_v Delta / T")};
+}
+
+[[nodiscard]] inline std::vector<Inequality> inequalities(DirectStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    if (bounds.drag > 0.0) {
+        std::vector<Inequality> lines = velocity_inequalities(bounds, device);
+        if (scheme.predict > 0) {
+            lines.push_back({"velocity-prediction", "prediction of a force of velocity", "B_v = 0", 0.0,
+                             bounds.drag, Basis::None, "docs/certificate.md"});
+        }
+        return lines;
+    }
+    return bounds.hysteresis ? hysteresis_inequalities(bounds, device, scheme.predict)
+                             : direct_inequalities(bounds, device, scheme.predict);
 }
 
 }  // namespace palpate

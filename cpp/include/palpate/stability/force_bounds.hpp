@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <tuple>
 #include <utility>
 
+#include "palpate/fields/field_table.hpp"
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/stability/limited_mean.hpp"
@@ -17,14 +19,14 @@ namespace palpate {
 /// Proved bounds of a model over every position that can be reached, continuations included. For a force with
 /// hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h/r more while it sticks.
 struct ForceBounds {
+    Interval slope;
+    double steepest = 0.0;
+    double sliding = 0.0;
+    Interval loss;
+    double loss_per_play = 0.0;
+    double mean_force = 0.0;
+    double drag = 0.0;
     bool hysteresis = false;
-    Interval slope;              ///< of every path: f', or g' - |h'| to g' + |h'| + h/r
-    double steepest = 0.0;       ///< L = max |f'|, or max(|g'| + |h'| + h/r)
-    double sliding = 0.0;        ///< max |f'|, or max(|g'| + |h'|); of all velocities
-    Interval loss;               ///< h; 0 without hysteresis
-    double loss_per_play = 0.0;  ///< max h/r
-    double mean_force = 0.0;     ///< what the limited force pushes on average over a period, beyond its loss
-    double drag = 0.0;           ///< B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone
 
     /// M = max(0, max f'); NaN stays NaN
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
@@ -35,14 +37,31 @@ struct ForceBounds {
     [[nodiscard]] double play_radius() const noexcept {
         return loss_per_play > 0.0 ? loss.upper / loss_per_play : std::numeric_limits<double>::infinity();
     }
-
-    /// Whether every bound is a number. Nothing is certified of one that is not.
-    [[nodiscard]] bool finite() const noexcept {
-        return std::isfinite(slope.lower) && std::isfinite(slope.upper) && std::isfinite(steepest) &&
-               std::isfinite(sliding) && std::isfinite(loss.lower) && std::isfinite(loss.upper) &&
-               std::isfinite(loss_per_play) && std::isfinite(mean_force) && std::isfinite(drag);
-    }
 };
+
+template <>
+inline constexpr auto fields_of<ForceBounds> = std::tuple{
+    Field<&ForceBounds::slope, &Interval::lower>{"slope_min", "Of every path: min f', or min(g' - |h'|)."},
+    Field<&ForceBounds::slope, &Interval::upper>{"slope_max",
+                                                 "Of every path: max f', or max(g' + |h'| + h/r)."},
+    Field<&ForceBounds::steepest>{"steepest", "L = max |f'|, or max(|g'| + |h'| + h/r)."},
+    Field<&ForceBounds::sliding>{"sliding", "max |f'|, or max(|g'| + |h'|); of all velocities."},
+    Field<&ForceBounds::loss, &Interval::lower>{"loss_min", "Smallest h; 0 without hysteresis."},
+    Field<&ForceBounds::loss, &Interval::upper>{"loss_max", "Largest h; 0 without hysteresis."},
+    Field<&ForceBounds::loss_per_play>{"loss_per_play", "max h/r"},
+    Field<&ForceBounds::mean_force>{"mean_force",
+                                    "Mean of a limited force that repeats over its period, beyond its loss."},
+    Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone.",
+                              Rule::NotNegative},
+    Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
+
+/// True if every bound is a number. Nothing is certified of one that is not.
+[[nodiscard]] inline bool finite(const ForceBounds& bounds) noexcept {
+    bool all = true;
+    for_each_field<ForceBounds>(
+        [&](const auto& field) { all = all && std::isfinite(static_cast<double>(field.of(bounds))); });
+    return all;
+}
 
 /// The slope K_c k / (K_c + k) that is felt through a coupling where the object's is k > -K_c.
 [[nodiscard]] inline double felt_slope(double slope, double coupling_stiffness) noexcept {

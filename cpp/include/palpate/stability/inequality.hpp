@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <tuple>
+#include <vector>
 
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate {
 
@@ -19,30 +21,47 @@ enum class Basis : std::uint8_t {
     None,    ///< no bound is known beyond this one; what lies beyond is refused
 };
 
-inline constexpr std::array<std::string_view, 3> basis_names{"proved", "linear", "none"};
-
-[[nodiscard]] constexpr std::string_view name_of(Basis basis) noexcept {
-    return basis_names[static_cast<std::size_t>(basis)];
-}
+template <>
+inline constexpr auto words_of<Basis> = std::array<std::string_view, 3>{"proved", "linear", "none"};
 
 /// One line of a certificate: left >= right, or left > right where it is strict.
 struct Inequality {
-    std::string id;       ///< stable name, compared when a certificate is checked; texts are not
-    std::string name;     ///< subject in words
-    std::string formula;  ///< in the symbols of docs/certificate.md
-    double left = 0.0;    ///< what there is
-    double right = 0.0;   ///< what is needed
+    std::string id;
+    std::string name;
+    std::string formula;
+    double left = 0.0;
+    double right = 0.0;
     Basis rests_on = Basis::Proved;
     std::string source;
     bool strict = false;
 
     [[nodiscard]] double margin() const noexcept { return left - right; }
 
+    /// The margin as a share of the left side.
+    [[nodiscard]] double reserve() const noexcept { return margin() / std::abs(left); }
+
     /// Never for a side that is not a number.
     [[nodiscard]] bool holds() const noexcept {
         return std::isfinite(left) && std::isfinite(right) && (strict ? left > right : left >= right);
     }
 };
+
+template <>
+inline constexpr auto fields_of<Inequality> = std::tuple{
+    Field<&Inequality::id>{"id", "Stable name, compared when a certificate is checked; texts are not."},
+    Field<&Inequality::left>{"left", "What there is."},
+    Field<&Inequality::right>{"right", "What is needed."},
+    Field<&Inequality::name>{"name", "Subject in words.", Rule::Any, false},
+    Field<&Inequality::formula>{"formula", "In the symbols of docs/certificate.md.", Rule::Any, false},
+    Field<&Inequality::rests_on>{
+        "rests_on", "proved, linear (the linearised system only) or none (no bound is known beyond).",
+        Rule::Any, false},
+    Field<&Inequality::source>{"source", "Where the proof stands.", Rule::Any, false},
+    Field<&Inequality::strict>{"strict", "True if both sides must differ.", Rule::Any, false}};
+
+[[nodiscard]] inline bool all_hold(const std::vector<Inequality>& lines) noexcept {
+    return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+}
 
 /// "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a known bound has its
 /// cure as source.

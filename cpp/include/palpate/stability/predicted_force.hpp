@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
-#include "palpate/rendering/predicted.hpp"
+#include "palpate/rendering/direct.hpp"
 #include "palpate/stability/held_force.hpp"
 
 namespace palpate {

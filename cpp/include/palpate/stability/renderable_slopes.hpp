@@ -44,9 +44,8 @@ template <class Holds>
     bounds.sliding = sliding.steepest();
     bounds.steepest = bounds.sliding + stick;
     bounds.loss_per_play = stick;
-    const std::vector<Inequality> lines =
-        stick > 0.0 ? hysteresis_inequalities(bounds, device) : direct_inequalities(bounds, device);
-    return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+    return all_hold(stick > 0.0 ? hysteresis_inequalities(bounds, device)
+                                : direct_inequalities(bounds, device));
 }
 
 /// Above every slope that matters, far below where numbers end.
@@ -103,7 +102,7 @@ template <class Holds>
         bounds.slope.upper += bounds.loss_per_play;
         bounds.steepest = sliding.sliding + bounds.loss_per_play;
         const std::vector<Inequality> lines = hysteresis_inequalities(bounds, device);
-        return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
+        return all_hold(lines);
     };
     if (least > 0.0 && holds(least)) {
         return least;

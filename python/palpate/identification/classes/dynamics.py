@@ -199,8 +199,8 @@ class Dynamics:
         notes = []
         if not settled and "damping" in allowed and (spread := self._spread_of_speeds()) < LEAST_SPREAD:
             notes.append(
-                f"damping was not tested: the speed was nearly constant (varies by {100 * spread:.2g} %), so that "
-                "damping and hysteresis look alike; record slow and fast strokes"
+                f"damping was not tested: the speed was nearly constant (varies by {100 * spread:.2g} %), so "
+                "that damping and hysteresis look alike; record slow and fast strokes"
             )
             allowed = tuple(name for name in allowed if name != "damping")
         choices = [
@@ -233,13 +233,14 @@ class Dynamics:
             share, error = regression.held_out_gain(use, without, with_it)
             found = dict(zip(with_it, regression.solved(use, with_it), strict=True))[name]
             way = "falls" if share > 0.0 else "rises"
-            fresh = f"the squared error on held-out stretches {way} by {100 * abs(share):.3g} +- {100 * error:.2g} %"
+            fresh = f"the squared error on held-out stretches {way} by {100 * abs(share):.3g} "
+                f"+- {100 * error:.2g} %"
             if share > error and found > 0.0:
-                notes.append(f"{name} accepted: {changes}, {fresh}")
+                notes.append(f"{name} accepted: {changes}, {measured}")
                 continue
             names = tuple(other for other in names if other != name)
             notes.append(
-                f"{name} refused: {changes}, but {fresh if found > 0.0 else f'it would be {found:.4g}'}"
+                f"{name} refused: {changes}, but {measured if found > 0.0 else f'it would be {found:.4g}'}"
             )
         return Terms(*_values(regression.solved(use, names), names), use, tuple(notes))
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
+from ...verdict import FORCE_FLOOR, FORCE_JND
 
 EVERY = 5
 """One row of so many is kept back."""
@@ -21,12 +22,6 @@ TRIM = 0.1
 
 MOST_ROWS = 20_000
 """More fresh rows than this are thinned out evenly: they tell no more."""
-
-FORCE_JND = 0.07
-"""Weber fraction of force: a smaller difference is not felt."""
-
-FORCE_FLOOR = 0.01
-"""Share of the largest force below which a difference is not felt either."""
 
 
 @dataclass(frozen=True)

@@ -216,12 +216,9 @@ class UsbConnection {
             return refuse("does not say what it is (GET_INFO)", moved);
         }
         wire::Info info;
-        const wire::Decoded decoded =
-            wire::decode(std::span{bytes}.first(static_cast<std::size_t>(moved)), info);
-        if (decoded != wire::Decoded::Ok) {
-            reasons.push_back(name.text() +
-                              " is 1209:0001 but not of this protocol: its answer to GET_INFO " +
-                              wire::decoded_texts[static_cast<std::size_t>(decoded)]);
+        const std::string fault = wire::decode(std::span{bytes}.first(static_cast<std::size_t>(moved)), info);
+        if (!fault.empty()) {
+            reasons.push_back(name.text() + " is 1209:0001 but not of this protocol: " + fault);
             return;
         }
         fitting.push_back({std::move(handle), name, info});

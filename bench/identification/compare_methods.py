@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures error, parameters and time of palpate and other methods on P1 to P6.
+
+python bench/identification/compare_methods.py [P1 ...] [--draws 12] [--json FILE] [--only NAME ...]
+
+Each draw has different positions and noise. Numbers are medians of the draws; error, wavelets and parameters
+have their range beside them. All methods take their turn in every draw, so a busy machine slows all of them;
+the slowest take part in the first draws only. "over ours" is a method's fit and tuning time over palpate's
+whole time, median of the draws.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.methods import METHODS, Fitted, Method
+from bench.identification.problems import NAMES, TITLES, Problem, problem
+from bench.studies import SCALE, count, write_results
+
+OURS = METHODS[0].name
+
+SLOW = 5.0
+"""A method that takes this many times as long as palpate takes part in the first FEW draws only."""
+
+FEW = 3
+
+
+def skipped(method: Method, rows: Problem) -> str | None:
+    """Returns the reason why a method does not take part in a problem, or None."""
+    if rows.X.shape[1] not in method.inputs:
+        return "one input only"
+    if len(rows.y) > method.most_rows:
+        return f"takes too long with {len(rows.y)} rows"
+    return None
+
+
+def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
+    """Returns medians and ranges over the draws for each method, or the reason why it was skipped."""
+    found: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
+    reasons: dict[str, str] = {}
+    for draw in range(wanted):
+        rows = problem(name, draw)
+        for method in methods:
+            if (reason := reasons.get(method.name) or skipped(method, rows)) is not None:
+                reasons[method.name] = reason
+                continue
+            if _sits_out(found[method.name], found.get(OURS)):
+                continue
+            try:
+                fitted = method.fit(rows.X, rows.y)
+            except ImportError as missing:
+                reasons[method.name] = f"needs {missing.name}"
+                continue
+            found[method.name].append((rows.nrmse(fitted.predict(rows.X_test)), fitted))
+    return [
+        {"problem": name, "method": method.name, "skipped": reasons[method.name]}
+        if method.name in reasons
+        else {"problem": name, "method": method.name, **_medians(found[method.name], found.get(OURS))}
+        for method in methods
+    ]
+
+
+def _sits_out(theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None) -> bool:
+    """True if a method is so slow that it takes part in the first draws only."""
+    return len(theirs) >= FEW and ours is not None and _medians(theirs, ours)["over_ours"] > SLOW
+
+
+def _medians(
+    theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None
+) -> dict[str, Any]:
+    over = [each.seconds / own.seconds for (_, each), (_, own) in zip(theirs, ours or theirs, strict=False)]
+    errors = [error for error, _ in theirs]
+    sizes = [each.n_parameters for _, each in theirs]
+    wavelets = [each.n_wavelets for _, each in theirs if each.n_wavelets is not None]
+    return {
+        "nrmse": median(errors),
+        "nrmse_range": [min(errors), max(errors)],
+        "n_parameters": int(median(sizes)),
+        "n_parameters_range": [min(sizes), max(sizes)],
+        "n_wavelets": int(median(wavelets)) if wavelets else None,
+        "n_wavelets_range": [min(wavelets), max(wavelets)] if wavelets else None,
+        "fit_s": median(each.fit_seconds for _, each in theirs),
+        "tuning_s": median(each.tuning_seconds for _, each in theirs),
+        "over_ours": median(over),
+        "setting": theirs[0][1].setting,
+        "draws": len(theirs),
+    }
+
+
+def line(row: dict[str, Any]) -> str:
+    if "skipped" in row:
+        return f"{row['method']:28}  {row['skipped']}"
+    low, high = row["nrmse_range"]
+    return (
+        f"{row['method']:28}{row['nrmse']:10.2e}{f'{low:.2e} to {high:.2e}':>23}"
+        f"{_sized(row, 'n_wavelets'):>16}{_sized(row, 'n_parameters'):>16}{row['fit_s']:9.3f}"
+        f"{row['tuning_s']:10.2f}{row['over_ours']:11.2f}{row['draws']:7d}  {row['setting']}"
+    )
+
+
+def _sized(row: dict[str, Any], key: str) -> str:
+    """Returns median and range of a count."""
+    if row[key] is None:
+        return ""
+    low, high = row[f"{key}_range"]
+    return f"{row[key]} ({low} to {high})"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    chosen = NAMES if SCALE >= 0.1 else ("P1", "P4")
+    parser.add_argument("problems", nargs="*", default=list(chosen), metavar="P1 ...")
+    parser.add_argument("--draws", type=int, default=count(12))
+    parser.add_argument("--only", nargs="*", default=None, help="names of methods")
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    methods = [each for each in METHODS if not options.only or each.name in options.only]
+    results = []
+    with threadpool_limits(limits=1):
+        for name in options.problems:
+            print(f"\n{name}: {TITLES[name]}")
+            print(
+                f"{'':28}{'nrmse':>10}{'range':>23}{'wavelets':>16}{'parameters':>16}{'fit s':>9}"
+                f"{'tuning s':>10}{'over ours':>11}{'draws':>7}  setting",
+                flush=True,
+            )
+            rows = measured(name, options.draws, methods)
+            results.extend(rows)
+            print("\n".join(map(line, rows)), flush=True)
+            write_results(options.json, results)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures published dynamic benchmarks, one step ahead and in free run, beside published figures.
+
+python bench/identification/dynamic.py [SET ...] [--json FILE]     PALPATE_DATA names the folder of recordings
+
+"physical": input force = m a + f(position) or m a + f(velocity), solved for the motion. "black box": the
+next output from the last outputs and inputs. In free run only the first outputs are measured. Published
+figures are free runs; where our rows are not theirs, the line says "other rows".
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+from threadpoolctl import threadpool_limits
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.lagged import SWEEPS, Lagged
+from bench.studies import SCALE, write_results
+
+from palpate import WaveletNetworkRegressor
+
+Array = NDArray[np.float64]
+
+PUBLISHED = ("LTI SS", "polynomial NARX", "best known (SOTA row)")
+"""Printed rows of the table: a linear model, a black box, and the best."""
+
+DRIVE_MASS = 90.0
+"""Start of the search for the mass of the drive [kg]."""
+
+SUBSTEPS = 10
+"""Steps of a sample period in the simulation of the drive."""
+
+
+@dataclass(frozen=True)
+class Set:
+    """Name, unit and rows of one benchmark."""
+
+    name: str
+    unit: str
+    factor: float = 1.0
+    """Factor from the unit of the file"""
+    skip: int = 0
+    """First rows of a test that are not scored"""
+    comparable: bool = True
+    """True if the published figures are of the same rows"""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Errors of one model on one test set."""
+
+    benchmark: str
+    test_set: str
+    form: str
+    n_parameters: int
+    one_step: float
+    free_run: float
+    unit: str
+    comparable: bool
+    published: str = ""
+
+
+def rms(error: Array) -> float:
+    """Returns the RMS; NaN if a free run diverged."""
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def scored(
+    kind: Set,
+    form: str,
+    model: Lagged,
+    estimation: tuple[Array, Array],
+    tests: Mapping[str, tuple[Array, Array]],
+) -> list[Row]:
+    model.fit(*estimation)
+    rows = []
+    for test_set, (u, y) in tests.items():
+        measured = y[model.start :]
+        errors = [way(u, y) - measured for way in (model.one_step, model.free_run)]
+        one, free = (kind.factor * rms(error[kind.skip :]) for error in errors)
+        rows.append(Row(kind.name, test_set, form, model.n_parameters, one, free, kind.unit, kind.comparable))
+    return rows
+
+
+def silverbox(folder: Path) -> list[Row]:
+    """An electronic oscillator with a cubic spring. The amplitude of the arrow exceeds that of the data."""
+    table = pd.read_csv(folder / "silverbox" / "silverbox_snls80mv.csv")
+    u, y = table.input_V1_V.to_numpy(), table.output_V2_V.to_numpy()
+    multisine, last = slice(40_650, 127_410), 8_700
+    data = (u[multisine][:-last][:30_000], y[multisine][:-last][:30_000])
+    tests = {
+        "multisine": (u[multisine][-last:], y[multisine][-last:]),
+        "arrow no extrapolation": (u[:30_000], y[:30_000]),
+        "arrow full": (u[:40_650], y[:40_650]),
+    }
+    kind = Set("silverbox", "mV", 1e3, 50)
+    return [
+        *scored(kind, "physical", Lagged(3, 3, (0,)), data, tests),
+        *scored(kind, "black box", Lagged(3, 2, None), data, tests),
+    ]
+
+
+def cascaded_tanks(folder: Path) -> list[Row]:
+    table = pd.read_csv(folder / "sysid_benchmarks" / "cascaded_tanks.csv")
+    data, test = (
+        (rows.pump_voltage_V.to_numpy(), rows.level_sensor_V.to_numpy())
+        for rows in (table[table.split == "estimation"], table[table.split != "estimation"])
+    )
+    kind = Set("cascaded_tanks", "V")
+    return [
+        *scored(kind, "linear + f(level)", Lagged(3, 3, (0,)), data, {"test": test}),
+        *scored(kind, "black box", Lagged(2, 3, None), data, {"test": test}),
+    ]
+
+
+def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
+    """Returns the study of a file without a published split: fitted on one half, tested on the other."""
+
+    def rows(folder: Path) -> list[Row]:
+        table = pd.read_csv(folder / "sysid_benchmarks" / file)
+        u, y = table[inputs].to_numpy(dtype=float), table[output].to_numpy(dtype=float)
+        half = len(y) // 2
+        data, tests = (u[:half], y[:half]), {"second half": (u[half:], y[half:])}
+        kind = Set(name, "data units", comparable=False)
+        return [
+            *scored(kind, "linear + f(output)", Lagged(lags, lags, (0,)), data, tests),
+            *scored(kind, "black box", Lagged(lags, lags, None), data, tests),
+        ]
+
+    return rows
+
+
+def emps(folder: Path) -> list[Row]:
+    """Identifies force = m a + f(velocity) of a drive, then simulates the motion from the force.
+
+    The force is the motor's, in both files the same multiple of its voltage. The second file tells of pulses
+    beside it, the first has none: whether the voltage holds them is decided by the drive's controller.
+    """
+    files = {"estimation": "emps_estimation_250hz.csv", "test": "emps_validation_pulses_250hz.csv"}
+    tables = {name: pd.read_csv(folder / "sysid_benchmarks" / file) for name, file in files.items()}
+    learned = tables["estimation"]
+    period = float(np.median(np.diff(learned.time_s)))
+    x = learned.position_m.to_numpy()
+    force, velocity, acceleration = (
+        smooth(learned.motor_force_N.to_numpy(), period, 0),
+        smooth(x, period, 1),
+        smooth(x, period, 2),
+    )
+    mass, friction = DRIVE_MASS, WaveletNetworkRegressor(max_wavelets=16)
+    for _ in range(SWEEPS):
+        friction.fit(velocity[:, None], force - mass * acceleration)
+        left = force - friction.predict(velocity[:, None])
+        mass = float(acceleration @ left / (acceleration @ acceleration))
+    rows = []
+    for test_set, table in tables.items():
+        x, driven = table.position_m.to_numpy(), table.motor_force_N.to_numpy()
+        if "pulse_force_N" in table and not holds_pulses(learned, table, period):
+            driven = driven + table.pulse_force_N.to_numpy()
+        v = smooth(x, period, 1)
+        a = (driven - friction.predict(v[:, None])) / mass
+        ahead = x[:-1] + v[:-1] * period + 0.5 * period**2 * a[:-1]
+        free = simulated(driven, x[0], mass, friction.network_.force, period)
+        one_step, free_run = 1e3 * rms(ahead - x[1:]), 1e3 * rms(free - x)
+        n_parameters = friction.n_parameters_ + 1
+        rows.append(Row("emps", test_set, "physical", n_parameters, one_step, free_run, "mm", False))
+    return rows
+
+
+def holds_pulses(learned: pd.DataFrame, table: pd.DataFrame, period: float) -> bool:
+    """True if the voltage of the motor rises with the pulses beyond the command of the controller.
+
+    The controller, voltage over position error and both velocities, is fitted to the file without pulses; no
+    model of the motion is asked. Pulses that act on the drive from outside leave its law as it is.
+    """
+
+    def wanted(rows: pd.DataFrame) -> Array:
+        goal, x = rows.reference_position_m.to_numpy(), rows.position_m.to_numpy()
+        return np.column_stack([goal - x, smooth(goal, period, 1), smooth(x, period, 1), np.ones(len(x))])
+
+    law = np.linalg.lstsq(wanted(learned), learned.motor_voltage_V.to_numpy(), rcond=None)[0]
+    beyond = table.motor_voltage_V.to_numpy() - wanted(table) @ law
+    pulses = table.pulse_force_N.to_numpy()
+    share = float(np.polyfit(pulses, beyond, 1)[0])
+    print(f"{'':20}pulses stand in the motor's voltage with {share:.2f} V of each unit", flush=True)
+    return share > 0.5
+
+
+def smooth(signal: Array, period: float, derivative: int) -> Array:
+    """Returns the signal or its derivative, smoothed by cubics over 0.1 s."""
+    return np.asarray(savgol_filter(signal, 25, 3, deriv=derivative, delta=period))
+
+
+def simulated(
+    force: Array, start: float, mass: float, friction: Callable[[float], float], period: float
+) -> Array:
+    """Solves m dv/dt = F - f(v) by semi-implicit Euler steps."""
+    position, velocity, result, step = start, 0.0, np.empty(len(force)), period / SUBSTEPS
+    for k, held in enumerate(force):
+        result[k] = position
+        for _ in range(SUBSTEPS):
+            velocity += step * (held - float(friction(velocity))) / mass
+            position += step * velocity
+    return result
+
+
+SETS: dict[str, Callable[[Path], list[Row]]] = {
+    "silverbox": silverbox,
+    "cascaded_tanks": cascaded_tanks,
+    "emps": emps,
+    "coupled_drives": halves("coupled_drives", "coupled_drives_prbs_amp1.csv", "input_V", "speed_out", 3),
+    "ball_and_beam": halves("ball_and_beam", "ball_and_beam.csv", "beam_angle", "ball_position", 2),
+    "flexible_robot_arm": halves(
+        "flexible_robot_arm", "flexible_robot_arm.csv", "reaction_torque", "acceleration", 4
+    ),
+}
+
+
+def with_published(folder: Path, row: Row) -> Row:
+    """Returns the row with the published figures of its test set, if there are any."""
+    table = pd.read_csv(folder / "sysid_benchmarks" / "published_results.csv")
+    rows = table[(table.benchmark == row.benchmark) & (table.test_set == row.test_set)]
+    found = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value
+    told = ", ".join(f"{name} {found[name]}" for name in PUBLISHED if name in found.index)
+    if told and not row.comparable:
+        told = f"other rows: {told}"
+    return Row(**{**asdict(row), "published": told})
+
+
+def line(row: Row) -> str:
+    free = "diverges" if np.isnan(row.free_run) else f"{row.free_run:.4g}"
+    return (
+        f"{row.benchmark:20}{row.test_set:24}{row.form:20}{row.n_parameters:10d}{row.one_step:11.4g}"
+        f"{free:>11}  {row.unit:12}{row.published}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    chosen = SETS if SCALE >= 0.1 else ("cascaded_tanks",)
+    parser.add_argument("sets", nargs="*", default=list(chosen), metavar="SET ...")
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    place = os.environ.get("PALPATE_DATA")
+    if place is None or not Path(place).is_dir():
+        print("skipped: needs measured data, set PALPATE_DATA")
+        return
+    print(
+        f"{'RMSE':20}{'test set':24}{'form':20}{'parameters':>10}{'one step':>11}{'free run':>11}  "
+        f"{'unit':12}published, free run"
+    )
+    rows: list[Row] = []
+    with threadpool_limits(limits=1):
+        for name in options.sets:
+            for row in SETS[name](Path(place)):
+                rows.append(with_published(Path(place), row))
+                print(line(rows[-1]), flush=True)
+    write_results(options.json, [asdict(row) for row in rows])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draws error over size and over time beside the other methods, from the JSON files of `make bench`.
+
+python bench/identification/figures.py build/bench --to docs
+
+Draws identification-parameters.png, identification-time.png and identification-filters.png to FOLDER/figures.
+Writes the tables of FOLDER/identification.md if that page exists. A study that did not run keeps its table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullLocator
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.studies import fill_tables, markdown_table
+
+from palpate.cli.figures import figure_file
+from palpate.cli.output import number
+from palpate.plotting.look import grid
+
+ANY_SIGN, EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"
+"""Suffixes of sets that are another set, fitted or read with other options."""
+
+LIMIT = 1.3
+"""A file is counted if its error is more than this many times that of its splines."""
+
+LOOKS = (
+    ("o", "black"),
+    ("s", "0.55"),
+    ("D", "0.55"),
+    *((marker, "white") for marker in "^v<>pP*Xhd8"),
+)
+"""Marker and filling: palpate, its selection alone, its quasi-Newton refinement, then the other methods."""
+
+DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
+
+Row = Mapping[str, Any]
+
+
+def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
+    """Returns the results of NAME.py and where they were measured; None if it did not run."""
+    path = folder / f"{name}.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        where = content["where"]
+        measured = (
+            f"{where['date']}, {where['machine']}, load {where['load']:g}, Python {where['python']}, "
+            f"commit {where['commit']}"
+        )
+        if where["scale"] < 1.0:
+            measured += f", scale {where['scale']:g}: not for comparison"
+        return content["results"], measured
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SystemExit(
+            f"{path} is no output of bench/identification/{name}.py ({error!r}); make bench writes it"
+        ) from None
+
+
+def problems(rows: Sequence[Row]) -> str:
+    """Returns medians for each problem and method, with the range over the draws in parentheses."""
+    return markdown_table(
+        (
+            "problem, method",
+            "NRMSE",
+            "wavelets",
+            "parameters",
+            "fit [s]",
+            "tuning [s]",
+            "time over ours",
+            "draws",
+        ),
+        [
+            (
+                f"{row['problem']}, {row['method']}",
+                with_range(row, "nrmse", ".2e"),
+                with_range(row, "n_wavelets", "d"),
+                with_range(row, "n_parameters", "d"),
+                number(row["fit_s"]),
+                number(row["tuning_s"]),
+                f"{row['over_ours']:.3g}",
+                str(row["draws"]),
+            )
+            for row in rows
+            if "nrmse" in row
+        ],
+    )
+
+
+def with_range(row: Row, key: str, form: str) -> str:
+    """Returns median and range of a value; empty for a method without it."""
+    if row[key] is None:
+        return ""
+    low, high = row[f"{key}_range"]
+    return f"{row[key]:{form}} ({low:{form}} to {high:{form}})"
+
+
+def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
+    """Returns medians over the files of each set of recordings, for each method."""
+    lines = []
+    for name, files in sets.items():
+        good = [row for row in files if "nrmse" in row]
+        if not good:
+            continue
+        ratios = worst(good, "splines"), worst(good, "passive_splines")
+        lines.append(set_row(f"{name} ({len(good)} files), palpate", good, ratios))
+        for baseline in dict.fromkeys(key for row in good for key in row["baselines"]):
+            theirs = [row["baselines"][baseline] for row in good if baseline in row["baselines"]]
+            finite = [each for each in theirs if each["nrmse"] is not None and math.isfinite(each["nrmse"])]
+            of = "" if len(finite) == len(good) else f" ({len(finite)} files)"
+            if finite:
+                lines.append(set_row(f"{name}, {baseline}{of}", finite, ("", "")))
+    over = "worst file over its splines", "over splines with h >= 0"
+    return markdown_table(("recordings, method", "NRMSE", "parameters", "s a file", *over), lines)
+
+
+def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
+    """Returns one row for each file of the sets that were also fitted with other options."""
+    lines = []
+    for name, files in sets.items():
+        variants = [
+            {row["file"]: row for row in sets[other]}
+            for other in (name + ANY_SIGN, name + EARLIER)
+            if other in sets
+        ]
+        if len(variants) == 2:
+            lines += [crossing_row(row, *(each.get(row["file"], {}) for each in variants)) for row in files]
+    header = (
+        "file",
+        "palpate",
+        "h of any sign",
+        "splines",
+        "splines, h >= 0",
+        "floor",
+        "at the turn",
+        "25 ms earlier: palpate",
+        "splines",
+    )
+    return markdown_table(header, lines)
+
+
+def crossing_row(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
+    def error(of: Row | None) -> str:
+        return f"{of['nrmse']:.4f}" if of and "nrmse" in of else ""
+
+    return (
+        row["file"],
+        error(row),
+        error(any_sign),
+        error(row.get("splines")),
+        error(row.get("passive_splines")),
+        f"{row['floor']:.4f}" if "floor" in row else "",
+        f"{100 * row['share_at_turn']:.0f} %" if "share_at_turn" in row else "",
+        error(earlier),
+        error(earlier.get("splines")),
+    )
+
+
+def worst(files: Sequence[Row], splines: str) -> str:
+    """Returns the largest ratio of a model's error to that of its splines, and the number above the limit."""
+    pairs = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
+    ratios = [own / theirs for own, theirs in pairs if theirs is not None and theirs > 0]
+    if not ratios:
+        return ""
+    over = sum(ratio > LIMIT for ratio in ratios)
+    return f"{max(ratios):.2f}" + (f" ({over} above {LIMIT:g})" if over else "")
+
+
+def set_row(name: str, each: Sequence[Row], worst: tuple[str, str]) -> tuple[str, ...]:
+    return (
+        name,
+        f"{median(row['nrmse'] for row in each):.4f}",
+        f"{median(row['n_parameters'] for row in each):.0f}",
+        number(median(row["seconds"] for row in each)),
+        *worst,
+    )
+
+
+def counts(rows: Sequence[Row]) -> str:
+    return markdown_table(
+        ("claim", "right", "of"), [(row["claim"], str(row["right"]), str(row["draws"])) for row in rows]
+    )
+
+
+def dynamic(rows: Sequence[Row]) -> str:
+    return markdown_table(
+        ("benchmark, test set, form", "parameters", "one step", "free run", "unit", "published, free run"),
+        [
+            (
+                f"{row['benchmark']}, {row['test_set']}, {row['form']}",
+                str(row["n_parameters"]),
+                number(row["one_step"]),
+                "diverges" if math.isnan(row["free_run"]) else number(row["free_run"]),
+                row["unit"],
+                row["published"] or ("" if row["comparable"] else "other rows than ours"),
+            )
+            for row in rows
+        ],
+    )
+
+
+def speeds(rows: Sequence[Row]) -> str:
+    return markdown_table(
+        ("NRMSE of f, the hand up to", *(f"{hz:g} Hz" for hz in rows[0]["fastest_hz"])),
+        [(row["way"], *(f"{error:.2e}" for error in row["nrmse"])) for row in rows],
+    )
+
+
+TABLES: Mapping[str, Callable[[Any], str]] = {
+    "real_data": measured_objects,
+    "crossing": crossings,
+    "parsimony": counts,
+    "dynamic": dynamic,
+    "filters": speeds,
+}
+"""Tables of studies that may not have run; crossing is the second table of real_data."""
+
+
+def draw_reached(path: Path, rows: Sequence[Row], label: str, spent: Callable[[Row], float]) -> None:
+    """Draws the error of each method over what it spent, one panel per problem; best is at the lower left."""
+    good = [row for row in rows if "nrmse" in row]
+    methods = list(dict.fromkeys(row["method"] for row in good))
+    problems = list(dict.fromkeys(row["problem"] for row in good))
+    lines = math.ceil(len(problems) / 2)
+    with figure_file(path, height_inches=1.0 + 1.2 * lines, rows=[1.0] * lines, columns=2) as panels:
+        for axes, problem in zip(panels, problems, strict=False):
+            of = [row for row in good if row["problem"] == problem]
+            for row in of:
+                marker, filling = LOOKS[methods.index(row["method"]) % len(LOOKS)]
+                axes.plot(
+                    spent(row),
+                    row["nrmse"],
+                    linestyle="none",
+                    marker=marker,
+                    markersize=4.5,
+                    color="black",
+                    markerfacecolor=filling,
+                    markeredgewidth=0.7,
+                    label=row["method"],
+                    clip_on=False,
+                    # palpate is drawn above the others
+                    zorder=3 if filling == "black" else 2,
+                )
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xlim(*decades(spent(row) for row in of))
+            axes.set_ylim(*decades(row["nrmse"] for row in of))
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_major_locator(LogLocator(numticks=9))
+                axis.set_minor_locator(NullLocator())
+            grid(axes)
+            axes.set_title(problem, fontsize=7.0)
+        for axes in panels[len(problems) :]:
+            axes.set_visible(False)
+        for axes in panels[max(0, len(problems) - 2) : len(problems)]:
+            axes.set_xlabel(label)
+        panels[0].figure.supylabel("NRMSE against the truth", fontsize=8.0)
+        draw_legend(panels, methods)
+
+
+def draw_legend(panels: Sequence[Axes], methods: Sequence[str]) -> None:
+    """Draws one legend below all panels."""
+    handles = {
+        name: handle
+        for axes in panels
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    panels[0].figure.legend(
+        handles=[handles[name] for name in methods], frameon=False, loc="outside lower center", ncols=2
+    )
+
+
+def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
+    """Draws the error over the speed of the motion, one line for each way to identify."""
+    with figure_file(path, height_inches=3.4) as (axes,):
+        looks = zip(LOOKS, DASHES, (6.5, 5.5, 4.5, 4.0, 3.5), strict=False)
+        for row, ((marker, filling), dash, size) in zip(rows, looks, strict=False):
+            axes.plot(
+                row["fastest_hz"],
+                row["nrmse"],
+                color="black",
+                linewidth=0.8,
+                linestyle=dash,
+                marker=marker,
+                markersize=size,
+                markerfacecolor=filling,
+                markeredgewidth=0.7,
+                label=row["way"],
+            )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        places = sorted({float(at) for row in rows for at in row["fastest_hz"]})
+        axes.set_xticks(places, [f"{at:g}" for at in places])
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_ylim(*decades(error for row in rows for error in row["nrmse"]))
+        grid(axes)
+        axes.set_xlabel("highest frequency of the hand [Hz]")
+        axes.set_ylabel("NRMSE of f against the truth")
+        axes.figure.legend(frameon=False, loc="outside lower center", ncols=1)
+
+
+def decades(values: Iterable[float]) -> tuple[float, float]:
+    """Returns whole decades that hold all values, at least one."""
+    exponents = [math.log10(value) for value in values]
+    low, high = math.floor(min(exponents)), math.ceil(max(exponents))
+    return 10.0**low, 10.0 ** max(high, low + 1)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="where make bench left its JSON files")
+    parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
+    given = parser.parse_args(arguments)
+    methods = results_of(given.folder, "compare_methods")
+    if methods is None:
+        raise SystemExit(f"{given.folder / 'compare_methods.json'} does not exist; make bench writes it")
+    figures = given.to / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    rows, where = methods
+    draw_reached(
+        figures / "identification-parameters.png", rows, "parameters", lambda row: float(row["n_parameters"])
+    )
+    draw_reached(
+        figures / "identification-time.png",
+        rows,
+        "fit and tuning [s]",
+        lambda row: float(row["fit_s"] + row["tuning_s"]),
+    )
+    draws = max(row["draws"] for row in rows if "nrmse" in row)
+    drawn = f"median (least to largest) of up to {draws} draws"
+    tables = {"compare_methods": f"{problems(rows)}\n{where}; {drawn}\n"}
+    for name, table in TABLES.items():
+        found = results_of(given.folder, "real_data" if name == "crossing" else name)
+        if found is not None:
+            tables[name] = f"{table(found[0])}\n{found[1]}\n"
+            if name == "filters":
+                draw_over_speed(figures / "identification-filters.png", found[0])
+    print(f"wrote the figures of identification to {figures}")
+    fill_tables(given.to / "identification.md", tables)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares the filters of the paper with matched ones on moving objects with known truth.
+
+python bench/identification/filters.py [--json FILE]
+
+The mode of the paper gets the true mass and damping, which it has to assume. The matched one identifies them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.moving import moved
+from bench.studies import count, write_results
+
+from palpate import Model, SearchOptions, identify
+from palpate.recording import sample_force
+from palpate.recording.sample import LOWER, UPPER
+
+MASS, DAMPING = 1e-3, 0.06
+FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Highest frequency of the hand; the lowest is a tenth of it."""
+
+WAYS: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
+    "matched, mass": ({"mass": MASS}, {}),
+    "paper (figure 11), mass": (
+        {"mass": MASS},
+        {"search": SearchOptions(filters="paper-implicit", assumed_mass=MASS)},
+    ),
+    "matched, mass and damping": ({"mass": MASS, "damping": DAMPING}, {}),
+    "paper (figure 13), mass and damping": (
+        {"mass": MASS, "damping": DAMPING},
+        {"search": SearchOptions(filters="paper-explicit", assumed_mass=MASS, assumed_damping=DAMPING)},
+    ),
+}
+"""Mass and damping of the object, and the options of its identification."""
+
+
+def error(there: dict[str, float], options: dict[str, Any], fastest_hz: float, draw: int) -> float:
+    """Returns the NRMSE of the identified f over the visited positions."""
+    recording = moved(draw, seconds=20.0, slowest_hz=fastest_hz / 10.0, fastest_hz=fastest_hz, **there)
+    model = identify(recording, **options)
+    margin = 0.01 * (UPPER - LOWER)
+    x = np.linspace(LOWER + margin, UPPER - margin, 2001)
+    truth = sample_force(x)
+    return float(np.sqrt(np.mean((mean_force(model, x) - truth) ** 2)) / np.std(truth))
+
+
+def mean_force(model: Model, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns f, or the mean of press and release of a model with (wrongly identified) hysteresis."""
+    if not model.hysteretic:
+        return np.asarray(model.force(x))
+    strokes = [np.asarray(model.force(x, direction=np.full(len(x), side))) for side in (1.0, -1.0)]
+    return 0.5 * (strokes[0] + strokes[1])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=count(3))
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    speeds = FASTEST_HZ[-count(len(FASTEST_HZ)) :]
+    print(f"{'nrmse of f, the hand up to [Hz]':38}" + "".join(f"{hz:>10g}" for hz in speeds), flush=True)
+    results = []
+    for name, (there, settings) in WAYS.items():
+        errors = [median(error(there, settings, hz, draw) for draw in range(options.draws)) for hz in speeds]
+        print(f"{name:38}" + "".join(f"{each:10.2e}" for each in errors), flush=True)
+        results.append({"way": name, "fastest_hz": list(speeds), "nrmse": errors})
+    write_results(options.json, results)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Methods as functions of the rows of a problem: (X, y) -> Fitted; settings from a fifth of the rows."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import UnivariateSpline, make_lsq_spline
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
+from sklearn.kernel_ridge import KernelRidge
+from sklearn.linear_model import OrthogonalMatchingPursuit, Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransformer
+
+from palpate import SearchOptions, WaveletNetworkRegressor
+from palpate._core.model import wavelet_columns
+from palpate.identification.network.basis import truncated_frame
+
+Array = NDArray[np.float64]
+Predict = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A method fitted to all rows with its chosen setting."""
+
+    predict: Predict
+    n_parameters: int
+    fit_seconds: float
+    tuning_seconds: float
+    setting: str
+    n_wavelets: int | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Fit and tuning time."""
+        return self.fit_seconds + self.tuning_seconds
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method and the problems that it solves in reasonable time."""
+
+    name: str
+    fit: Callable[[Array, Array], Fitted]
+    inputs: tuple[int, ...] = (1, 2)
+    most_rows: int = 10**9
+
+
+def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
+    """Returns the fit of palpate with some options; it chooses its size by itself and needs no tuning."""
+
+    def fit(X: Array, y: Array) -> Fitted:
+        start = time.perf_counter()
+        network = WaveletNetworkRegressor(**options).fit(X, y)
+        seconds = time.perf_counter() - start
+        return Fitted(network.predict, network.n_parameters_, seconds, 0.0, "", network.n_wavelets_)
+
+    return fit
+
+
+def _tuned(
+    fit: Callable[[Any, Array, Array], tuple[Predict, int]], settings: Iterable[Any], X: Array, y: Array
+) -> Fitted:
+    """Chooses the setting on every fifth row, then fits all rows."""
+    start = time.perf_counter()
+    held = np.arange(len(y)) % 5 == 4
+    scores = []
+    for setting in settings:
+        try:
+            predict, _ = fit(setting, X[~held], y[~held])
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        scores.append((float(np.mean((predict(X[held]) - y[held]) ** 2)), setting))
+    best = min(scores, key=lambda score: score[0])[1]
+    tuned = time.perf_counter()
+    predict, n_parameters = fit(best, X, y)
+    return Fitted(predict, n_parameters, time.perf_counter() - tuned, tuned - start, str(best))
+
+
+def _sorted_means(x: Array, y: Array) -> tuple[Array, Array, Array]:
+    distinct, place, count = np.unique(x, return_inverse=True, return_counts=True)
+    return distinct, np.bincount(place, y) / count, count.astype(float)
+
+
+def lsq_spline(X: Array, y: Array) -> Fitted:
+    def fit(pieces: int, X: Array, y: Array) -> tuple[Predict, int]:
+        order = np.argsort(X[:, 0], kind="stable")
+        x, force = X[order, 0], y[order]
+        inner = np.linspace(x[0], x[-1], pieces + 1)[1:-1]
+        knots = np.r_[(x[0],) * 4, inner, (x[-1],) * 4]
+        spline = make_lsq_spline(x, force, knots, k=3)
+        return lambda at: spline(np.clip(at[:, 0], x[0], x[-1])), len(spline.c)
+
+    return _tuned(fit, (8, 16, 24, 32, 41, 50, 64, 80, 100, 130), X, y)
+
+
+def univariate_spline(X: Array, y: Array) -> Fitted:
+    def fit(share: float, X: Array, y: Array) -> tuple[Predict, int]:
+        x, mean, count = _sorted_means(X[:, 0], y)
+        order = np.argsort(X[:, 0], kind="stable")
+        apart = np.diff(y[order], 2)
+        noise = float(np.mean(apart**2)) / 6.0
+        within = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
+        spline = UnivariateSpline(
+            x, mean, w=np.sqrt(count), s=max(share * len(y) * noise - within, 0.0), ext=3
+        )
+        interior = len(spline.get_knots()) - 2
+        return lambda at: spline(at[:, 0]), len(spline.get_coeffs()) + interior
+
+    # without noise the spline interpolates; with many rows FITPACK would take minutes
+    shares = (0.98, 0.99, 1.0, 1.005, 1.01, 1.02, 1.05, 1.1)
+    return _tuned(fit, (1e-6, *shares) if len(y) <= 1_000 else shares, X, y)
+
+
+def spline_ridge(X: Array, y: Array) -> Fitted:
+    """Fits B-splines of one input, or their products for two inputs, by ridge regression."""
+
+    def fit(setting: tuple[int, float], X: Array, y: Array) -> tuple[Predict, int]:
+        knots, penalty = setting
+        splines = SplineTransformer(n_knots=knots, degree=3, include_bias=True)
+        ridge = Ridge(alpha=penalty, fit_intercept=False)
+        if X.shape[1] == 1:
+            chain = make_pipeline(splines, ridge).fit(X, y)
+            return chain.predict, len(chain[-1].coef_)
+        splines.fit(X)
+
+        def products(at: Array) -> Array:
+            each = splines.transform(at).reshape(len(at), at.shape[1], -1)
+            table = each[:, 0]
+            for k in range(1, at.shape[1]):
+                table = np.einsum("ni,nj->nij", table, each[:, k]).reshape(len(at), -1)
+            return table
+
+        ridge.fit(products(X), y)
+        return lambda at: ridge.predict(products(at)), len(ridge.coef_)
+
+    knots = (25, 50, 100, 150) if X.shape[1] == 1 else (5, 8, 12, 18)
+    return _tuned(fit, [(k, a) for k in knots for a in (1e-8, 1e-4, 1e-2)], X, y)
+
+
+def frame_pursuit(X: Array, y: Array) -> Fitted:
+    """Fits by orthogonal matching pursuit on the frame of palpate's selection."""
+    low, reach = X.min(axis=0), np.ptp(X, axis=0)
+
+    def columns(atoms: Any, at: Array) -> Array:
+        box = np.clip((at - low) / reach, 0.0, 1.0)
+        return np.concatenate([box, wavelet_columns(box, atoms.alpha, atoms.beta)], axis=1)
+
+    start = time.perf_counter()
+    thin = (X - low)[:: max(1, len(X) // 20_000)] / reach
+    finest = 128.0 if X.shape[1] == 1 else 16.0
+    atoms = truncated_frame(
+        thin, coarsest=1.0, finest=finest, frame_scale=2.0, frame_step=0.5, max_candidates=1200
+    )
+    held = np.arange(len(y)) % 5 == 4
+    table = columns(atoms, X)
+    built = time.perf_counter()
+    scores = []
+    for atoms_taken in (8, 16, 24, 32, 48, 64, 96, 128):
+        pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=min(atoms_taken, len(y) // 3))
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", RuntimeWarning
+            )  # it says where the dictionary has no more to give
+            pursuit.fit(table[~held], y[~held])
+        scores.append((float(np.mean((pursuit.predict(table[held]) - y[held]) ** 2)), atoms_taken))
+    tuned = time.perf_counter()
+    taken = min(min(scores)[1], len(y) // 3)
+    pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=taken).fit(table, y)
+    fitted = time.perf_counter()
+    # each atom counts its dilation, its translations and its weight
+    count = taken * (X.shape[1] + 2) + 1
+    fit_seconds = (built - start) + (fitted - tuned)
+    return Fitted(
+        lambda at: pursuit.predict(columns(atoms, at)), count, fit_seconds, tuned - built, f"{taken} atoms"
+    )
+
+
+def kernel_ridge(X: Array, y: Array) -> Fitted:
+    def fit(setting: tuple[float, float], X: Array, y: Array) -> tuple[Predict, int]:
+        gamma, penalty = setting
+        chain = make_pipeline(MinMaxScaler(), KernelRidge(kernel="rbf", gamma=gamma, alpha=penalty)).fit(X, y)
+        return chain.predict, len(y)
+
+    return _tuned(
+        fit, [(g, a) for g in (1.0, 3.0, 10.0, 30.0, 100.0) for a in (1e-12, 1e-10, 1e-8, 1e-5)], X, y
+    )
+
+
+def gaussian_process(X: Array, y: Array) -> Fitted:
+    start = time.perf_counter()
+    scale = MinMaxScaler().fit(X)
+    width = 0.1 * np.ones(X.shape[1])
+    processes = []
+    for shape in (RBF(width, (1e-3, 1e2)), Matern(width, (1e-3, 1e2), nu=2.5)):
+        kernel = ConstantKernel(1.0, (1e-3, 1e6)) * shape + WhiteKernel(1e-6, (1e-14, 1.0))
+        process = GaussianProcessRegressor(kernel, normalize_y=True, random_state=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            processes.append(process.fit(scale.transform(X), y))
+    process = max(processes, key=lambda each: each.log_marginal_likelihood_value_)
+    seconds = time.perf_counter() - start
+    return Fitted(lambda at: process.predict(scale.transform(at)), len(y), seconds, 0.0, "")
+
+
+def polynomial_ridge(X: Array, y: Array) -> Fitted:
+    def fit(degree: int, X: Array, y: Array) -> tuple[Predict, int]:
+        chain = make_pipeline(MinMaxScaler((-1, 1)), PolynomialFeatures(degree), Ridge(1e-10, solver="svd"))
+        chain.fit(X, y)
+        return chain.predict, len(chain[-1].coef_)
+
+    return _tuned(fit, (3, 5, 7, 9, 12), X, y)
+
+
+def mars(X: Array, y: Array) -> Fitted:
+    """Fits multivariate adaptive regression splines; needs the package `pyearth`."""
+    from pyearth import Earth
+
+    start = time.perf_counter()
+    model = Earth(max_degree=X.shape[1], max_terms=60).fit(X, y)
+    seconds = time.perf_counter() - start
+    terms = len(model.coef_.ravel())
+    return Fitted(model.predict, 2 * terms, seconds, 0.0, f"{terms} terms")
+
+
+METHODS = (
+    Method("palpate", palpate_with()),
+    Method("palpate, selection alone", palpate_with(search=SearchOptions(refine=False))),
+    Method("palpate, quasi-Newton", palpate_with(search=SearchOptions(refinement="quasi-newton")), most_rows=100_000),
+    Method("OMP on a Mexican-hat frame", frame_pursuit, most_rows=100_000),
+    Method("make_lsq_spline", lsq_spline, inputs=(1,)),
+    Method("UnivariateSpline", univariate_spline, inputs=(1,), most_rows=100_000),
+    Method("SplineTransformer + Ridge", spline_ridge),
+    Method("polynomial + Ridge", polynomial_ridge),
+    Method("KernelRidge", kernel_ridge, most_rows=1_000),
+    Method("Gaussian process", gaussian_process, most_rows=500),
+    Method("MARS (pyearth)", mars, most_rows=100_000),
+)
+"""palpate first. A method that is not installed is skipped, and the output says so."""

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Counts how often the model class of simulated objects is identified correctly.
+
+python bench/identification/parsimony.py [--draws 100] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.moving import moved
+from bench.studies import count, write_results
+
+from palpate import Model, Recording, identify
+
+MASS, DAMPING = 1e-3, 0.06
+"""True values of the moving object [N*m*s^2/rad, N*m*s/rad]."""
+
+WITHIN = 0.05
+"""Allowed relative error of mass and damping."""
+
+
+def spring(draw: int) -> Recording:
+    """Returns a recording of a linear spring: 100 to 3000 rows, noise of 0.01 to 100 % of its range."""
+    random = np.random.default_rng([7, draw])
+    n = round(10.0 ** random.uniform(2.0, 3.5))
+    x = 0.3 - 0.3 * np.cos(np.cumsum(random.uniform(0.5, 1.5, n)) * 40.0 / n)
+    noise = 10.0 ** random.uniform(-4.0, 0.0) * 1.8
+    force = 3.0 * x + 0.1 + random.normal(0.0, noise, n)
+    return Recording.from_arrays(np.round(x / 1e-4) * 1e-4, force, time=1e-3 * np.arange(n))
+
+
+def velocity_is_there(model: Model) -> bool:
+    return model.damping is not None or "velocity" in model.inputs
+
+
+def recovered(model: Model) -> bool:
+    """True if mass and damping are those of the object."""
+    return (
+        model.mass is not None
+        and model.damping is not None
+        and abs(model.mass / MASS - 1.0) < WITHIN
+        and abs(model.damping / DAMPING - 1.0) < WITHIN
+    )
+
+
+CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]]] = {
+    "linear spring: no wavelet": (
+        100,
+        spring,
+        lambda model: model.n_wavelets == 0 and model.kind == "position" and not velocity_is_there(model),
+    ),
+    "velocity present: taken": (100, lambda draw: moved(draw, damping=0.03), velocity_is_there),
+    "velocity absent: refused": (100, moved, lambda model: not velocity_is_there(model)),
+    "hysteresis present: taken": (
+        100,
+        lambda draw: moved(draw, hysteresis=0.1),
+        lambda model: model.kind == "hysteresis",
+    ),
+    "hysteresis absent: refused": (
+        100,
+        lambda draw: moved(draw, damping=0.03),
+        lambda model: model.kind != "hysteresis",
+    ),
+    f"mass and damping from 60 s: within {100 * WITHIN:g} %": (
+        20,
+        lambda draw: moved(draw, seconds=60.0, mass=MASS, damping=DAMPING),
+        recovered,
+    ),
+}
+"""Number of draws, recording of a draw, and test of its model."""
+
+
+def is_right(claim: str, draw: int) -> bool:
+    """True if the model of one draw is right."""
+    _, recording, right = CLAIMS[claim]
+    return right(identify(recording(draw)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=None, help="of each claim at most")
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    results = []
+    print(f"{'':44}{'right':>7}{'of':>5}", flush=True)
+    for claim, (full, _, _) in CLAIMS.items():
+        draws = min(options.draws or full, count(full))
+        found = Parallel(n_jobs=-1)(delayed(is_right)(claim, draw) for draw in range(draws))
+        wrong = [draw for draw, each in enumerate(found) if not each]
+        told = f"  not in draws {', '.join(map(str, wrong))}" if wrong else ""
+        print(f"{claim:44}{draws - len(wrong):7d}{draws:5d}{told}", flush=True)
+        results.append({"claim": claim, "right": draws - len(wrong), "draws": draws})
+    write_results(options.json, results)
+
+
+if __name__ == "__main__":
+    main()

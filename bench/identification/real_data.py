@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares palpate with the baselines on measured objects; every fifth row is held out.
+
+python bench/identification/real_data.py [SET ...] [--files 5] [--json FILE]
+
+PALPATE_DATA names the folder of recordings.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.figures import LIMIT
+from bench.studies import SCALE, count, write_results
+
+import palpate
+from palpate.baselines import PASSIVE, Compared, comparable, compare
+from palpate.recording.motion import velocity
+from palpate.verification.metrics import normalised, root_mean_square
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+EVERY = 5
+"""Rows i with i mod 5 = 4 are held out."""
+
+MOST_FILES = 16
+"""Largest number of files of a set."""
+
+
+AT_TURN = 0.01
+"""Share of the travel before its end, where the direction changes."""
+
+
+@dataclass(frozen=True)
+class Set:
+    """Options for reading and identifying the recordings of one folder."""
+
+    pattern: str = "*.csv"
+    reading: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    folder: str = ""
+    """Folder, if its name is not that of the set"""
+    beside: bool = True
+    """False if the baselines are those of another set"""
+
+
+SETS = {
+    "keyswitches": Set(),
+    "rubber_domes": Set(),
+    "rubber_domes_h_of_any_sign": Set(
+        options={"hysteresis_nonnegative": False}, folder="rubber_domes", beside=False
+    ),
+    "rubber_domes_force_25_ms_earlier": Set(reading={"force_late_s": 0.025}, folder="rubber_domes"),
+    "switch_springs": Set(),
+    "motor_cogging": Set("map_*.csv"),
+    "organ_probing": Set(
+        reading={
+            "position": "depth_mm",
+            "force": "normal_force_N",
+            "inputs": ("contact_x_mm", "contact_y_mm"),
+        }
+    ),
+    "davinci_grip": Set(
+        reading={"position": "back_angle_rad", "force": "back_torque_Nm"},
+        options={"inputs": "position,velocity"},
+    ),
+    "afm_indentation": Set(reading={"position": "tip_position_um"}),
+    "vhb4910_viscoelastic": Set("loadunload_*.csv"),
+    "magnet_attraction": Set(),
+}
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Rows of a recording where release was measured above press. No passive model can follow them."""
+
+    floor: float
+    """NRMSE of the best force with h >= 0: both strokes as measured, their mean where they cross. It is
+    fitted to the judged rows, noise included."""
+    above: float
+    """Largest difference of release and press [force]"""
+    at_turn: Rows
+    """(n,) rows in the last hundredth of the travel"""
+
+    @staticmethod
+    def of(recording: palpate.Recording, judged: Rows) -> Crossing | None:
+        """Evaluates the judged rows (n,); returns None without two strokes."""
+        x, direction, force = recording.position, recording.direction, recording.force
+        if direction is None or not {-1, 1} <= set(direction.tolist()):
+            return None
+        press, release = (_stroke(recording, side) for side in (1, -1))
+        both = (x >= max(press[0][0], release[0][0])) & (x <= min(press[0][-1], release[0][-1]))
+        above = np.where(both, np.maximum(np.interp(x, *release) - np.interp(x, *press), 0.0), 0.0)
+        floor = float(np.sqrt(np.mean(above[judged] ** 2))) / 2.0 / float(np.std(force[judged]))
+        return Crossing(floor, float(above.max()), x > x.max() - AT_TURN * np.ptp(x))
+
+
+def _stroke(recording: palpate.Recording, side: int) -> tuple[Array, Array]:
+    """Returns the distinct positions of one stroke and the mean forces there."""
+    assert recording.direction is not None
+    on = recording.direction == side
+    places, where = np.unique(recording.position[on], return_inverse=True)
+    return places, np.bincount(where, recording.force[on]) / np.bincount(where)
+
+
+def ours(
+    recording: palpate.Recording, train: palpate.Recording, options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Identifies the kept rows and tests the held-out rows of the baselines.
+
+    It is led along the whole motion, since a velocity and a play need the rows between; of the rows that are
+    held out only the force is unknown.
+    """
+    start = time.perf_counter()
+    model = palpate.identify(train, **options)
+    seconds = time.perf_counter() - start
+    check = palpate.verify(model, recording)
+    held_out = np.arange(len(recording)) % EVERY == EVERY - 1
+    judged = held_out & comparable(recording) & check.rows
+    error = check.residual[judged[check.rows]]
+    nrmse = normalised(root_mean_square(error), recording.force[judged])
+    crossed: dict[str, float] = {}
+    if (crossing := Crossing.of(recording, judged)) is not None:
+        late = error[crossing.at_turn[judged]]
+        crossed = {
+            "floor": crossing.floor,
+            "release_above_press": crossing.above,
+            "share_at_turn": float(late @ late / (error @ error)),
+        }
+    return {
+        "nrmse": nrmse,
+        "n_parameters": model.n_parameters,
+        "n_wavelets": model.n_wavelets,
+        "rung": model.fit.rung,
+        "seconds": seconds,
+        "finite": bool(np.isfinite(nrmse) and nrmse < 1.5),
+        **crossed,
+    }
+
+
+def row_of(path: Path, kind: Set) -> dict[str, Any]:
+    """Returns the results of palpate and of every baseline on the same rows of one file."""
+    reading = dict(kind.reading)
+    try:
+        recording = palpate.read_recording(path, **reading)
+    except palpate.InputError as first:
+        # files of one folder differ in a column: the reader chooses
+        reading.pop("position", None)
+        try:
+            recording = palpate.read_recording(path, **reading)
+        except palpate.InputError:
+            return {"file": path.stem, "refused": str(first)}
+    if "velocity" in kind.options.get("inputs", ""):
+        # derived before rows are held out: a derivative needs its neighbours in time
+        speed, _ = velocity(recording)
+        recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
+    train, _ = recording.split(EVERY)
+    try:
+        found = ours(recording, train, kind.options)
+    except palpate.InputError as error:
+        found = {"refused": str(error)}
+    others = {each.name: each for each in compare([recording], EVERY)}
+    splines = others["smoothing spline" if "smoothing spline" in others else "smoothing spline, two strokes"]
+    return {
+        "file": path.stem,
+        **found,
+        "splines": _numbers(splines),
+        "passive_splines": _numbers(others[PASSIVE]) if PASSIVE in others else None,
+        "baselines": {name: _numbers(each) for name, each in others.items()} if kind.beside else {},
+    }
+
+
+def _numbers(each: Compared) -> dict[str, Any]:
+    told = {"nrmse": each.nrmse, "n_parameters": each.n_parameters, "seconds": each.seconds}
+    return told if each.refused is None else {**told, "refused": each.refused}
+
+
+def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Prints the medians of one set, refused files and diverged models."""
+    good = [row for row in rows if "nrmse" in row]
+    for row in rows:
+        for who, told in (
+            ("", row),
+            *((f"{name}: ", each) for name, each in row.get("baselines", {}).items()),
+        ):
+            if "refused" in told:
+                print(f"  {row['file']} is refused, {who}{told['refused']}")
+    if not good:
+        return
+    title = f"median of {len(good)} files"
+    print(f"  {title:52}{'nrmse':>9}{'worst':>9}{'parameters':>12}{'seconds':>9}")
+    _report_line("palpate", good, len(good))
+    for method in dict.fromkeys(key for row in good for key in row["baselines"]):
+        theirs = [row["baselines"][method] for row in good if method in row["baselines"]]
+        _report_line(method, [each for each in theirs if np.isfinite(each["nrmse"])], len(good))
+    _report_ratios("the splines'", {row["file"]: (row, row["splines"]) for row in good})
+    passive = {row["file"]: (row, row["passive_splines"]) for row in good if row["passive_splines"]}
+    _report_ratios("that of the splines with h >= 0", passive)
+    diverged = [row["file"] for row in good if not row["finite"]]
+    print(f"  diverged: {', '.join(diverged) if diverged else 'none'}")
+
+
+def _report_line(method: str, each: Sequence[Mapping[str, Any]], of: int) -> None:
+    """Prints medians, with the number of files if it is not all of them."""
+    if each:
+        told = method if len(each) == of else f"{method} ({len(each)} files)"
+        nrmse, size, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
+        print(f"  {told:52}{median(nrmse):9.4f}{max(nrmse):9.4f}{median(size):12.0f}{median(seconds):9.2f}")
+
+
+def _report_ratios(than: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
+    """Prints the ratio of errors, file by file."""
+    ratios = {
+        file: own["nrmse"] / other["nrmse"] for file, (own, other) in pairs.items() if other["nrmse"] > 0.0
+    }
+    if not ratios:
+        return
+    worst = max(ratios, key=lambda file: ratios[file])
+    over = sum(ratio > LIMIT for ratio in ratios.values())
+    print(
+        f"  error over {than}: median {median(ratios.values()):.2f}, worst {ratios[worst]:.2f} ({worst}); "
+        f"above {LIMIT}: {over} of {len(ratios)}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    chosen = SETS if SCALE >= 0.1 else ("switch_springs",)
+    parser.add_argument("sets", nargs="*", default=list(chosen), metavar="SET ...")
+    parser.add_argument(
+        "--files", type=int, default=count(MOST_FILES), help="of each set at most, evenly spread"
+    )
+    parser.add_argument("--each", action="store_true", help="print a line for each file")
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    folder = os.environ.get("PALPATE_DATA")
+    if folder is None or not Path(folder).is_dir():
+        print("skipped: needs measured data, set PALPATE_DATA")
+        return
+    results: dict[str, list[dict[str, Any]]] = {}
+    for name in options.sets:
+        files = sorted((Path(folder) / (SETS[name].folder or name)).glob(SETS[name].pattern))
+        files = files[:: max(1, -(-len(files) // options.files))]
+        print(f"\n{name}", flush=True)
+        results[name] = []
+        for path in files:
+            row = row_of(path, SETS[name])
+            results[name].append(row)
+            if options.each and "nrmse" in row:
+                passive = row["passive_splines"]
+                print(
+                    f"  {row['file'][:48]:50}{row['nrmse']:9.4f}{row['n_parameters']:6d} {row['rung']:12}"
+                    f"{row['seconds']:7.2f} s   splines {row['splines']['nrmse']:.4f} "
+                    f"{row['splines']['n_parameters']:5d}"
+                    + (f", with h >= 0 {passive['nrmse']:.4f}" if passive else "")
+                    + (f"; floor {row['floor']:.4f}" if "floor" in row else "")
+                    + (f", at the turn {100 * row['share_at_turn']:.0f} %" if "floor" in row else ""),
+                    flush=True,
+                )
+        report(name, results[name])
+    write_results(options.json, results)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "held_maps.hpp"
+#include "palpate/dynamics/coupling.hpp"
+#include "palpate/fields/readable.hpp"
+#include "palpate/rendering/energy_consistent.hpp"
+#include "palpate/rendering/explicit.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/massless.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
+#include "palpate/stability/coupling_need.hpp"
+
+namespace palpate::bench {
+
+/// Stiffness of a spring in the explicit structure driven by a force, (4m - 2 B_o T) / T^2, over the mass.
+[[nodiscard]] inline FailureMap explicit_map(int points) {
+    constexpr double period = 1e-3;
+    constexpr std::size_t ticks = 40'000;
+    FailureMap map{"explicit", "mass m [kg*m^2]", "stiffness K [N*m/rad]", {}};
+    for (const double damping : {0.001, 0.01, 0.1}) {
+        map.lines.push_back(failure_line(
+            "B_o = " + readable(damping), logarithmic(1e-4, 1e-2, points),
+            [&](double mass) { return (4.0 * mass - 2.0 * damping * period) / (period * period); },
+            [&](double mass, double stiffness) {
+                return oscillates_force_driven(Explicit{LinearObject{stiffness}, {mass, damping}, {}, period},
+                                               ticks);
+            },
+            3.0));
+    }
+    return map;
+}
+
+/// True if one of several objects behind a coupling gives energy in the steady state. Each object responds like a
+/// spring with a share of the coupling stiffness, or for a negative share like a mass.
+[[nodiscard]] inline bool coupling_loses_balance(VirtualCoupling coupling, const DeviceProfile& device) {
+    constexpr double reach = 0.01;  // [rad]
+    const double period = device.period_s;
+    for (const int pace : {1, 2, 3, 4, 6, 10}) {
+        const auto settled = 400 * static_cast<std::size_t>(pace) * static_cast<std::size_t>(pace);
+        const double tangent = std::tan(0.5 * std::numbers::pi / pace);
+        for (const double share :
+             {1e6, 3.0, 1.0, 0.3, -0.5, -0.8, -1.0, -1.1, -1.2, -1.4, -1.7, -2.0, -4.0}) {
+            const double stiffness = std::max(0.0, share) * coupling.stiffness;
+            const double mass =
+                std::max(0.0, -share) * coupling.stiffness * period * period / (4.0 * tangent * tangent);
+            const PacedWork work = work_of_pacing(
+                EnergyConsistent{LinearObject{stiffness}, {mass, 0.0}, coupling, period, 1e-4, false}, device,
+                {reach, pace, 1e6 * device.viscous_damping, period}, 0.0, share < 0.0 ? settled : 400);
+            if (work.negative()) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/// Coupling damping over coupling stiffness in the maps [s].
+inline constexpr double coupling_time = 0.2e-3;
+
+/// Stiffness of the stiffest coupling that is certified for every passive object behind it: b > K_c T / 2 + B_c,
+/// and its form with delay.
+[[nodiscard]] inline double coupling_limit(const DeviceProfile& device) noexcept {
+    const double need = coupling_need({1.0, coupling_time}, device.period_s, device.whole_delay_samples(),
+                                      device.delay_fraction());
+    return device.viscous_damping / (device.period_s * need);
+}
+
+/// Coupling stiffness over the damping of the device.
+[[nodiscard]] inline FailureMap coupling_map(int points) {
+    return {
+        "coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
+        lines_over_damping(points, 3.0, coupling_limit, [](const DeviceProfile& device, double stiffness) {
+            return coupling_loses_balance({stiffness, coupling_time * stiffness}, device);
+        })};
+}
+
+/// Steepest falling slope of an object behind a coupling over the coupling stiffness. The device has just the damping
+/// that the coupling needs, and its force limit is never reached. The bounds are sufficient: K_c + B_c/T without
+/// mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
+[[nodiscard]] inline FailureMap falling_map(int points) {
+    constexpr double width = 0.1;  // of the snap [rad]
+    const double period = smooth_knob().period_s;
+    FailureMap map{"falling", "coupling stiffness K_c [N*m/rad]", "steepest fall s [N*m/rad]", {}};
+    const auto gives = [&](auto build, double stiffness, double falling) {
+        const VirtualCoupling coupling{stiffness, coupling_time * stiffness};
+        DeviceProfile device = smooth_knob();
+        device.viscous_damping = period * coupling_need(coupling, period, 0);
+        const SnappingObject object{falling, width};
+        const double deepest = 0.25 * falling * width * width;
+        for (const double reach : {0.02 * width, 0.2 * width, width, 2.0 * width}) {
+            for (const double middle : {0.0, 0.5 * width}) {
+                for (const int pace : paces) {
+                    const double start = middle - 0.5 * reach;
+                    const PacedWork work =
+                        work_of_pacing(build(object, coupling), device, {reach, pace, 1e6, period}, start);
+                    if (work.whole < -(object.at(start, {}).energy + deepest + work.rounding)) {
+                        return true;
+                    }
+                }
+            }
+        }
+        return false;
+    };
+    map.searched = 10.0;
+    const auto add = [&](const char* name, double damping, auto build) {
+        map.lines.push_back(failure_line(
+            name, logarithmic(10.0, 1000.0, points),
+            [&](double stiffness) {
+                return stiffness + (coupling_time * stiffness + 2.0 * damping) / period;
+            },
+            [&](double stiffness, double falling) { return gives(build, stiffness, falling); },
+            map.searched));
+    };
+    const LoadLineSolver solver{.longest_step = 0.1 * width};
+    add("massless", 0.0, [&](const auto& object, VirtualCoupling coupling) {
+        return Massless{object, coupling, period, solver};
+    });
+    add("implicit, B_o = 0.02", 0.02, [&](const auto& object, VirtualCoupling coupling) {
+        return Implicit{object, Inertia{0.001, 0.02}, coupling, period, solver};
+    });
+    return map;
+}
+
+/// Work of a hand that throws a free mass [J]: it deflects the coupling, waits until the mass has passed the handle,
+/// then slows it down with a force just below the device's limit. The device clips the structure's force.
+template <Structure S>
+[[nodiscard]] double work_of_a_throw(S structure, VirtualCoupling coupling, const DeviceProfile& device,
+                                     double deflection) {
+    constexpr int deflecting = 60;  // samples
+    constexpr int most_slowing = 4000;
+    const double limit = device.force_limit;
+    double work = 0.0;
+    double x = 0.0;
+    structure.reset(x);
+    Rendered now = structure.step(x);
+    const auto move = [&](double to) {
+        const double d = to - x;
+        work += std::clamp(now.force, -limit, limit) * d + device.viscous_damping / device.period_s * d * d;
+        x = to;
+        now = structure.step(x);
+    };
+    for (int k = 0; k < deflecting; ++k) {
+        move(x + deflection / deflecting);
+    }
+    double before = now.environment_position - 1.0;
+    while (now.environment_position < x + limit / coupling.stiffness && now.environment_position > before) {
+        before = now.environment_position;
+        move(x);
+    }
+    for (int k = 0; k < most_slowing && now.environment_position >= before; ++k) {
+        before = now.environment_position;
+        move(std::max(x, before - 0.99 * limit / coupling.stiffness));
+    }
+    return work;
+}
+
+/// Work of a hand that throws a mass behind a coupling, over the deflection of the coupling. The force limit acts
+/// inside the step, on device and object, or outside, on the device only. Below 0 the hand takes out energy.
+[[nodiscard]] inline FailureMap limit_map(int points) {
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    const Inertia mass{0.05, 0.0};
+    const VirtualCoupling coupling{90.0, 0.0};
+    DeviceProfile device = smooth_knob();
+    device.viscous_damping = device.period_s * coupling_need(coupling, device.period_s, 0);
+    FailureMap map{"limit", "deflection of the coupling [rad]", "work of the hand [J]", {}};
+    map.linear = true;
+    const auto add = [&](const char* name, auto build) {
+        FailureLine line{name, logarithmic(0.05, 0.6, points), {}, {}};
+        for (const double deflection : line.at) {
+            line.measured.push_back(work_of_a_throw(build(), coupling, device, deflection));
+            line.theory.push_back(std::numeric_limits<double>::quiet_NaN());
+        }
+        map.lines.push_back(std::move(line));
+    };
+    const auto implicit = [&](double limit) {
+        return Implicit<LinearObject>{LinearObject{}, mass, coupling, device.period_s, {}, limit};
+    };
+    add("limit outside the step", [&] { return implicit(infinite); });
+    add("limit inside, implicit", [&] { return implicit(device.force_limit); });
+    add("limit inside, energy-consistent", [&] {
+        return EnergyConsistent{LinearObject{}, mass, coupling,          device.period_s,
+                                1e-4,           true, device.force_limit};
+    });
+    return map;
+}
+
+/// Limit of each structure over the sample time, at the damping of the default knob.
+[[nodiscard]] inline FailureMap period_map(int points) {
+    constexpr Inertia inertia{0.001, 0.1};
+    constexpr std::size_t ticks = 40'000;
+    FailureMap map{"period", "sample time T [s]", "stiffness [N*m/rad]", {}};
+    const std::vector<double> periods = logarithmic(2e-4, 5e-3, points);
+    const auto device = [](double period, int delay) {
+        DeviceProfile knob = smooth_knob();
+        knob.period_s = period;
+        knob.delay_s = delay * knob.period_s;
+        return knob;
+    };
+    for (int delay = 0; delay <= 2; ++delay) {
+        map.lines.push_back(failure_line(
+            "direct, delay " + std::to_string(delay), periods,
+            [&](double period) { return direct_limit(device(period, delay)); },
+            [&](double period, double stiffness) {
+                return spring_swings_up(device(period, delay), stiffness);
+            }));
+    }
+    map.lines.push_back(failure_line(
+        "coupling, delay 0", periods, [&](double period) { return coupling_limit(device(period, 0)); },
+        [&](double period, double stiffness) {
+            return coupling_loses_balance({stiffness, coupling_time * stiffness}, device(period, 0));
+        },
+        3.0));
+    map.lines.push_back(failure_line(
+        "explicit, driven by a force", periods,
+        [&](double period) {
+            return (4.0 * inertia.mass - 2.0 * inertia.damping * period) / (period * period);
+        },
+        [&](double period, double stiffness) {
+            return oscillates_force_driven(Explicit{LinearObject{stiffness}, inertia, {}, period}, ticks);
+        },
+        3.0));
+    return map;
+}
+
+/// Encoder step of a spring behind a coupling over the stiffness of the spring: f_c >= gamma Delta / 2, where gamma
+/// is K_c K / (K_c + K) without coupling damping. With damping gamma assumes the worst position of each edge between
+/// two counts, so it is sufficient only.
+[[nodiscard]] inline FailureMap coupled_encoder_map(int points) {
+    constexpr double stiffness = 40.0;  // K_c [N*m/rad]
+    constexpr double friction = 0.002;  // [N*m]
+    FailureMap map{"coupled-encoder", "stiffness K [N*m/rad]", "encoder step [rad]", {}};
+    map.searched = 10.0;
+    for (const double damping : {0.0, 0.008, 0.02}) {
+        const VirtualCoupling coupling{stiffness, damping};
+        const auto bound = [&](double spring) {
+            ForceBounds bounds;
+            bounds.slope = {spring, spring};
+            return 2.0 * friction / massless_gain(bounds, coupling, smooth_knob().period_s);
+        };
+        const auto fails = [&](double spring, double step) {
+            DeviceProfile knob = smooth_knob();
+            knob.encoder_step = step;
+            knob.coulomb_friction = friction;
+            for (const int pace : {1, 2, 4}) {
+                for (const double reach : ways_over_an_edge(knob)) {
+                    const PacedWork work =
+                        work_of_pacing(Massless{LinearObject{spring}, coupling, knob.period_s}, knob,
+                                       {reach, pace, 1e6, knob.period_s}, 0.5 * step - 0.5 * reach, 100);
+                    if (work.negative()) {
+                        return true;
+                    }
+                }
+            }
+            return false;
+        };
+        map.lines.push_back(failure_line("B_c = " + readable(damping), logarithmic(4.0, 4000.0, points),
+                                         bound, fails, map.searched));
+    }
+    return map;
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::bench {
+
+/// The limit of one method over one quantity: measured in simulation, and given by theory.
+struct FailureLine {
+    std::string name;
+    std::vector<double> at;        ///< the quantity
+    std::vector<double> measured;  ///< the largest value without failure; NaN: no value failed
+    std::vector<double> theory;    ///< NaN: theory gives no limit
+};
+
+/// Lines that share their axes.
+struct FailureMap {
+    std::string name;   ///< for file names
+    std::string along;  ///< the quantity on the horizontal axis, with its unit
+    std::string limit;  ///< the quantity that is limited, with its unit
+    std::vector<FailureLine> lines;
+    double searched = 0.0;  ///< largest value that was tried, over the theory, where no value failed
+    bool linear = false;    ///< the limit has a linear axis and may be negative
+};
+
+/// Values from `first` to `last`, evenly spaced on a logarithmic axis.
+[[nodiscard]] inline std::vector<double> logarithmic(double first, double last, int points) {
+    std::vector<double> values;
+    values.reserve(static_cast<std::size_t>(points));
+    for (int k = 0; k < points; ++k) {
+        values.push_back(points == 1 ? first : first * std::pow(last / first, k / (points - 1.0)));
+    }
+    return values;
+}
+
+/// Returns the value in [lower, upper] at which `fails(value)` becomes true, by bisection on a logarithmic axis, to
+/// `relative`. NaN if `upper` does not fail; `lower` if `lower` fails.
+template <class Fails>
+[[nodiscard]] double failure_boundary(double lower, double upper, Fails fails, double relative = 2e-4) {
+    if (!(lower > 0.0 && upper > lower)) {
+        throw std::invalid_argument("a boundary is searched from " + std::to_string(lower) + " to " +
+                                    std::to_string(upper) + ", must be 0 < from < to");
+    }
+    if (!fails(upper)) {
+        return std::numeric_limits<double>::quiet_NaN();
+    }
+    if (fails(lower)) {
+        return lower;
+    }
+    while (upper > lower * (1.0 + relative)) {
+        const double middle = std::sqrt(lower * upper);
+        (fails(middle) ? upper : lower) = middle;
+    }
+    return std::sqrt(lower * upper);
+}
+
+/// Measures a line: for every value of the quantity, `theory(value)` and the boundary of `fails(value, limit)`
+/// between theory / reach and theory * reach.
+template <class Theory, class Fails>
+[[nodiscard]] FailureLine failure_line(std::string name, const std::vector<double>& at, Theory theory,
+                                       Fails fails, double reach = 10.0) {
+    FailureLine line{std::move(name), at, {}, {}};
+    for (const double value : at) {
+        const double expected = theory(value);
+        line.theory.push_back(expected);
+        line.measured.push_back(failure_boundary(expected / reach, expected * reach,
+                                                 [&](double limit) { return fails(value, limit); }));
+    }
+    return line;
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "coupled_maps.hpp"
+#include "failure_map.hpp"
+#include "guard_maps.hpp"
+#include "held_maps.hpp"
+#include "solver_maps.hpp"
+
+namespace palpate::bench {
+
+struct NamedFailureMap {
+    std::string_view name;
+    FailureMap (*measure)(int points);
+};
+
+/// All maps, in the order of the page.
+inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
+    {"explicit", explicit_map},
+    {"damping", damping_map},
+    {"prediction", prediction_map},
+    {"period", period_map},
+    {"encoder", encoder_map},
+    {"play", play_map},
+    {"coupling", coupling_map},
+    {"falling", falling_map},
+    {"limit", limit_map},
+    {"coupled-encoder", coupled_encoder_map},
+    {"hand", hand_map},
+    {"solver", solver_map},
+    {"pole", pole_map},
+    {"guard", guard_map},
+});
+
+/// Returns the fields of a map; NaN becomes null when it is printed.
+[[nodiscard]] inline nlohmann::ordered_json as_json(const FailureMap& map) {
+    nlohmann::ordered_json lines = nlohmann::ordered_json::array();
+    for (const FailureLine& line : map.lines) {
+        lines.push_back(
+            {{"name", line.name}, {"at", line.at}, {"measured", line.measured}, {"theory", line.theory}});
+    }
+    return {{"name", map.name},         {"along", map.along},   {"limit", map.limit},
+            {"searched", map.searched}, {"linear", map.linear}, {"lines", lines}};
+}
+
+[[nodiscard]] inline nlohmann::ordered_json as_json(const GuardEffect& effect) {
+    return {{"guard", effect.guard},
+            {"cost", effect.cost},
+            {"wrong", effect.wrong},
+            {"without", effect.without},
+            {"with", effect.with}};
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures where each method fails and draws the limits beside their theory.
+
+python bench/limits/failure_maps.py --to docs [--points 9]      needs build/release/bench/failure_maps
+
+Every point is a bisection over closed loops with simulated devices and hands. Writes one picture for each map
+and failure-maps.json to FOLDER/figures. Writes the tables of FOLDER/where-each-method-fails.md if it exists.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.studies import ROOT, fill_tables, markdown_table, where, write_json
+
+from palpate.cli.figures import figure_file
+from palpate.cli.output import number
+from palpate.plotting.look import grid
+
+PROGRAM = ROOT / "build" / "release" / "bench" / "failure_maps"
+PAGE = "where-each-method-fails.md"
+
+MARKERS = "os^Dv"
+DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
+LONGEST_OF_TWO_COLUMNS = 30
+"""Longest name in a legend of two columns [characters]"""
+
+Map = Mapping[str, Any]
+"""A map as the program prints it; null stands for NaN."""
+
+
+def values(line: Map, key: str) -> NDArray[np.float64]:
+    """Returns at, measured or theory of a line, (points,)."""
+    return np.array(line[key], dtype=np.float64)
+
+
+def draw_map(axes: Axes, drawn: Map) -> None:
+    """Draws measured limits as markers and theory as lines, both axes logarithmic unless the map is linear.
+
+    A filled marker stands at the largest value that was tried if no value failed.
+    """
+    lines, searched = drawn["lines"], drawn["searched"]
+    for line, marker, dash in zip(lines, MARKERS, DASHES, strict=False):
+        at, measured, theory = (values(line, key) for key in ("at", "measured", "theory"))
+        look = {"marker": marker, "markersize": 4.5, "color": "black"}
+        axes.plot(at, theory, color="0.45", linewidth=1.0, linestyle=dash, zorder=1)
+        axes.plot(
+            at,
+            measured,
+            linestyle="none" if np.isfinite(theory).any() else dash,
+            linewidth=0.6,
+            markerfacecolor="white",
+            markeredgewidth=0.8,
+            label=in_print(line["name"]),
+            **look,
+        )
+        held = np.isnan(measured) & np.isfinite(theory)
+        if searched > 0.0 and held.any():
+            name = f"{in_print(line['name'])}: still holds"
+            axes.plot(at[held], searched * theory[held], linestyle="none", label=name, **look)
+    axes.set_xscale("log")
+    label_decades(axes.xaxis)
+    if not drawn["linear"]:
+        axes.set_yscale("log")
+        label_decades(axes.yaxis)
+    grid(axes)
+    axes.set_xlabel(in_print(drawn["along"]))
+    axes.set_ylabel(in_print(drawn["limit"]))
+    handles, _ = axes.get_legend_handles_labels()
+    shown = [
+        handle for handle in handles if isinstance(handle, Line2D) and np.isfinite(handle.get_ydata()).any()
+    ]
+    if any(np.isfinite(values(line, "theory")).any() for line in lines):
+        shown.append(Line2D([], [], color="0.45", linewidth=1.0, label="theory"))
+    longest = max(len(str(handle.get_label())) for handle in shown)
+    columns = 2 if longest <= LONGEST_OF_TWO_COLUMNS else 1
+    axes.figure.legend(handles=shown, frameon=False, loc="outside lower center", ncols=columns)
+
+
+def label_decades(axis: Axis) -> None:
+    """Labels powers of ten; below two decades also 1, 2 and 5 as plain numbers."""
+    low, high = axis.get_view_interval()
+    axis.set_minor_formatter(NullFormatter())
+    if high < 100.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def in_print(text: str) -> str:
+    """Replaces products, squares and indices by their printed form."""
+    text = text.replace("*", "·").replace("^2", "²")
+    return re.sub(r"\b([A-Za-z])_([a-z])\b", r"$\1_\2$", text)
+
+
+def map_table(shown: Map) -> str:
+    """Returns measured over theory for each line, or measured values if the theory gives none."""
+    lines = shown["lines"]
+    if not shown["linear"] and any(np.isfinite(values(line, "theory")).any() for line in lines):
+        return markdown_table(
+            ("", "measured over theory"), [(line["name"], spread(line, shown["searched"])) for line in lines]
+        )
+    places = lines[0]["at"]
+    chosen = np.unique(np.linspace(0, len(places) - 1, 5).round().astype(int))
+    return markdown_table(
+        (shown["along"], *(number(places[k]) for k in chosen)),
+        [(line["name"], *(number(values(line, "measured")[k]) for k in chosen)) for line in lines],
+    )
+
+
+def spread(line: Map, searched: float) -> str:
+    """Returns the least and largest ratio of measured over theory, and where no value failed."""
+    measured, theory = values(line, "measured"), values(line, "theory")
+    known = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
+    ratio, none = measured[known] / theory[known], f"nothing failed up to {number(searched)}"
+    if not ratio.size:
+        return none
+    found = f"{ratio.min():.4f} to {ratio.max():.4f}"
+    return f"{found}; elsewhere {none}" if np.isnan(measured).any() else found
+
+
+def guard_table(guards: Sequence[Mapping[str, Any]]) -> str:
+    return markdown_table(
+        ("guard", "cost when nothing is wrong", "what is wrong", "without", "with"),
+        [
+            (
+                row["guard"],
+                f"{100.0 * row['cost']:.2g} %",
+                row["wrong"],
+                number(row["without"]),
+                number(row["with"]),
+            )
+            for row in guards
+        ],
+        text_columns=(0, 2),
+    )
+
+
+def write(printed: Mapping[str, Any], to: Path, seconds: float) -> None:
+    """Draws and writes what the program printed, and fills the tables of the page."""
+    measured = {
+        **where(),
+        "seconds": round(seconds, 1),
+        "simulated": "device and hands are simulated; nothing here was measured on hardware",
+        **printed,
+    }
+    for each in printed["maps"]:
+        path = to / "figures" / f"failure-{each['name']}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with figure_file(path, height_inches=3.2) as (axes,):
+            draw_map(axes, each)
+    write_json(to / "figures" / "failure-maps.json", measured)
+    tables = {each["name"]: map_table(each) for each in printed["maps"]}
+    tables["guards"] = guard_table(printed["guards"])
+    tables["where"] = (
+        f"Measured by `python bench/limits/failure_maps.py --to docs`: palpate {measured['palpate']}, "
+        f"{measured['date']}, {measured['machine']}, {measured['seconds']} s.\n"
+    )
+    fill_tables(to / PAGE, tables)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
+    parser.add_argument("--points", type=int, default=9, help="values along each axis")
+    given = parser.parse_args()
+    if not PROGRAM.exists():
+        raise SystemExit(f"{PROGRAM} does not exist: cmake --build --preset release --target failure_maps")
+    start = time.perf_counter()
+    run = subprocess.run([PROGRAM, str(given.points)], stdout=subprocess.PIPE, check=True)
+    write(json.loads(run.stdout), given.to, time.perf_counter() - start)
+
+
+if __name__ == "__main__":
+    main()

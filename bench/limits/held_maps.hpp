@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "failure_map.hpp"
+#include "palpate/device/device_profile.hpp"
+#include "palpate/fields/readable.hpp"
+#include "palpate/rendering/direct.hpp"
+#include "palpate/simulation/hand.hpp"
+#include "palpate/stability/held_force.hpp"
+#include "palpate/stability/predicted_force.hpp"
+#include "trials.hpp"
+
+namespace palpate::bench {
+
+/// Returns the device of the maps: the default knob without encoder or force steps.
+[[nodiscard]] inline DeviceProfile smooth_knob() {
+    DeviceProfile device;
+    device.encoder_step = 0.0;
+    return device;
+}
+
+/// True if a directly rendered spring oscillates with growing amplitude with a hand so heavy that the phase advances
+/// by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. It fails just above the bound.
+[[nodiscard]] inline bool spring_swings_up(const DeviceProfile& device, double stiffness) {
+    constexpr double late_phase = 0.03;  // [rad]
+    constexpr double radians = 1000.0;   // of the simulated oscillation
+    const double late = (0.5 + device.delay_s / device.period_s) * device.period_s;
+    const double inertia = stiffness * late * late / (late_phase * late_phase);
+    const PassiveHand heavy{0.0, 0.0, std::max(0.0, inertia - device.inertia), 0.0};
+    const auto ticks = static_cast<std::size_t>(radians / late_phase * late / device.period_s);
+    return oscillates_with(Direct{LinearObject{stiffness}}, device, heavy, stiffness, ticks);
+}
+
+/// Stiffness of the stiffest spring that is certified for a device without steps. The damping that it needs is
+/// proportional to its slope.
+[[nodiscard]] inline double direct_limit(const DeviceProfile& device) {
+    return device.viscous_damping / (device.longest_period_s() * device_need(device, {1.0, 0.0}));
+}
+
+/// Measures a limit over the damping of the device, one line for each delay. `limit(device)` is the theory;
+/// `fails(device, stiffness)` is searched up to `reach` times that.
+template <class Limit, class Fails>
+[[nodiscard]] std::vector<FailureLine> lines_over_damping(int points, double reach, Limit limit,
+                                                          Fails fails) {
+    std::vector<FailureLine> lines;
+    for (int delay = 0; delay <= 2; ++delay) {
+        const auto device = [&](double damping) {
+            DeviceProfile knob = smooth_knob();
+            knob.viscous_damping = damping;
+            knob.delay_s = delay * knob.period_s;
+            return knob;
+        };
+        lines.push_back(failure_line(
+            "delay " + std::to_string(delay), logarithmic(0.005, 0.5, points),
+            [&](double damping) { return limit(device(damping)); },
+            [&](double damping, double stiffness) { return fails(device(damping), stiffness); }, reach));
+    }
+    return lines;
+}
+
+/// Stiffness of a directly rendered spring over the damping of the device.
+[[nodiscard]] inline FailureMap damping_map(int points) {
+    return {"damping", "device damping b [N*m*s/rad]", "stiffness K [N*m/rad]",
+            lines_over_damping(points, 10.0, direct_limit, spring_swings_up)};
+}
+
+/// Returns travels over the edge between two encoder counts, for which friction, damping or the encoder dominates.
+/// Most are far below a count.
+[[nodiscard]] inline std::vector<double> ways_over_an_edge(const DeviceProfile& device) {
+    const double balance = device.coulomb_friction * device.period_s / device.viscous_damping;
+    const double step = device.encoder_step;
+    return logarithmic(std::min(1e-3 * balance, 1e-2 * step), std::max(1e3 * balance, 1e3 * step), 24);
+}
+
+/// Stiffness of a spring over the encoder step, K <= min(2b/T, 2 f_c/Delta): Abbott and Okamura 2005.
+[[nodiscard]] inline FailureMap encoder_map(int points) {
+    FailureMap map{"encoder", "encoder step [rad]", "stiffness K [N*m/rad]", {}};
+    for (const double friction : {0.002, 0.02}) {
+        const auto device = [&](double step) {
+            DeviceProfile knob = smooth_knob();
+            knob.encoder_step = step;
+            knob.coulomb_friction = friction;
+            return knob;
+        };
+        const auto fails = [&](double step, double stiffness) {
+            const DeviceProfile knob = device(step);
+            for (const double reach : ways_over_an_edge(knob)) {
+                const PacedWork work =
+                    work_of_pacing(Direct{LinearObject{stiffness}}, knob, {reach, 1, 1e6, knob.period_s},
+                                   0.5 * step - 0.5 * reach, 100);
+                if (work.negative()) {
+                    return true;
+                }
+            }
+            return false;
+        };
+        map.lines.push_back(failure_line(
+            "friction " + readable(friction) + " N*m", logarithmic(2e-6, 2e-2, points),
+            [&](double step) { return std::min(direct_limit(device(step)), 2.0 * friction / step); }, fails));
+    }
+    return map;
+}
+
+/// Hysteresis h of a spring over the play radius. While the play operator sticks the slope is g' + h/r, and
+/// b >= T (g' + h/r) (1/2 + n_d). Without the term h/r there would be no limit.
+[[nodiscard]] inline FailureMap play_map(int points) {
+    constexpr double spring = 10.0;  // g' [N*m/rad]
+    FailureMap map{"play", "play radius r [rad]", "hysteresis h [N*m]", {}};
+    for (int delay = 0; delay <= 2; ++delay) {
+        DeviceProfile device = smooth_knob();
+        device.delay_s = delay * device.period_s;
+        map.lines.push_back(failure_line(
+            "delay " + std::to_string(delay), logarithmic(1e-4, 1e-2, points),
+            [&](double radius) { return radius * (direct_limit(device) - spring); },
+            [&](double radius, double hysteresis) {
+                const EvenHysteresis object{{spring, 0.0}, {0.0, hysteresis}, radius};
+                return loses_balance([&] { return Direct{object}; }, device, 0.5 * radius);
+            }));
+    }
+    return map;
+}
+
+/// Stiffness of the stiffest spring that is certified for a device without steps if the force is that of a predicted
+/// position.
+[[nodiscard]] inline double predicted_limit(const DeviceProfile& device, int predict) {
+    return device.viscous_damping / (device.longest_period_s() * predicted_need(device, predict, {1.0, 0.0}));
+}
+
+/// True if a firm hand takes out energy in the steady state at one of 60 frequencies up to the Nyquist frequency.
+[[nodiscard]] inline bool predicted_spring_generates(const DeviceProfile& device, int predict,
+                                                     double stiffness) {
+    constexpr int frequencies = 60;
+    for (int turns = 1; turns <= frequencies; ++turns) {
+        const PacingHand hand{.reach = 0.1,
+                              .ticks = frequencies,
+                              .firmness = 1e6 * device.viscous_damping,
+                              .period_s = device.period_s,
+                              .turns = turns};
+        if (work_of_pacing(PredictedDirect{LinearObject{stiffness}, predict}, device, hand, 0.0, 0)
+                .negative()) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Stiffness of a spring rendered at a predicted position over the number of samples of the prediction.
+[[nodiscard]] inline FailureMap prediction_map(int points) {
+    FailureMap map{"prediction", "samples m of the prediction", "stiffness K [N*m/rad]", {}};
+    std::vector<double> taps;
+    for (const double value : logarithmic(1.0, most_prediction_taps, points)) {
+        if (const double m = std::round(value); taps.empty() || m > taps.back()) {
+            taps.push_back(m);
+        }
+    }
+    for (int delay = 0; delay <= 2; ++delay) {
+        DeviceProfile device = smooth_knob();
+        device.delay_s = delay * device.period_s;
+        map.lines.push_back(failure_line(
+            "delay " + std::to_string(delay), taps,
+            [&](double m) { return predicted_limit(device, static_cast<int>(m)); },
+            [&](double m, double stiffness) {
+                return predicted_spring_generates(device, static_cast<int>(m), stiffness);
+            }));
+    }
+    return map;
+}
+
+/// Stiffness of a spring that does not oscillate with growing amplitude, over the mass of a passive hand. The theory
+/// is the bound for every hand, so the map shows how much of it one known hand leaves unused.
+[[nodiscard]] inline FailureMap hand_map(int points) {
+    FailureMap map{"hand", "mass of the hand [kg*m^2]", "stiffness K [N*m/rad]", {}};
+    map.searched = 40.0;
+    const auto add = [&](const std::string& name, int delay, double damping, int predict = 0) {
+        DeviceProfile device = smooth_knob();
+        device.delay_s = delay * device.period_s;
+        const double bound = predict > 0 ? predicted_limit(device, predict) : direct_limit(device);
+        map.lines.push_back(failure_line(
+            name, logarithmic(1e-5, 1e-1, points), [&](double /*mass*/) { return bound; },
+            [&](double mass, double stiffness) {
+                constexpr double radians = 1000.0;  // of the simulated oscillation
+                const double slowness = std::sqrt((mass + device.inertia) / stiffness);
+                const auto ticks = static_cast<std::size_t>(radians * slowness / device.period_s);
+                const PassiveHand hand{0.0, damping, mass, 0.0};
+                return predict > 0
+                           ? oscillates_with(PredictedDirect{LinearObject{stiffness}, predict}, device, hand,
+                                             stiffness, ticks)
+                           : oscillates_with(Direct{LinearObject{stiffness}}, device, hand, stiffness, ticks);
+            },
+            map.searched));
+    };
+    for (int delay = 0; delay <= 2; ++delay) {
+        add("delay " + std::to_string(delay), delay, 0.0);
+    }
+    add("delay 0, damping hand", 0, smooth_knob().viscous_damping);
+    add("delay 0, predict 4", 0, 0.0, 4);
+    return map;
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "palpate/model/continuation.hpp"
+#include "palpate/model/environment.hpp"
+#include "palpate/model/hysteresis.hpp"
+#include "palpate/rendering/structure.hpp"
+#include "palpate/simulation/closed_loop.hpp"
+#include "palpate/simulation/hand.hpp"
+
+namespace palpate::bench {
+
+/// f = stiffness x. Every bound of it is known.
+struct LinearObject {
+    using State = Stateless;
+    double stiffness = 0.0;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {stiffness * x, stiffness, 0.5 * stiffness * x * x, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+/// f = falling (x^3 / width^2 - x): slope -falling at 0, snaps from -width to width.
+struct SnappingObject {
+    using State = Stateless;
+    double falling = 0.0;
+    double width = 0.1;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double u = x / width;
+        return {falling * x * (u * u - 1.0), falling * (3.0 * u * u - 1.0),
+                0.5 * falling * x * x * (0.5 * u * u - 1.0), false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+/// A straight line as one of the two curves of a hysteresis.
+struct StraightCurve {
+    double slope = 0.0;
+    double offset = 0.0;
+
+    [[nodiscard]] Curve at(double x) const noexcept {
+        return {slope * x + offset, slope, (0.5 * slope * x + offset) * x,
+                (slope * x / 6.0 + 0.5 * offset) * x * x};
+    }
+    [[nodiscard]] bool extrapolated(double /*x*/) const noexcept { return false; }
+};
+
+/// f = g x + s h: a spring with an even loss.
+using EvenHysteresis = HysteresisPair<StraightCurve>;
+
+static_assert(Environment<LinearObject> && Environment<EvenHysteresis> && Environment<SnappingObject>);
+
+inline constexpr double not_finite = std::numeric_limits<double>::infinity();
+
+/// Detects a growing oscillation: the largest value of the last quarter of a motion exceeds that of the second.
+class Growth {
+  public:
+    explicit Growth(std::size_t ticks) noexcept : ticks_{ticks} {}
+
+    /// Returns false if the motion need not be continued.
+    [[nodiscard]] bool add(double quantity) noexcept {
+        const std::size_t quarter = std::min<std::size_t>(3, 4 * tick_ / ticks_);
+        ++tick_;
+        if (!std::isfinite(quantity)) {
+            broke_ = true;
+            return false;
+        }
+        largest_[quarter] = std::max(largest_[quarter], std::abs(quantity));
+        broke_ = quarter > 0 && largest_[quarter] > 1e6 * largest_[0];
+        return !broke_;
+    }
+
+    [[nodiscard]] bool grows() const noexcept { return broke_ || largest_[3] > largest_[1]; }
+
+  private:
+    std::size_t ticks_;
+    std::size_t tick_ = 0;
+    std::array<double, 4> largest_{};
+    bool broke_ = false;
+};
+
+/// True if a structure that is driven by a force oscillates with growing amplitude after a push.
+template <Structure S>
+[[nodiscard]] bool oscillates_force_driven(S structure, std::size_t ticks) noexcept {
+    structure.reset(0.0);
+    Growth growth{ticks};
+    (void)structure.drive(1.0);
+    for (std::size_t k = 0; k < ticks; ++k) {
+        const Rendered now = structure.drive(0.0);
+        if (!growth.add(now.status == Status::Ok ? now.environment_position : not_finite)) {
+            break;
+        }
+    }
+    return growth.grows();
+}
+
+inline constexpr Guards unguarded{.limit = {1e9}};
+
+/// True if a passive hand and the object, a spring of this stiffness around 0, oscillate with growing amplitude.
+template <Structure S>
+[[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
+                                   double stiffness, std::size_t ticks) {
+    constexpr double endless = 1e150;  // a force limit would stop the growth [N*m]
+    device.force_limit = endless;
+    const double inertia = device.inertia + hand.mass;
+    Growth growth{ticks};
+    (void)closed_loop(std::move(structure), device, hand, ticks, {8, 0.0, 1.0, Guards{.limit = {endless}}},
+                      [&](const Tick& /*tick*/, const Motion& now, const EnergyAccount& /*account*/) {
+                          return growth.add(inertia * now.velocity * now.velocity +
+                                            (stiffness + hand.stiffness) * now.position * now.position);
+                      });
+    return growth.grows();
+}
+
+/// Work that a pacing hand has put in, after all turns and after half of them.
+struct PacedWork {
+    double half = 0.0;      ///< [J]
+    double whole = 0.0;     ///< [J]
+    double rounding = 0.0;  ///< bound of its rounding error [J]
+
+    /// True if the hand takes out energy in the steady state.
+    [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
+};
+
+template <Structure S>
+[[nodiscard]] PacedWork work_of_pacing(S structure, DeviceProfile device, const PacingHand& hand,
+                                       double start, std::size_t fewest_ticks = 2000) {
+    constexpr std::size_t fewest_turns = 16;
+    device.force_limit = 1e9;
+    const auto turn = 2 * static_cast<std::size_t>(hand.ticks);
+    const std::size_t ticks = 2 * turn * std::max(fewest_turns / 2, fewest_ticks / 2 / turn);
+    PacedWork work;
+    std::size_t tick = 0;
+    (void)closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
+                      [&](const Tick& /*now*/, const Motion& /*handle*/, const EnergyAccount& account) {
+                          work.whole = account.motor + account.loss;
+                          work.rounding = 1e-9 * account.throughput;
+                          if (++tick == ticks / 2) {
+                              work.half = work.whole;
+                          }
+                          return true;
+                      });
+    return work;
+}
+
+/// Ticks of half a period of the pacing hands, from the Nyquist frequency down.
+inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
+
+/// True if a hand takes out energy in the steady state at one of the paces.
+template <class Build>
+[[nodiscard]] bool loses_balance(Build build, const DeviceProfile& device, double reach) {
+    return std::any_of(paces.begin(), paces.end(), [&](int pace) {
+        const double firmness = 1e6 * (device.viscous_damping + 1e-6);
+        const PacedWork work = work_of_pacing(build(), device, {reach, pace, firmness, device.period_s}, 0.0);
+        return work.negative();
+    });
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares the plan of one object on one device with the best structure that trial finds."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate import DeviceProfile, Hand, Model, Scheme, identify, plan, read_recording
+from palpate._core.simulation import motion_driven, simulate
+from palpate._core.stability import certify, force_bounds
+from palpate.identification.network.constraints import slope_limited
+from palpate.planning import Plan
+from palpate.planning.choices import renderable_slopes
+from palpate.recording import Recording
+
+SAMPLES = 1001
+PUSH = 0.01
+"""Displacement of the hand before it is released [share of the travel]"""
+SWING = 4.0
+"""Largest oscillation at rest after four seconds [encoder steps]"""
+ANGLE = (
+    DeviceProfile(id="knob", coulomb_friction=0.005),
+    DeviceProfile(id="weak knob", viscous_damping=0.005, coulomb_friction=0.002),
+    DeviceProfile(id="late knob", coulomb_friction=0.01, delay_s=1e-3),
+)
+LENGTH = {"position_unit": "m", "inertia": 0.05, "encoder_step": 1e-6, "force_limit": 20.0}
+TRAVEL = (
+    DeviceProfile(id="slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH),
+    DeviceProfile(id="weak slide", viscous_damping=1.0, coulomb_friction=0.01, **LENGTH),
+    DeviceProfile(id="late slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH, delay_s=1e-3),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Result of one object on one device; forces in the unit of the model."""
+
+    object: str
+    device: str
+    plan: str
+    verdict: str
+    error: float
+    best: str
+    """Best candidate that is certified, or stable at every equilibrium"""
+    best_error: float
+    best_at_rest: str
+    """Best candidate that comes to rest, proved or not"""
+    best_at_rest_error: float
+    shakes: bool
+    """The plan does not come to rest"""
+    direct_shakes: bool
+    """The identified model, rendered directly, does not come to rest"""
+    force_range: float
+    loss_rms: float | None
+    loss_largest: float | None
+    kept: float | None
+    """Share of the travel without a limited slope"""
+    kept_departure: float | None
+    """Largest difference of rendered and identified force there"""
+
+    @property
+    def ratio(self) -> float:
+        return self.error / self.best_error
+
+
+def analytic(force: np.ndarray, x: np.ndarray) -> Model:
+    """Returns the model of an object that is known exactly."""
+    return identify(
+        Recording.from_arrays(x, force, units={"position": "rad", "force": "N*m"}), inputs=("position",)
+    )
+
+
+def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ...]]]:
+    """Yields name, model and the devices of its unit."""
+    x = np.linspace(0.0, 0.47, 3000)
+    yield "spring and wall", analytic(2.0 * x + 0.24 * np.logaddexp(0.0, (x - 0.4) / 0.004), x), ANGLE
+    yield "snap-through", analytic(4.0 * x + 0.5 * np.exp(-(((x - 0.2) / 0.03) ** 2)), x), ANGLE
+    for file in measured_switches(switches):
+        yield file.stem.replace("__", ": ").replace("_", " "), identify(read_recording(file)), TRAVEL
+
+
+def measured_switches(wanted: int) -> list[Path]:
+    """Returns files spread over the measured switches; none without measured data."""
+    given = os.environ.get("PALPATE_DATA")
+    files = sorted((Path(given) / "keyswitches").glob("*.csv")) if given else []
+    return files[:: max(1, len(files) // max(1, wanted))][:wanted]
+
+
+def strokes(model: Model, x: np.ndarray) -> np.ndarray:
+    """Returns the force (1, n), or press and release (2, n)."""
+    return np.array(
+        [model.force(x, direction=side) for side in ((1.0, -1.0) if model.hysteretic else (None,))]
+    )
+
+
+def sweep(model: Model, device: DeviceProfile) -> Hand:
+    """Returns a hand that sweeps the domain to and fro, as far as the force of the device allows."""
+    lower, upper = float(model.lower[0]), float(model.upper[0])
+    x = np.linspace(lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower), 500)
+    force = strokes(model, x)[0]
+    held = np.abs(force) < 0.8 * device.force_limit
+    x, force = x[held], force[held]
+    stiffness = max(2.0 * float(np.abs(force).max()) / (upper - lower), 1e-6)
+    target = x + force / stiffness
+    return Hand(
+        stiffness=stiffness, damping=0.002 * stiffness, lower=float(target.min()), upper=float(target.max())
+    )
+
+
+def error(
+    model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, seconds: float
+) -> float:
+    """Returns the RMS of commanded minus identified force at the end of the tick; infinity if it diverges."""
+    start = float(np.clip(0.0, model.lower[0], model.upper[0]))
+    try:
+        trace = simulate(rendered, scheme, device, hand, seconds, start_position=start)
+    except ValueError:
+        return float("inf")
+    end = np.asarray(trace["handle_end"])
+    if not np.isfinite(end).all() or np.abs(end).max() > 1e3:
+        return float("inf")
+    felt = Scheme(structure="direct", play_radius=scheme.play_radius if model.hysteretic else 0.0)
+    truth = motion_driven(model, felt, end, device.period_s)["force"]
+    return float(np.sqrt(np.mean((np.asarray(trace["force"]) - truth) ** 2)))
+
+
+def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile) -> bool:
+    """True if a push keeps a hand without damping moving that presses the steepest part of the object.
+
+    One hand has no mass, and one is so heavy that a force comes 0.03 rad of the swing late.
+    """
+    lower, upper = float(model.lower[0]), float(model.upper[0])
+    x = np.linspace(lower, upper, SAMPLES)
+    force = strokes(model, x)[0]
+    slope = np.where(np.abs(force) < 0.8 * device.force_limit, np.gradient(force, x), -np.inf)
+    place, steepest = float(x[np.argmax(slope)]), float(slope.max())
+    late = 0.5 * device.period_s + device.delay_s
+    stiffness = 0.05 * steepest
+    target = place + float(strokes(rendered, np.array([place]))[0, 0]) / stiffness
+    hand = Hand(stiffness=stiffness, damping=0.0, lower=target, upper=target)
+    for inertia in (device.inertia, max(device.inertia, steepest * (late / 0.03) ** 2)):
+        held = DeviceProfile(
+            inertia=inertia,
+            viscous_damping=device.viscous_damping,
+            coulomb_friction=device.coulomb_friction,
+            encoder_step=device.encoder_step,
+            delay_s=device.delay_s,
+            force_limit=device.force_limit,
+            position_unit=device.position_unit,
+        )
+        start = place + PUSH * (upper - lower)
+        trace = simulate(rendered, scheme, held, hand, 4.0, start_position=start)
+        if not np.ptp(np.asarray(trace["handle_end"])[-500:]) <= SWING * device.encoder_step:
+            return True
+    return False
+
+
+def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) -> Iterator[Scheme]:
+    """Yields every structure over couplings, masses and dampings around the limit of the device."""
+    play = {"play_radius": radius}
+    yield Scheme(structure="direct", **play)
+    held = 2.0 * device.viscous_damping / device.period_s
+    for stiffness, share in itertools.product(np.geomspace(0.05 * held, 2.0 * held, grid), (0.0, 2e-4)):
+        coupling = {"coupling_stiffness": stiffness, "coupling_damping": share * stiffness, **play}
+        yield Scheme(structure="massless", **coupling)
+        if not model.hysteretic:
+            yield Scheme(structure="massless", compensated=True, **coupling)
+        for structure, reserve, ratio in itertools.product(
+            ("implicit", "energy-consistent", "explicit"), (0.02, 2.0), (0.0, 0.5)
+        ):
+            mass = reserve * (held + stiffness) * device.period_s**2
+            yield Scheme(structure=structure, mass=mass, damping=ratio * mass / device.period_s, **coupling)
+
+
+def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
+    """Returns the share of the travel where no slope is limited, and the largest difference of rendered and
+    identified force there. h / r counts as slope."""
+    x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
+    stick = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
+    low, high = renderable_slopes(device, stick, model)
+    forces = strokes(model, x)
+    unchanged = np.ones(SAMPLES, dtype=bool)
+    for force in forces:
+        nearest = slope_limited(x, force, low, high)
+        unchanged &= np.abs(nearest - force) <= 1e-6 * np.ptp(force)
+    # Kinks are rounded over 0.5 % of the travel: six of these do not count as unchanged.
+    margin = round(0.03 * SAMPLES)
+    unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
+    departure = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)
+    return float(unchanged.mean()), float(departure[unchanged].max(initial=0.0))
+
+
+def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid: int) -> Row:
+    chosen = plan(model, device)
+    certificate = chosen.certificate
+    loss = None if chosen.limited is None else chosen.force_error
+    assert certificate is not None
+    hand = sweep(chosen.rendered, device)
+    proved = at_rest = (float("inf"), "none")
+    rendered = {"": model} if loss is None else {"": model, ", slope limited": chosen.rendered}
+    for (words, shown), scheme in itertools.product(
+        rendered.items(), candidates(model, device, chosen.scheme.play_radius, grid)
+    ):
+        try:
+            known = not certify(shown, scheme, device).refused
+        except ValueError:
+            continue  # impossible: a compensated model that is too steep for its coupling
+        found = error(model, shown, scheme, device, hand, seconds), scheme.structure + words
+        if known:
+            proved = min(proved, found)
+        if found[0] < at_rest[0] and not shakes(model, shown, scheme, device):
+            at_rest = found
+    share, departure = (None, None) if loss is None else kept(model, chosen, device)
+    direct = Scheme(structure="direct", play_radius=chosen.scheme.play_radius)
+    return Row(
+        object=name,
+        device=device.id,
+        plan=chosen.structure + ("" if loss is None else ", slope limited"),
+        verdict=certificate.verdict,
+        error=error(model, chosen.rendered, chosen.scheme, device, hand, seconds),
+        best=proved[1],
+        best_error=proved[0],
+        best_at_rest=at_rest[1],
+        best_at_rest_error=at_rest[0],
+        shakes=shakes(model, chosen.rendered, chosen.scheme, device),
+        direct_shakes=shakes(model, model, direct, device),
+        force_range=float(np.ptp(strokes(model, np.linspace(model.lower[0], model.upper[0], SAMPLES)))),
+        loss_rms=None if loss is None else loss.rms,
+        loss_largest=None if loss is None else loss.largest,
+        kept=share,
+        kept_departure=departure,
+    )

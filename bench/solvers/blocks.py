@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures Python calls in alternating blocks and writes them in the format of Google Benchmark."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy
+from bench.studies import SCALE, commit, write_json
+
+REPETITIONS = 9
+"""Blocks of each call; another load of the machine affects all calls alike."""
+
+
+def scaled(seconds: float) -> float:
+    """Returns a duration at the current scale."""
+    return seconds * SCALE
+
+
+def timed(
+    calls: Mapping[str, Callable[[], object]],
+    block_s: float,
+    clock: Callable[[], int] = time.perf_counter_ns,
+) -> dict[str, list[float]]:
+    """Returns the nanoseconds of each call, once for each block of about block_s seconds.
+
+    The clock is wall time, for calls that use several processors, or time.process_time_ns.
+    """
+    counts = {name: _count(call, block_s, clock) for name, call in calls.items()}
+    found: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(REPETITIONS):
+        for name, call in calls.items():
+            found[name].append(_nanoseconds(call, counts[name], clock))
+    return found
+
+
+def _count(call: Callable[[], object], block_s: float, clock: Callable[[], int]) -> int:
+    count = 1
+    while True:
+        seconds = 1e-9 * _nanoseconds(call, count, clock) * count
+        if seconds >= 0.5 * block_s:
+            return count
+        count = max(2 * count, int(count * block_s / max(seconds, 1e-9) / 2))
+
+
+def _nanoseconds(call: Callable[[], object], count: int, clock: Callable[[], int]) -> float:
+    rounds = range(count)
+    start = clock()
+    for _ in rounds:
+        call()
+    return (clock() - start) / count
+
+
+def row(name: str, nanoseconds: float, **counters: float) -> dict[str, Any]:
+    """Returns one repetition in the format of Google Benchmark."""
+    return {
+        "name": name,
+        "run_name": name,
+        "run_type": "iteration",
+        "cpu_time": nanoseconds,
+        "time_unit": "ns",
+        **counters,
+    }
+
+
+def write_results(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Writes a file in the format of Google Benchmark."""
+    write_json(path, {"context": _context(), "benchmarks": list(rows)})
+
+
+def _context() -> dict[str, Any]:
+    try:
+        processor = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        processor = ""
+    clock = re.search(r"cpu MHz\s*: *(\d+)", processor)
+    model = re.search(r"model name\s*: *(.+)", processor)
+    return {
+        "processor": model[1] if model else platform.machine(),
+        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "num_cpus": os.cpu_count(),
+        "mhz_per_cpu": int(clock[1]) if clock else 0,
+        "caches": [],
+        "commit": commit(),
+        "versions": f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}",
+    }

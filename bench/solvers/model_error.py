@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures model error over size and over the time of an evaluation.
+
+python bench/solvers/model_error.py FILE.json
+
+Wavelet networks grown to N wavelets, and the baselines over their settings, on two problems with known truth.
+An evaluation is one of 10^4 positions in an array, one thread.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.problems import TITLES, problem
+from bench.solvers.blocks import row, scaled, timed, write_results
+from bench.studies import SCALE
+
+from palpate import WaveletNetworkRegressor
+from palpate.baselines import HuntCrossley, LinearZones, LookupTable, SmoothingSpline, TissueParameters
+
+PROBLEMS = ("P1", "P2")
+WAVELETS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32) if SCALE >= 0.1 else (1, 2, 4)
+
+BASELINES = {
+    "lookup table": [LookupTable(size) for size in (4, 8, 16, 32, 64, 128, 256, 512)],
+    "smoothing spline": [SmoothingSpline(smoothing) for smoothing in (30.0, 10.0, 3.0, 1.5, 1.1, 1.0, 0.9)],
+    "linear zones": [LinearZones(threshold) for threshold in (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)],
+    "tissue parameters": [TissueParameters()],
+    "Hunt-Crossley": [HuntCrossley()],
+}
+
+Predict = Callable[[np.ndarray], np.ndarray]
+
+
+def models(X: np.ndarray, y: np.ndarray) -> Iterator[tuple[str, int, int, Predict]]:
+    """Yields method, wavelets (0: none), parameters and prediction."""
+    seen = set()
+    for most in WAVELETS:
+        network = WaveletNetworkRegressor(max_wavelets=most).fit(X, y)
+        if network.n_wavelets_ in seen:
+            continue
+        seen.add(network.n_wavelets_)
+        force = network.network_.force
+        yield (
+            "wavelet network",
+            network.n_wavelets_,
+            network.n_parameters_,
+            lambda rows, force=force: force(rows[:, 0]),
+        )
+    for name, settings in BASELINES.items():
+        for setting in settings:
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    fitted = setting.fit(X, y)
+            except (ValueError, np.linalg.LinAlgError) as refused:
+                print(f"{name}: {refused}")
+                continue
+            yield name, 0, fitted.n_parameters_, fitted.predict
+
+
+def main() -> None:
+    rows = []
+    start = time.perf_counter()
+    for name in PROBLEMS:
+        given = problem(name)
+        found = list(models(given.X, given.y))
+        calls = {str(k): partial(each[3], given.X_test) for k, each in enumerate(found)}
+        times = timed(calls, scaled(0.02), time.process_time_ns)
+        print(f"{name}: {TITLES[name]}")
+        for k, (method, wavelets, parameters, predict) in enumerate(found):
+            ns = median(times[str(k)]) / len(given.truth)
+            error = given.nrmse(predict(given.X_test))
+            rows.append(
+                row(
+                    f"{TITLES[name].split(',')[0]}/{method}/{k}",
+                    ns,
+                    nrmse=error,
+                    n_parameters=parameters,
+                    n_wavelets=wavelets,
+                )
+            )
+            print(
+                f"  {method:20} {wavelets:4d} wavelets {parameters:5d} parameters {error:10.2e} {ns:8.1f} ns"
+            )
+    write_results(Path(sys.argv[1]), rows)
+    print(f"{time.perf_counter() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shared by all studies: scale of a run, JSON files with machine and date, tables of generated pages."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from palpate import __version__
+from palpate.recording.files import replacing
+
+ROOT = Path(__file__).parents[1]
+
+SCALE = float(os.environ.get("PALPATE_BENCH_SCALE", "1"))
+"""1 for numbers that are published, 0.01 to see that everything runs."""
+
+
+def count(full: int) -> int:
+    """Number of draws or files at the current scale, at least 1."""
+    return max(1, round(full * min(SCALE, 1.0)))
+
+
+def commit() -> str:
+    """Returns the commit of this checkout, with "-dirty" if a file was changed."""
+    answer = subprocess.run(
+        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    return answer.stdout.strip() or "unknown"
+
+
+def where() -> dict[str, Any]:
+    """Returns machine, date and versions of a measurement."""
+    return {
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
+        "python": platform.python_version(),
+        "palpate": __version__,
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "commit": commit(),
+        "scale": SCALE,
+        "load": round(os.getloadavg()[0], 1),
+    }
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes the whole file or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Writes one JSON value."""
+    write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+def write_results(path: Path | None, results: Any) -> None:
+    """Writes results with their machine and date; does nothing without a path."""
+    if path is not None:
+        write_json(path, {"where": where(), "results": results})
+
+
+def markdown_table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: Sequence[int] = (0,)
+) -> str:
+    """Returns a table; the numbers of the other columns are aligned right."""
+    rule = ["---" if k in text_columns else "---:" for k in range(len(header))]
+    return "".join(f"| {' | '.join(line)} |\n" for line in (header, rule, *rows))
+
+
+def fill_tables(page: Path, tables: Mapping[str, str]) -> None:
+    """Writes tables between the marks `<!-- NAME -->` and `<!-- end -->` of a page, if the page exists.
+
+    Raises
+    ------
+    SystemExit
+        A mark is missing.
+    """
+    if not page.exists():
+        return
+    text = page.read_text(encoding="utf-8")
+    for name, table in tables.items():
+        mark, end = f"<!-- {name} -->\n", "<!-- end -->\n"
+        before, _, marked = text.partition(mark)
+        _, found, after = marked.partition(end)
+        if not found or mark in after:
+            raise SystemExit(
+                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line of its own"
+            )
+        text = before + mark + table + end + after
+    write_text(page, text)
+    print(f"wrote the tables of {page}")

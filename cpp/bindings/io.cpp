@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <pybind11/stl.h>
+
+#include "bindings.hpp"
+#include "palpate/io/model_file.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+py::object to_python(const Json& value) {
+    switch (value.type()) {
+        case Json::value_t::object: {
+            py::dict items;
+            for (const auto& item : value.items()) {
+                items[py::str(item.key())] = to_python(item.value());
+            }
+            return items;
+        }
+        case Json::value_t::array: {
+            py::list items(value.size());
+            for (std::size_t k = 0; k < value.size(); ++k) {
+                items[k] = to_python(value[k]);
+            }
+            return items;
+        }
+        case Json::value_t::string:
+            return py::str(value.get_ref<const std::string&>());
+        case Json::value_t::boolean:
+            return py::bool_(value.get<bool>());
+        case Json::value_t::number_integer:
+            return py::int_(value.get<std::int64_t>());
+        case Json::value_t::number_unsigned:
+            return py::int_(value.get<std::uint64_t>());
+        case Json::value_t::number_float:
+            return py::float_(value.get<double>());
+        default:
+            return py::none();
+    }
+}
+
+/// An integer of more than 64 bits becomes a double, as it does in a file.
+Json to_json(const py::handle& value, int depth = 0) {
+    if (depth > deepest_json) {
+        throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
+                                    " levels deep");
+    }
+    if (value.is_none()) {
+        return nullptr;
+    }
+    if (py::isinstance<py::bool_>(value)) {
+        return value.cast<bool>();
+    }
+    if (py::isinstance<py::float_>(value)) {
+        return value.cast<double>();
+    }
+    if (py::isinstance<py::int_>(value)) {
+        try {
+            return value < py::int_(0) ? Json(value.cast<std::int64_t>()) : Json(value.cast<std::uint64_t>());
+        } catch (const py::cast_error&) {
+            return value.cast<double>();
+        }
+    }
+    if (py::isinstance<py::str>(value)) {
+        return value.cast<std::string>();
+    }
+    if (py::isinstance<py::dict>(value)) {
+        Json items = Json::object();
+        for (const auto& [key, item] : py::reinterpret_borrow<py::dict>(value)) {
+            items[py::str(key).cast<std::string>()] = to_json(item, depth + 1);
+        }
+        return items;
+    }
+    if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+        Json items = Json::array();
+        for (const py::handle& item : py::reinterpret_borrow<py::sequence>(value)) {
+            items.push_back(to_json(item, depth + 1));
+        }
+        return items;
+    }
+    throw std::invalid_argument("the file cannot hold " + py::repr(value).cast<std::string>());
+}
+
+}  // namespace
+
+void bind_io(py::module_& module) {
+    module.def(
+        "read_json", [](const std::string& path) { return to_python(read_json(path)); }, "path"_a,
+        "Content of a JSON file. ValueError: one sentence that begins with the name of the file.");
+    module.def(
+        "check_model", [](const py::object& content) { (void)parse_model(to_json(content)); }, "content"_a,
+        "Checks the content of a model file; a certificate is computed again. ValueError: the path of the\n"
+        "first wrong field, its value, what would be right.");
+    module.def(
+        "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
+        "plan"_a, "Scheme of the plan of a model file.");
+    module.def(
+        "checked_certificate",
+        [](const ForceModel& model, const py::object& plan, const py::object& certificate) {
+            const Json scheme = to_json(plan);
+            const Json stored = to_json(certificate);
+            return *detail::read_certificate({stored, "certificate"}, detail::read_plan({scheme, "plan"}),
+                                             model, "");
+        },
+        "model"_a, "plan"_a, "certificate"_a,
+        "Certificate of a model file, computed again from the rendered model and found the same. "
+        "ValueError:\n"
+        "the field that differs, its value, what would be right.");
+}
+
+}  // namespace palpate::bindings

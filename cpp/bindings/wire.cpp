@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include "bindings.hpp"
+#include "palpate/device/wire.hpp"
+
+namespace palpate::bindings {
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace {
+
+py::dict decode_info(const py::bytes& data) {
+    const auto text = data.cast<std::string>();
+    wire::Info info;
+    const std::string fault =
+        wire::decode({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, info);
+    if (!fault.empty()) {
+        throw std::invalid_argument(fault);
+    }
+    return py::dict(
+        "firmware"_a = info.firmware, "counts_per_rev"_a = info.counts_per_rev,
+        "encoder_step"_a = wire::position_of(1, info.counts_per_rev),
+        "max_torque"_a = -wire::force_of(info.max_torque_uNm), "rate_hz"_a = info.rate_hz,
+        "watchdog_ms"_a = info.watchdog_ms, "transducer"_a = (info.capabilities & wire::has_transducer) != 0,
+        "measures_velocity"_a = (info.capabilities & wire::measures_velocity) != 0, "uid"_a = info.uid);
+}
+
+}  // namespace
+
+void bind_wire(py::module_& module) {
+    module.def("decode_info", &decode_info, "data"_a,
+               "Identity of a USB device from its answer to GET_INFO. InputError names the wrong field.\n\n"
+               "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, "
+               "transducer,\nmeasures_velocity, uid.");
+    py::enum_<wire::Request>(module, "UsbRequest", "bRequest of a control transfer.")
+        .value("GetInfo", wire::Request::GetInfo)
+        .value("Enable", wire::Request::Enable)
+        .value("Zero", wire::Request::Zero)
+        .value("Watchdog", wire::Request::Watchdog)
+        .value("Clear", wire::Request::Clear);
+    module.attr("usb_vendor") = wire::vendor_id;
+    module.attr("usb_product") = wire::product_id;
+    module.attr("usb_interface") = wire::interface_number;
+    module.attr("usb_interface_kind") =
+        py::make_tuple(wire::interface_kind[0], wire::interface_kind[1], wire::interface_kind[2]);
+    module.attr("usb_to_host") = wire::request_to_host;
+    module.attr("usb_to_device") = wire::request_to_device;
+    module.attr("usb_largest_packet") = wire::largest_packet;
+    module.attr("shortest_watchdog_ms") = wire::shortest_watchdog_ms;
+    module.attr("longest_watchdog_ms") = wire::longest_watchdog_ms;
+}
+
+}  // namespace palpate::bindings

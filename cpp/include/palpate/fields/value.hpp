@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace palpate {
+
+struct Field;
+using Fields = std::vector<Field>;
+
+/// A value of a report, which becomes JSON or a Python object. An empty one and a number that is not finite are null.
+using Value = std::variant<std::monostate, bool, std::uint64_t, double, std::string, std::vector<double>,
+                           std::vector<std::string>, Fields, std::vector<Fields>>;
+
+/// One named value of a report.
+struct Field {
+    std::string name;
+    Value value;
+};
+
+/// Lines of a report for a person: title and text.
+using Lines = std::vector<std::pair<std::string, std::string>>;
+
+}  // namespace palpate

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "palpate/device/device_profile.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/scheme.hpp"
+
+namespace palpate {
+
+/// Size of a model relative to a model that suits the default knob. Default numbers are multiplied by it; times stay as
+/// they are.
+struct ModelScale {
+    double length = 1.0;  ///< positions, relative to those of the knob
+    double force = 1.0;   ///< forces, relative to those of the knob
+
+    [[nodiscard]] double stiffness() const noexcept { return force / length; }
+};
+
+namespace detail {
+
+inline constexpr double knob_travel = 0.5;     ///< of a model that suits the default knob [rad]
+inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device over the largest force
+
+/// Returns the force while sliding in a direction, +1 for pressing and -1 for releasing. A model of position and
+/// velocity slides at the largest velocity of its data.
+[[nodiscard]] inline double sliding_force(const ForceModel& model, double position,
+                                          double direction) noexcept {
+    if (const VelocityNetwork* force = model.velocity()) {
+        const Domain& box = model.domain();
+        return force->force(position, direction > 0.0 ? box.upper[1] : box.lower[1]);
+    }
+    return model.hysteresis() != nullptr ? model.hysteresis()->sliding(position, direction).force
+                                         : model.network()->at(position, {}).force;
+}
+
+[[nodiscard]] inline double largest_force(const ForceModel& model) noexcept {
+    const double lower = model.domain().lower[0];
+    const double step = (model.domain().upper[0] - lower) / 1000.0;
+    double largest = 0.0;
+    for (int k = 0; k <= 1000; ++k) {
+        for (const double direction : {-1.0, 1.0}) {
+            largest = std::max(largest, std::abs(sliding_force(model, lower + k * step, direction)));
+        }
+    }
+    return largest > 0.0 ? largest : 1.0;
+}
+
+}  // namespace detail
+
+/// Returns the scale of a model of position, or of position and velocity. `is_angle`: its positions are in rad, so it
+/// suits the knob as it is. For any other unit (millimetres of a keyswitch, micrometres under an AFM tip) travel and
+/// largest force are compared with the knob's.
+[[nodiscard]] inline ModelScale scale_of(const ForceModel& model, bool is_angle) {
+    require_renderable(model);
+    if (is_angle) {
+        return {};
+    }
+    const double length = (model.domain().upper[0] - model.domain().lower[0]) / detail::knob_travel;
+    const double force = detail::force_reserve * detail::largest_force(model) / DeviceProfile{}.force_limit;
+    return {length, force};
+}
+
+/// Returns the default knob at a model's scale.
+[[nodiscard]] inline DeviceProfile scaled_knob(const ModelScale& scale, bool is_angle, double period_s) {
+    DeviceProfile device;
+    device.period_s = period_s;
+    if (!is_angle) {
+        device.id += ", scaled";
+        device.position_unit = "m";
+        device.inertia *= scale.stiffness();
+        device.viscous_damping *= scale.stiffness();
+        device.coulomb_friction *= scale.force;
+        device.encoder_step *= scale.length;
+        device.force_step *= scale.force;
+        device.force_limit *= scale.force;
+    }
+    return device;
+}
+
+/// Fields of a scheme that the user chose, in the model's own units. The others follow the model.
+struct SchemeChoices {
+    std::optional<StructureKind> structure;
+    std::optional<bool> compensated;
+    std::optional<double> coupling_stiffness;
+    std::optional<double> coupling_damping;
+    std::optional<double> mass;
+    std::optional<double> damping;
+    std::optional<double> play_radius;
+    std::optional<int> predict;
+
+    /// True if a field is chosen. A flag that is not set chooses nothing.
+    [[nodiscard]] bool any() const noexcept {
+        return structure || compensated.value_or(false) || coupling_stiffness || coupling_damping || mass ||
+               damping || play_radius || predict;
+    }
+};
+
+/// Returns the default play radius of a model that leaves it to the rendering, else 0.
+[[nodiscard]] inline double default_play_radius(const ForceModel& model, double encoder_step) noexcept {
+    if (model.hysteresis() == nullptr || model.play_radius()) {
+        return 0.0;
+    }
+    return usual_play_radius(model.domain().upper[0] - model.domain().lower[0], encoder_step);
+}
+
+/// Returns the scheme with the chosen fields, and the default ones at the model's scale elsewhere.
+[[nodiscard]] inline Scheme scheme_for(const ForceModel& model, const ModelScale& scale,
+                                       const DeviceProfile& device, const SchemeChoices& chosen = {}) {
+    const Scheme standard;
+    const bool directly = model.velocity() != nullptr || chosen.predict.value_or(0) > 0;
+    return {chosen.structure.value_or(directly ? StructureKind::Direct : standard.structure),
+            {chosen.coupling_stiffness.value_or(standard.coupling.stiffness * scale.stiffness()),
+             chosen.coupling_damping.value_or(standard.coupling.damping * scale.stiffness())},
+            {chosen.mass.value_or(standard.inertia.mass * scale.stiffness()),
+             chosen.damping.value_or(standard.inertia.damping * scale.stiffness())},
+            chosen.compensated.value_or(standard.compensated),
+            chosen.play_radius.value_or(default_play_radius(model, device.encoder_step)),
+            chosen.predict.value_or(standard.predict)};
+}
+
+}  // namespace palpate

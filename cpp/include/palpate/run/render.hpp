@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "palpate/device/device_profile.hpp"
+#include "palpate/fields/readable.hpp"
+#include "palpate/guard/guard_settings.hpp"
+#include "palpate/guard/guards.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/scale.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/run/controller.hpp"
+#include "palpate/run/live_device.hpp"
+#include "palpate/run/record_sinks.hpp"
+#include "palpate/run/session.hpp"
+#include "palpate/run/session_text.hpp"
+#include "palpate/run/session_verdict.hpp"
+#include "palpate/run/summary.hpp"
+#include "palpate/stability/certificate.hpp"
+
+namespace palpate {
+
+/// Options of every session.
+struct RunOptions {
+    std::string device = "simulated";
+    std::optional<double> wait_s;  ///< for an answer of the device; default: the device's own [s]
+    LoopSettings loop;
+    RealTimeOptions real_time;
+    std::string record;  ///< recording; empty: none
+    bool force = false;  ///< replace an existing recording
+    std::optional<std::uint16_t> telemetry_port;
+    double telemetry_hz = Telemetry::usual_hz;
+    std::string created_by;
+};
+
+/// Options of a rendering. Fields that are not set follow the model and the device.
+struct RenderOptions : RunOptions {
+    bool rate_given = false;  ///< true if the user chose loop.rate_hz
+    SchemeChoices scheme;
+    std::optional<double> force_limit;
+    std::optional<double> largest_speed;
+    std::optional<double> slew_s;
+    std::optional<std::uint64_t> tolerated;
+    double ramp_s = GuardSettings{}.ramp_s;
+    double frozen_s = GuardSettings{}.frozen_s;
+    bool energy_tank = true;
+    bool uncertified = false;
+    std::vector<std::string> faults;  ///< of the simulated device
+};
+
+/// A model and its plan.
+struct PlannedModel {
+    std::string name;  ///< of its file
+    ForceModel model;  ///< the identified model
+    std::string position_unit;
+    std::string force_unit;
+    std::optional<Scheme> plan;
+    std::optional<ForceModel> limited;  ///< rendered by the plan in place of `model`
+    std::optional<Certificate> certificate;
+
+    [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
+    /// Returns the name and the units, for a refusal.
+    [[nodiscard]] std::string in_units() const {
+        const auto unit = [](const std::string& text) { return text.empty() ? "no unit" : text; };
+        return name + " is in " + unit(position_unit) + " and " + unit(force_unit);
+    }
+    [[nodiscard]] RecordUnits units() const {
+        return {position_unit, force_unit == "N*m" ? "Nm" : force_unit};
+    }
+};
+
+/// A rendering on an open device, settled before anything moves.
+struct RenderJob {
+    const ForceModel& model;  ///< that is rendered
+    Scheme scheme;
+    GuardSettings guards;
+    SessionSettings session;
+    Metadata metadata;
+    std::vector<std::string> notes;  ///< for the user
+};
+
+[[noreturn]] inline void refuse(const std::string& sentence) {
+    throw std::invalid_argument(sentence);
+}
+
+/// True if the options choose a rendering that differs from the plan. Then no certificate holds.
+[[nodiscard]] inline bool differs_from_plan(const RenderOptions& options) noexcept {
+    return options.scheme.any() || options.force_limit || options.slew_s || options.tolerated;
+}
+
+/// Returns the reason why the certificate of a model does not hold for a simulated device; empty if it holds.
+[[nodiscard]] inline std::string void_reason(const RenderOptions& options, const PlannedModel& model) {
+    if (!model.certificate) {
+        return "the model has no certificate";
+    }
+    if (options.uncertified) {
+        return "--uncertified was given";
+    }
+    return differs_from_plan(options) ? "the command line asks for a rendering of its own" : "";
+}
+
+namespace detail {
+
+/// Returns the reason why a model must not move a device; empty if its certificate holds for the device, its rate and
+/// the options. The reader of the model checked that the certificate fits the model.
+[[nodiscard]] inline std::string certificate_mismatch(const RenderOptions& options, const PlannedModel& model,
+                                                      const DeviceProfile& device) {
+    const auto differs = [](double certified, double measured) {
+        constexpr double rounding = 1e-6;  // of a profile written by hand
+        return std::abs(certified - measured) > rounding * std::abs(measured);
+    };
+    if (!model.certificate) {
+        return "has no certificate";
+    }
+    const DeviceProfile& certified = model.certificate->device;
+    if (!model.certificate->certified()) {
+        return "is not certified: " + model.certificate->why;
+    }
+    if (certified.id != device.id) {
+        return "is certified for the device " + certified.id + ", not for " + device.id;
+    }
+    if (differs(certified.period_s, device.period_s)) {
+        return "is certified for a period of " + readable(1e3 * certified.period_s) + " ms, the device has " +
+               readable(1e3 * device.period_s) + " ms";
+    }
+    if (certified.encoder_step < device.encoder_step &&
+        differs(certified.encoder_step, device.encoder_step)) {
+        return "is certified for an encoder step of " + readable(certified.encoder_step) +
+               " rad, the device has " + readable(device.encoder_step) + " rad";
+    }
+    if (certified.force_limit > device.force_limit && differs(certified.force_limit, device.force_limit)) {
+        return "is certified for " + readable(certified.force_limit) + " N*m, the device makes " +
+               readable(device.force_limit) + " N*m";
+    }
+    if (differs_from_plan(options)) {
+        return "is certified as it was planned: leave out --structure and its numbers, --force-limit, "
+               "--slew-s, --tolerated-samples";
+    }
+    return "";
+}
+
+[[nodiscard]] inline GuardSettings chosen_guards(const RenderOptions& options, const LiveDevice& device) {
+    GuardSettings guards = guards_for(device.scale, device.profile);
+    guards.force_limit = options.force_limit.value_or(guards.force_limit);
+    guards.largest_speed = options.largest_speed.value_or(guards.largest_speed);
+    guards.slew_s = options.slew_s.value_or(guards.slew_s);
+    guards.ramp_s = options.ramp_s;
+    guards.frozen_s = options.frozen_s;
+    guards.energy_tank = options.energy_tank;
+    validate(guards);
+    if (!device.profile.makes(guards.force_limit)) {
+        refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +
+               readable(device.profile.force_limit));
+    }
+    guards.force_limit = std::min(guards.force_limit, device.profile.force_limit);
+    return guards;
+}
+
+/// Below this share of its rate the certificate does not hold, because it is for the period of the rate.
+inline constexpr double certified_rate_share = 0.99;
+
+/// Sets guards and loop as certified: no slew limit and no tick without a force, because the proofs do not cover them;
+/// the certified force limit; no longer time between two ticks than certified; damping and friction of the device for
+/// the energy tank.
+inline void keep_certified(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
+    guards.certified = true;
+    guards.slew_s = 0.0;
+    guards.force_limit = certificate.device.force_limit;
+    guards.device_damping = certificate.device.viscous_damping;
+    guards.device_friction = certificate.device.coulomb_friction;
+    loop.tolerated = 0;
+    loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
+    loop.longest_period_s = certificate.longest_period_s;
+}
+
+/// Opens telemetry and recording. Returns a sentence if an interrupted recording was set aside, else "".
+inline std::string open_sinks(const RunOptions& options, const RecordUnits& units, const Metadata& metadata,
+                              RecordSinks& sinks) {
+    if (options.telemetry_port) {
+        const std::string reason = sinks.telemetry.open(*options.telemetry_port, options.telemetry_hz, units);
+        require(reason.empty(), reason);
+    }
+    if (options.record.empty()) {
+        return "";
+    }
+    const std::string reason = sinks.file.open(options.record, units, metadata, options.force);
+    require(reason.empty(), reason);
+    const std::string& aside = sinks.file.file().set_aside_as();
+    return aside.empty() ? "" : "a recording that was cut off earlier is kept as " + aside;
+}
+
+/// Finishes the recording and judges the session.
+[[nodiscard]] inline Summary finish(const RunOptions& options, const LoopSettings& loop,
+                                    const RecordUnits& units, const Metadata& metadata, RecordSinks& sinks,
+                                    SessionReport report, SessionExpectation expected,
+                                    const LiveDevice& device) {
+    Summary summary;
+    summary.report = std::move(report);
+    summary.loop = loop;
+    summary.units = units;
+    summary.record = options.record;
+    if (!options.record.empty()) {
+        expected.recorded = true;
+        summary.warnings = finish_record(sinks.file, summary.report, loop, summary.record);
+        if (!summary.orderly()) {
+            summary.last_ticks =
+                write_last_ticks(options.record, options.force, units, metadata, summary.report, loop);
+        }
+    }
+    expected.warnings = summary.warnings;
+    summary.findings = judge_session(summary.report, loop, sinks, expected);
+    summary.recorded = sinks.file.written();
+    summary.lost_records = summary.report.lost_records + sinks.file.refused();
+    summary.telemetry_sent = sinks.telemetry.sent();
+    summary.telemetry_dropped = sinks.telemetry.dropped();
+    summary.positions = sinks.positions;
+    summary.forces = sinks.forces;
+    summary.kept = std::move(sinks.kept);
+    summary.device = device.title;
+    summary.device_report = device.report();
+    return summary;
+}
+
+}  // namespace detail
+
+/// Settles scheme, guards and rate of a rendering on an open device. A real device requires a certificate that holds for
+/// it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a refusal.
+[[nodiscard]] inline RenderJob settle(const RenderOptions& options, const PlannedModel& model,
+                                      const LiveDevice& device) {
+    std::string reason = void_reason(options, model);
+    if (!device.simulated && !options.uncertified) {
+        reason = detail::certificate_mismatch(options, model, device.profile);
+        if (!reason.empty()) {
+            refuse(model.name + " " + reason +
+                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+        }
+    }
+    const bool follows_plan = model.plan && !options.scheme.any();
+    RenderJob job{
+        follows_plan ? model.planned() : model.model,
+        follows_plan ? *model.plan : scheme_for(model.model, device.scale, device.profile, options.scheme),
+        detail::chosen_guards(options, device),
+        {.loop = options.loop, .real_time = options.real_time},
+        {},
+        {}};
+    LoopSettings& loop = job.session.loop;
+    loop.rate_hz = device.rate_hz;
+    loop.tolerated = options.tolerated.value_or(loop.tolerated);
+    if (reason.empty()) {
+        detail::keep_certified(*model.certificate, job.guards, loop);
+    } else if (model.certificate && device.simulated) {
+        job.notes.push_back("uncertified: " + reason);
+    }
+    validate(loop);
+    validate(job.guards);
+    validate(job.scheme, job.model, 1.0 / loop.rate_hz);
+    if (!model.plan && !options.scheme.any() && job.scheme.structure != StructureKind::Direct) {
+        job.notes.emplace_back(
+            "no plan in the model: rendered behind the default coupling, which is felt; 'palpate plan' finds "
+            "the simplest rendering that is not");
+    }
+    job.metadata = device.metadata;
+    job.metadata.emplace_back("certified", !reason.empty() ? "no: " + reason
+                                           : device.simulated
+                                               ? std::string(name_of(model.certificate->verdict))
+                                               : "yes");
+    job.metadata =
+        flight_metadata(options.created_by, job.metadata, model.name, job.scheme, job.guards, loop.rate_hz);
+    return job;
+}
+
+/// Renders a model on an open device until the loop ends, then closes the device.
+[[nodiscard]] inline Summary render(const RenderOptions& options, const PlannedModel& model,
+                                    const RenderJob& job, LiveDevice& device,
+                                    const std::atomic<bool>& stop_requested, const Watch& watch) {
+    if (std::error_code ignored;
+        !options.record.empty() && std::filesystem::equivalent(options.record, model.name, ignored)) {
+        refuse("--record " + options.record + " is the model; writing there would destroy it");
+    }
+    RecordSinks sinks;
+    const std::string note = detail::open_sinks(options, model.units(), job.metadata, sinks);
+    const double period_s = 1.0 / job.session.loop.rate_hz;
+    SessionReport report =
+        with_structure(job.model, job.scheme, period_s, job.guards.force_limit, [&](auto structure) {
+            Controller controller{device, std::move(structure),
+                                  guards_of(job.guards, job.model, job.scheme, period_s)};
+            return run_session(controller, job.session, sinks, stop_requested, watch);
+        });
+    const Domain& domain = model.model.domain();
+    Summary summary =
+        detail::finish(options, job.session.loop, model.units(), job.metadata, sinks, std::move(report),
+                       {.encoder_step = job.guards.encoder_step,
+                        .domain = {domain.lower[0], domain.upper[0]},
+                        .position_unit = model.position_unit},
+                       device);
+    summary.notes = job.notes;
+    if (!note.empty()) {
+        summary.notes.push_back(note);
+    }
+    return summary;
+}
+
+}  // namespace palpate

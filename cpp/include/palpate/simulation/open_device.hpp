@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/fields/readable.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/run/live_device.hpp"
+#include "palpate/run/measure.hpp"
+#include "palpate/run/open_inverse3.hpp"
+#include "palpate/run/open_usb.hpp"
+#include "palpate/run/render.hpp"
+#include "palpate/simulation/faulty_device.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/test_rig.hpp"
+
+namespace palpate {
+
+/// Opens the simulated device for rendering: that of the certificate if one holds, else the default knob at the model's
+/// scale.
+[[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
+                                                                const PlannedModel& model) {
+    const bool certified = void_reason(options, model).empty();
+    const double rate_hz = certified ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
+    if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
+        refuse("--rate-hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
+               readable(rate_hz) + " Hz: plan again for a device of that period, or give --uncertified");
+    }
+    LoopSettings loop = options.loop;
+    loop.rate_hz = rate_hz;
+    validate(loop);
+    const double period_s = 1.0 / rate_hz;
+    TestRig rig = rig_for(model.model, model.position_unit == "rad", period_s);
+    if (certified) {
+        rig.device = model.certificate->device;
+    }
+    const double largest_speed =
+        options.largest_speed.value_or(guards_for(rig.scale, rig.device).largest_speed);
+    std::vector<Fault> faults;
+    for (const std::string& fault : options.faults) {
+        faults.push_back(parse_fault(fault, period_s));
+    }
+    auto live = std::make_unique<LiveDeviceOf<Faulty<SimulatedDevice>>>(
+        Faulty{SimulatedDevice{rig.device, rig.hand, simulated_substeps(period_s)}, faults,
+               3.0 * largest_speed * period_s});
+    if (const Opened opened = live->open(); !opened) {
+        refuse(opened.reason);
+    }
+    live->title = rig.device.id + " (simulated: nothing moves)";
+    live->profile = rig.device;
+    live->scale = rig.scale;
+    live->rate_hz = rate_hz;
+    live->metadata = simulated_metadata(rig);
+    live->simulated = true;
+    return live;
+}
+
+/// Opens a device for rendering by its name: simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]. Throws
+/// std::invalid_argument with the reason if it cannot be opened or does not fit the model.
+[[nodiscard]] inline std::unique_ptr<LiveDevice> open_device(const RenderOptions& options,
+                                                             const PlannedModel& model) {
+    const std::string kind = options.device.substr(0, options.device.find(':'));
+    const bool whole = options.device == kind;
+    if (!(kind == "simulated" && whole) &&
+        !((kind == "usb" || kind == "inverse3") && (whole || options.device.size() > kind.size() + 1))) {
+        refuse("device is '" + options.device +
+               "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
+    }
+    if (kind != "simulated" && !options.faults.empty()) {
+        refuse("--fault is for the simulated device");
+    }
+    if (model.force_unit == "A") {
+        refuse(
+            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A");
+    }
+    return kind == "usb"        ? open_usb(options, model)
+           : kind == "inverse3" ? open_inverse3(options, model)
+                                : open_simulated(options, model);
+}
+
+/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or simulated with the model `object`
+/// mounted. Options that follow the device are set.
+[[nodiscard]] inline std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
+                                                                   const std::optional<ForceModel>& object) {
+    if (options.device == "usb" || options.device.starts_with("usb:")) {
+        return usb_to_measure(options);
+    }
+    detail::require(options.device == "simulated",
+                    "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    validate(options.loop);
+    const double period_s = 1.0 / options.loop.rate_hz;
+    TestRig rig;
+    rig.device.period_s = period_s;
+    if (object) {
+        rig = rig_for(*object, options.units.position == "rad", period_s);
+        options.lower = options.lower.value_or(object->domain().lower[0]);
+        options.upper = options.upper.value_or(object->domain().upper[0]);
+    }
+    if (options.moves()) {
+        rig.hand.stiffness = rig.hand.damping = 0.0;  // nobody holds a handle that moves by itself
+    }
+    rig.device.coulomb_friction = options.friction_share * rig.device.force_limit;
+    validate(rig.device);
+    SimulatedRig device{rig.device, rig.hand, simulated_substeps(period_s)};
+    const bool transducer = object && options.transducer;
+    if (object) {
+        device.mount({object_of(*object, rig, 0.0), transducer});
+    }
+    auto live = std::make_unique<LiveDeviceOf<SimulatedRig>>(std::move(device));
+    live->title = rig.device.id;
+    live->profile = rig.device;
+    live->scale = rig.scale;
+    live->rate_hz = options.loop.rate_hz;
+    live->metadata = {{"simulated", "yes: device, hand and object; nothing here was measured"},
+                      {"device", rig.device.id}};
+    live->simulated = true;
+    live->transducer = transducer;
+    return live;
+}
+
+}  // namespace palpate

@@ -1,0 +1,348 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Candidate structures for a model on a device, the simplest first: each is certified or refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from .._core.device import DeviceProfile
+from .._core.model import ForceModel
+from .._core.rendering import Scheme, compensated_share
+from .._core.stability import Certificate, balancing_shift, certify, force_bounds, steepest_stick
+from .choices import (
+    LONGEST_PLAY,
+    SPARE,
+    coupling_for,
+    explicit_scheme,
+    play_radius_for,
+    renderable_slopes,
+    usual_play_radius,
+)
+from .limited_network import limit_slopes, scale_hysteresis, sliding_slopes
+from .static_error import static_force_error, with_network
+
+_COUPLING_DAMPING = 0.2
+"""Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""
+
+_WIDER_PLAY = 1.02
+"""Play radius that is tried if the computed one is just refused [share of the computed one]"""
+
+_PREDICTIONS = (1, 2, 4, 8, 16)
+"""Samples tried for a prediction. Few react faster, with less force error; many need less damping [-]"""
+
+_LATE_TICK = 1.25
+"""Time between two samples for which a chosen prediction must hold, unless none is certified that long
+[longest time between samples of the device]"""
+
+_LEAST_HYSTERESIS = 1.0 / 64.0
+"""Smallest share of h that is still worth rendering [-]"""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A network, the scheme that renders it, and what is proved of both on a device."""
+
+    rendered: ForceModel
+    certificate: Certificate
+
+    @property
+    def scheme(self) -> Scheme:
+        return self.certificate.scheme
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """The reason why a structure does not apply."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A model, a device, and the caller's requirements in the model's units."""
+
+    model: ForceModel
+    device: DeviceProfile
+    coupling: bool = False
+    coupling_stiffness: float | None = None
+    coupling_damping: float | None = None
+    mass: float | None = None
+    damping: float | None = None
+    """Object damping"""
+    play_radius: float | None = None
+    predict: int | None = None
+    """Samples of the prediction; 0: none; None: chosen"""
+    may_limit: bool = True
+    """True if a limited network may be rendered in place of the identified one"""
+
+    @property
+    def dynamic(self) -> bool:
+        """True if the object has mass or damping besides its force."""
+        return bool(self.mass) or bool(self.damping)
+
+    @property
+    def chooses_play(self) -> bool:
+        """True if neither the caller nor the model gives a play radius."""
+        return self.model.hysteretic and not self.play_radius and self.model.play_radius is None
+
+    @property
+    def longest_play(self) -> float:
+        """Largest play radius [position]."""
+        return LONGEST_PLAY * float(self.model.upper[0] - self.model.lower[0])
+
+    @property
+    def usual_play(self) -> float:
+        """The caller's play radius, or the usual one [position]."""
+        return self.play_radius or usual_play_radius(self.model, self.device)
+
+    def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
+        """A scheme for the model, or for a network in its place, with its certificate."""
+        rendered = rendered or self.model
+        return Candidate(rendered, certify(rendered, scheme, self.device))
+
+    def direct_scheme(self, rendered: ForceModel) -> Scheme:
+        """The direct structure; it has the narrowest play that is certified for a network."""
+        radius = self.play_radius or 0.0
+        if self.chooses_play:
+            radius = min(play_radius_for(rendered, self.device), self.longest_play)
+        return Scheme(structure="direct", play_radius=radius, predict=self.predict or 0)
+
+    def not_static(self) -> Refusal | None:
+        """Refuses a structure without mass for an object with mass or damping."""
+        if not self.dynamic:
+            return None
+        parts = [
+            f"a {word} of {value:.4g}"
+            for word, value in (("mass", self.mass), ("damping", self.damping))
+            if value
+        ]
+        return Refusal(f"the object has {' and '.join(parts)}, which it would leave out")
+
+    def not_direct(self) -> Refusal | None:
+        """Refuses direct rendering for an object with mass, or where a coupling is required."""
+        return self.not_static() or (Refusal("a coupling was asked for") if self.coupling else None)
+
+    def only_direct(self) -> Refusal | None:
+        """Refuses a prediction, which only the direct structure of the identified model has."""
+        if not self.predict:
+            return None
+        return Refusal(
+            f"it has no prediction of the model as it was identified, and predict is {self.predict}"
+        )
+
+
+_NOT_LIMITED = Refusal("the model is to be rendered as it was identified")
+
+
+def _direct(task: Task) -> Candidate | Refusal:
+    """The model as it was identified."""
+    if refusal := task.not_direct():
+        return refusal
+    found = task.certified(task.direct_scheme(task.model))
+    if found.certificate.refused and task.chooses_play:
+        # Bounds of the sum g' + h / r can be wider than the sum of the bounds, from which r was chosen.
+        wider = min(_WIDER_PLAY * found.scheme.play_radius, task.longest_play)
+        again = task.certified(_direct_with(wider, found.scheme.predict))
+        found = found if again.certificate.refused else again
+    return _predicted(found, task)
+
+
+def _direct_limited(task: Task) -> Candidate | Refusal:
+    """The nearest force that the device can render."""
+    if refusal := task.not_direct():
+        return refusal
+    if not task.may_limit:
+        return _NOT_LIMITED
+    if refusal := task.only_direct():
+        return refusal
+    low, high = renderable_slopes(task.device, model=task.model)
+    if high <= 0.0:
+        return _no_slope(task.device)
+    limited = (
+        _hysteresis_limited(_balanced(task.model, task.device), task)
+        if task.model.hysteretic
+        else _within(task.model, low, high, task.device)
+    )
+    if limited is None:
+        return Refusal(f"no network was found whose slopes lie between {low:.4g} and {high:.4g}")
+    return _predicted(task.certified(task.direct_scheme(limited), limited), task)
+
+
+def _massless(task: Task) -> Candidate | Refusal:
+    """The model behind a coupling whose spring has been taken out of it, slopes limited as that requires."""
+    if refusal := task.not_static():
+        return refusal
+    if not task.coupling:
+        return Refusal("no coupling was asked for, and none makes a steeper slope possible")
+    model, device = task.model, task.device
+    damping = task.coupling_damping or 0.0
+    stiffness = task.coupling_stiffness
+    low, high = (-math.inf, math.inf) if model.hysteretic else renderable_slopes(device)
+    if stiffness is None:
+        static = damping == 0.0 and not model.hysteretic
+        falling = 0.0 if static else max(0.0, -force_bounds(model, task.usual_play).slope_min)
+        stiffness = coupling_for(device, damping, falling)
+        if static:
+            stiffness = min(stiffness, SPARE * high)
+    if stiffness <= 0.0:
+        return _no_slope(device)
+    scheme = Scheme(
+        structure="massless",
+        coupling_stiffness=stiffness,
+        coupling_damping=damping,
+        compensated=not model.hysteretic,
+        play_radius=task.usual_play,
+    )
+    if model.hysteretic:
+        return task.certified(scheme)
+    highest = compensated_share * stiffness
+    balanced = _balanced(model, device)
+    low, high = low if damping == 0.0 else -math.inf, min(highest, high)
+    if not task.may_limit and not (balanced is model and _fits(model, low, high)):
+        return _NOT_LIMITED
+    limited = _within(balanced, low, high, device)
+    if limited is None:
+        return Refusal(f"no network was found whose slopes lie below {highest:.4g} = {compensated_share} K_c")
+    return task.certified(scheme, limited)
+
+
+def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
+    """The model with its mass behind a coupling."""
+    if not task.dynamic:
+        return Refusal("the object has no mass or damping of its own")
+    if not task.mass:
+        return Refusal("the object has damping but no mass; give one with mass")
+    damping = task.coupling_damping
+    if damping is None:
+        damping = _COUPLING_DAMPING * task.device.viscous_damping
+    stiffness = task.coupling_stiffness
+    if stiffness is None:
+        stiffness = coupling_for(task.device, damping)
+    if stiffness <= 0.0:
+        return Refusal(f"the device's damping {task.device.viscous_damping:.4g} holds no coupling")
+    return task.certified(
+        Scheme(
+            structure=structure,
+            coupling_stiffness=stiffness,
+            coupling_damping=damping,
+            mass=task.mass,
+            damping=task.damping or 0.0,
+            play_radius=task.usual_play,
+        )
+    )
+
+
+def _explicit(task: Task) -> Candidate | Refusal:
+    """The paper's structure: stable at best."""
+    if refusal := task.only_direct():
+        return refusal
+    scheme = explicit_scheme(
+        force_bounds(task.model, task.usual_play, task.device.force_limit),
+        task.device,
+        mass=task.mass,
+        damping=task.damping,
+        coupling_stiffness=task.coupling_stiffness,
+        coupling_damping=task.coupling_damping,
+        play_radius=task.usual_play,
+    )
+    return task.certified(scheme)
+
+
+Propose = Callable[[Task], Candidate | Refusal]
+
+
+def _of_position(propose: Propose) -> Propose:
+    """The candidate structure, refused for a force of velocity."""
+
+    def guarded(task: Task) -> Candidate | Refusal:
+        if not task.model.of_velocity:
+            return propose(task)
+        return Refusal(
+            "of a force of position and velocity no bound is known but for direct rendering as it is"
+        )
+
+    return guarded
+
+
+CANDIDATES: Mapping[str, Propose] = {
+    "direct": _direct,
+    "direct, slope limited": _of_position(_direct_limited),
+    "massless": _of_position(_massless),
+    "implicit": _of_position(lambda task: _with_mass("implicit", task)),
+    "energy-consistent": _of_position(lambda task: _with_mass("energy-consistent", task)),
+    "explicit": _of_position(_explicit),
+}
+"""Candidate structures in the order in which they are tried"""
+
+
+def _direct_with(play_radius: float, predict: int) -> Scheme:
+    return Scheme(structure="direct", play_radius=play_radius, predict=predict)
+
+
+def _predicted(found: Candidate, task: Task) -> Candidate:
+    """The same with the fewest samples of prediction that are certified; without where none are.
+
+    A prediction spends damping, and with it the time that a tick may be late: it must leave `_LATE_TICK`, or
+    the time without it. Where nothing is certified without a prediction, any that is certified is taken.
+    """
+    if task.predict is not None or task.model.of_velocity:
+        return found
+    enough = min(_LATE_TICK * task.device.longest_period_s, found.certificate.longest_period_s)
+    for samples in _PREDICTIONS:
+        ahead = task.certified(_direct_with(found.scheme.play_radius, samples), found.rendered)
+        if ahead.certificate.certified and ahead.certificate.longest_period_s >= enough:
+            return ahead
+    return found
+
+
+def _no_slope(device: DeviceProfile) -> Refusal:
+    return Refusal(
+        f"the device can hold no slope at all: friction {device.coulomb_friction:.4g}, damping "
+        f"{device.viscous_damping:.4g}, encoder step {device.encoder_step:.4g}, "
+        f"force step {device.force_step:.4g}"
+    )
+
+
+def _within(model: ForceModel, low: float, high: float, device: DeviceProfile) -> ForceModel | None:
+    """The model itself where its slopes lie within limits, else the nearest that does; balanced."""
+    limited = model if _fits(model, low, high) else limit_slopes(model, low, high)
+    return None if limited is None else _balanced(limited, device)
+
+
+def _fits(model: ForceModel, low: float, high: float) -> bool:
+    found = sliding_slopes(model)
+    return found[0] >= low and found[1] <= high
+
+
+def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
+    """The model, shifted if it repeats: limited by the device, its mean force must be 0."""
+    shift = balancing_shift(model, device.force_limit)
+    return with_network(model, bias=model.bias + shift) if shift else model
+
+
+def _hysteresis_limited(model: ForceModel, task: Task) -> ForceModel:
+    """Limits the slopes or reduces h, whichever has the smaller force error; both where neither is enough."""
+
+    def holds(candidate: ForceModel) -> bool:
+        return not certify(candidate, task.direct_scheme(candidate), task.device).refused
+
+    def scaled(candidate: ForceModel, share: float) -> ForceModel:
+        return _balanced(scale_hysteresis(candidate, share), task.device)
+
+    def most_hysteresis_that_holds(candidate: ForceModel) -> ForceModel:
+        kept, refused = 0.0, 1.0
+        for _ in range(10):
+            share = 0.5 * (kept + refused)
+            kept, refused = (share, refused) if holds(scaled(candidate, share)) else (kept, share)
+        return scaled(candidate, max(kept, _LEAST_HYSTERESIS))
+
+    radius = task.play_radius or model.play_radius or task.longest_play
+    stick = min(force_bounds(model, radius).loss_per_play, steepest_stick(task.device))
+    limited = _within(model, *renderable_slopes(task.device, stick, model), task.device) or model
+    found = [limited if holds(limited) else most_hysteresis_that_holds(limited)]
+    if limited is not model and holds(scaled(model, _LEAST_HYSTERESIS)):
+        found.append(most_hysteresis_that_holds(model))
+    exact = Scheme(structure="direct")
+    return min(found, key=lambda candidate: static_force_error(model, candidate, exact).rms)

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The network nearest to a model that a device can render: slopes limited, the rest left as identified.
+
+The nearest force with slopes between two limits is an isotonic regression; it differs from the model on whole
+stretches around what is too steep, and has kinks at their ends. Smoothing by a narrow positive kernel rounds
+the kinks and keeps the limits. The change alone is then given to further wavelets, chosen one by one
+(orthogonal least squares, values and slopes), and the limits are imposed in a last least squares over all
+wavelets, so that elsewhere the model stays what it was and the limits are certified.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from .._core.model import ForceModel, wavelet_columns, wavelet_slope_columns
+from .._core.stability import ForceBounds, force_bounds
+from .._typing import Float1D, Float2D
+from ..identification.network.basis import Basis
+from ..identification.network.constraints import domain_bounds, impose, slope_limited
+from ..identification.network.fitted import FittedNetwork
+from ..identification.network.separable import Block, SeparableProblem
+from .static_error import SAMPLES, strokes, with_network
+
+_ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
+"""Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both
+ends: one that begins at once where contact does needs a steep way there, and so does the continuation of one
+that is not zero or less at the lower end, or zero or more at the upper one."""
+
+_RESERVE = 0.985
+"""Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""
+
+_CERTIFIED = 0.997
+"""Share of a limit that is imposed: the rest is for bounds that are wider than what they bound [-]"""
+
+_CLOSE = 2e-5
+"""RMS error at which no further wavelets are taken [share of the force's range]"""
+
+_CLOSE_SLOPE = 0.01
+"""The same of the slope [share of the smaller limit]"""
+
+_MOST = 64
+"""Further wavelets at most [-]"""
+
+_NEW = 1e-5
+"""Share of a candidate's squared norm that must stand outside what was chosen for it to be taken [-]"""
+
+_SCALE_RATIO = 1.6
+_SCALE_STEP = 0.75
+"""Frame of the candidates: ratio of neighbouring dilations, translation step over width [-]"""
+
+_WIDE = 1e9
+"""A play radius of this many travels adds no slope while it sticks [-]"""
+
+
+@lru_cache(maxsize=8)
+def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBounds:
+    """Proved bounds while sliding, continuations included: those of a play that adds no slope."""
+    travel = float(model.upper[0] - model.lower[0])
+    return force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
+
+
+def sliding_slopes(model: ForceModel) -> tuple[float, float]:
+    """The smallest and largest slope of these bounds."""
+    bounds = sliding_bounds(model)
+    return bounds.slope_min, bounds.slope_max
+
+
+def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | None:
+    """The model with every slope proved to lie within limits; None where no such network was found.
+
+    Parameters
+    ----------
+    model : ForceModel
+        A model of one position.
+    low, high : float
+        Slopes of either stroke [force/position]; may be infinite.
+    """
+    travel = float(model.upper[0] - model.lower[0])
+    for smoothing, restoring in _ATTEMPTS:
+        limited = _limited_once(model, low, high, smoothing * travel, restoring)
+        if limited is None:
+            continue
+        found = sliding_slopes(limited)
+        if found[0] >= low and found[1] <= high:
+            return limited
+    return None
+
+
+def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
+    """The model with h multiplied by a share: the two strokes differ by less."""
+    names = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+    return with_network(model, **{name: share * getattr(model, name) for name in names})
+
+
+def _limited_once(
+    model: ForceModel, low: float, high: float, sigma: float, restoring: bool
+) -> ForceModel | None:
+    """The model with the change fitted; None where its continuations would be steeper than the limit."""
+    x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
+    forces = strokes(model, x)
+    changes = _changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
+    wanted = forces + changes
+    middle, travel = wanted.mean(axis=0), x[-1] - x[0]
+    pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
+    if not restoring and pushed_out and np.abs(middle).max() > high * travel:
+        return None
+    if len(changes) == 2:  # of g and h
+        changes = np.array([0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])])
+    alpha, beta = _candidates(x, np.any(changes != 0.0, axis=0), sigma)
+    close = min(_CLOSE * float(np.ptp(forces)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
+    before = model.alpha[:, 0], model.beta[:, 0]
+    chosen = _chosen(x, changes, before, (alpha, beta), sigma, close)
+    return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
+
+
+def _changes_needed(
+    x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: ForceModel, restoring: bool
+) -> Float2D:
+    """What strokes (k, n) lack for their slopes to lie within limits, kinks rounded; zero elsewhere."""
+    n, step = len(x), x[1] - x[0]
+    margin = int(np.ceil(6.0 * sigma / step))
+    before = after = 0
+    if model.period is not None:
+        before = after = n - 1
+        wide = [np.concatenate([f[:-1] - f[-1] + f[0], f, f[1:] + f[-1] - f[0]]) for f in strokes]
+    else:
+        # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
+        before, after = (n if side == "free" else 0 for side in (model.below, model.above))
+        wide = [np.pad(force, (before, after)) for force in strokes]
+    grid = x[0] + step * (np.arange(len(wide[0])) - before)
+    nearest = np.array([slope_limited(grid, force, low, high) for force in wide])
+    if restoring and model.period is None:
+        rise, fall = high * (grid - x[0]), high * (grid - x[-1])
+        nearest = np.minimum(nearest, np.maximum(rise, 0.0) if model.below == "free" else rise)
+        nearest = np.maximum(nearest, np.minimum(fall, 0.0) if model.above == "free" else fall)
+    if len(strokes) == 2 and model.below == "free" and model.period is None:
+        nearest = _begun_together(grid, nearest, before, margin // 2, high)
+    inside = slice(margin + before, margin + before + n)
+    changes = []
+    for force, limited in zip(strokes, nearest, strict=True):
+        extended = _extended(limited, margin)
+        smooth = gaussian_filter1d(extended, sigma / step, mode="nearest")[inside]
+        touched = np.abs(extended[inside] - force) > 1e-9 * np.ptp(force)
+        near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
+        changes.append(np.where(near, smooth - force, 0.0))
+    return np.array(changes)
+
+
+def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
+    """Pressing (2, n) lowered where contact begins, if it would be too steep beyond the lower edge.
+
+    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Where it
+    rises as steeply as it may, that is too much if it begins above `high` / slope times where releasing
+    ends, the slope being that of releasing over the `near` samples that the rounding of kinks reaches.
+    """
+    press, release = strokes
+    first = release[edge]
+    slope = np.diff(release[edge : edge + near + 1]).max() / (grid[1] - grid[0])
+    if first <= 0.0 or slope <= 0.0:
+        return strokes
+    begin = release[edge + near] + first * (high / slope - 1.0)
+    return np.array([np.minimum(press, begin + high * (grid - grid[edge + near])), release])
+
+
+def _extended(force: Float1D, margin: int) -> Float1D:
+    """A force and its straight continuations."""
+    steps = np.arange(1, margin + 1)
+    before = force[0] - steps[::-1] * (force[1] - force[0])
+    after = force[-1] + steps * (force[-1] - force[-2])
+    return np.concatenate([before, force, after])
+
+
+def _fitted(
+    model: ForceModel, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
+) -> ForceModel:
+    """Least squares on the wavelets that there were and further ones, the slope limits and h >= 0 imposed."""
+    lower, travel = model.lower, model.upper - model.lower
+    box = ((x - lower) / travel)[:, None]
+    ones = np.ones_like(x)
+    hysteretic = len(wanted) == 2
+    problem = SeparableProblem(
+        tuple(Block.weighted(box, stroke, ones, ones[:, None]) for stroke in wanted),
+        np.array([[0.5, 0.5], [0.5, -0.5]]) if hysteretic else np.array([[1.0]]),
+        samples=wanted.size,
+        within=0.0,
+        force_range=float(np.ptp(wanted)) or 1.0,
+        resolved_by=1,
+    )
+    basis = Basis(model.alpha * travel, (model.beta - lower) / travel).joined(
+        Basis(alpha[:, None] * travel, (beta[:, None] - lower) / travel)
+    )
+    slopes = (low * float(travel[0]), high * float(travel[0]))
+    lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
+    bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
+    solution = impose(problem, problem.solve(basis), bounds)
+    found = FittedNetwork.of(solution, problem.readout, lower, travel, inputs=("position",))
+    new = {
+        name: value
+        for name, value in found.parameters().items()
+        if name not in ("lower", "upper") and value is not None
+    }
+    limited = with_network(model, **new)
+    if not lossy:
+        return limited
+    least = sliding_bounds(limited).loss_min
+    if least >= 0.0:
+        return limited
+    # The bound h >= 0 is imposed up to rounding, but must be proved: raise h by the difference.
+    return with_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
+
+
+def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:
+    """Dilations and translations (k,) of wavelets from the finest width to the travel, near a change."""
+    travel = x[-1] - x[0]
+    at = x[changed][::4] if changed.any() else x[:1]
+    alpha, beta = [], []
+    width = finest
+    while width < travel:
+        centres = np.arange(x[0] - 3.0 * width, x[-1] + 3.0 * width, _SCALE_STEP * width)
+        centres = centres[np.abs(centres[:, None] - at).min(axis=1) < 3.0 * width]
+        alpha.append(np.full(len(centres), 1.0 / width))
+        beta.append(centres)
+        width *= _SCALE_RATIO
+    return np.concatenate(alpha), np.concatenate(beta)
+
+
+def _chosen(
+    x: Float1D,
+    changes: Float2D,
+    before: tuple[Float1D, Float1D],
+    candidates: tuple[Float1D, Float1D],
+    sigma: float,
+    close: float,
+) -> Sequence[int]:
+    """Candidates chosen one by one for changes (outputs, n), beside a line and the wavelets that there were.
+
+    Slopes are fitted beside the values, sigma times a slope weighing as much as a value.
+    """
+
+    def both(values: Float2D, slopes: Float2D) -> Float2D:
+        return np.concatenate([values, sigma * slopes])
+
+    rates = np.gradient(changes, x, axis=1)
+    targets = both(changes.T, rates.T)
+    ones, zeros = np.ones_like(x), np.zeros_like(x)
+
+    def wavelets(alpha: Float1D, beta: Float1D) -> Float2D:
+        values = wavelet_columns(x[:, None], alpha[:, None], beta[:, None])
+        return both(values, wavelet_slope_columns(x, alpha[:, None], beta[:, None]))
+
+    line = both(np.column_stack([ones, x]), np.column_stack([zeros, ones]))
+    always = np.concatenate([line, wavelets(*before)], axis=1)
+    columns = wavelets(*candidates)
+    basis = np.linalg.qr(always)[0]
+    residual = targets - basis @ (basis.T @ targets)
+    left = columns - basis @ (basis.T @ columns)
+    norms = np.square(columns).sum(axis=0)
+    # Everything from here on is in products: a pivoted Cholesky factor of the candidates' Gram matrix.
+    gram, products = left.T @ left, left.T @ residual
+    size = np.diag(gram).copy()
+    rest = float(np.square(residual).sum())
+    factor = np.empty((_MOST, len(size)))
+    chosen: list[int] = []
+    while len(chosen) < _MOST and rest > residual.size * close**2:
+        new = size > _NEW * norms
+        gains = np.where(new, np.square(products).sum(axis=1) / np.where(new, size, 1.0), 0.0)
+        best = int(np.argmax(gains))
+        if gains[best] <= 0.0:
+            break
+        k, root = len(chosen), np.sqrt(size[best])
+        factor[k] = (gram[best] - factor[:k, best] @ factor[:k]) / root
+        products = products - np.outer(factor[k], products[best] / root)
+        size = size - np.square(factor[k])
+        rest -= float(gains[best])
+        chosen.append(best)
+    return chosen

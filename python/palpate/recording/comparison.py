@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings that do not belong together: two objects in one file, repeated rows, other units or zeros."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D, Float2D
+from ..verdict import Finding, no, usable
+from .cells import ROWS_TO_COMPARE, CellRows, Travel, amount, sides
+from .recording import Recording
+from .units import GRAVITY
+
+BLOCKS = 32
+"""Blocks of rows between which a file is split."""
+
+EXPLAINED = 0.4
+"""Share of the scatter about the mean curves that the split into two parts explains."""
+
+APART = 0.02
+"""Distance of the two parts, as a share of the force's spread."""
+
+PATTERN = 16
+"""Rows by which a repetition of the beginning is found."""
+
+LEAST_COPY = 0.1
+"""Share of the rows that a copy holds."""
+
+MOST_COPIES = 4
+"""Places that begin like the file and are compared to the end."""
+
+SAME_PLACE = 0.1
+"""Distance of the mean positions of two parts in a cell, in cells, up to which they are compared."""
+
+CURVE_POINTS = 64
+"""Points of a curve at most."""
+
+POINT_ROWS = 4
+"""Rows that a point of a curve is the mean of, on average."""
+
+UNIT_RATIOS = {
+    10.0: "mm and cm",
+    25.4: "mm and in",
+    1e3: "a unit and its thousandth, such as mm and m or mN and N",
+    1e6: "a unit and its millionth, such as um and m",
+    GRAVITY: "N and kgf",
+    1e3 / GRAVITY: "gf and N",
+    4.4482216: "N and lbf",
+    180.0 / np.pi: "deg and rad",
+}
+"""Ratios of units that files mix up."""
+
+SHARED = 0.3
+"""Share of the travel that two recordings need in common to be compared."""
+
+DIFFERENT = 0.25
+"""RMS difference of two curves, as a share of the force's spread, above which they differ."""
+
+SAME = 0.1
+"""The same difference up to which a ratio explains it."""
+
+ONE_WAY = 0.99
+"""Share of the moving rows that go one way in a recording of one stroke."""
+
+PRESS_ABOVE = 0.9
+"""Share of the shared positions at which the press lies above the release of the same object."""
+
+SAME_RANGE = 2.0
+"""Ratio of their ranges of force up to which two strokes are of one object: the release begins where the
+press ends. 74 measured pairs have 0.9 to 1.2."""
+
+MOST_RECORDINGS = 20
+"""Recordings among which the one is sought that agrees best with the others."""
+
+Curve = tuple[Float1D, Float1D]
+"""Mean positions in rising order, and mean forces."""
+
+
+def merged_findings(recording: Recording, cells: CellRows | None) -> list[Finding]:
+    """Findings on a force that has two branches, one before and one after a row, and on repeated rows."""
+    if recording.input_names:
+        return []
+    if (again := _appended_to_itself(recording)) is not None:
+        return [
+            usable(
+                f"the rows from {again} on repeat those from 0 on exactly: the file was probably appended to "
+                f"itself; give --rows 0:{again}"
+            )
+        ]
+    return [] if cells is None else _two_parts(recording, cells)
+
+
+def _two_parts(recording: Recording, cells: CellRows) -> list[Finding]:
+    """Compares the parts before and after each block edge, cell by cell."""
+    total = float(np.sum(cells.residual**2))
+    spread = float(np.std(recording.force))
+    if not total > 0.0 or not spread > 0.0:
+        return []
+    width = 2 * cells.cells
+    block = cells.row * BLOCKS // len(recording)
+    code = block * width + cells.cell
+
+    def sums(values: Float1D | None) -> Float2D:
+        table = np.bincount(code, values, BLOCKS * width).reshape(BLOCKS, width)
+        return table.cumsum(axis=0, dtype=np.float64)
+
+    count, force, place = sums(None), sums(cells.residual), sums(cells.place)
+    before, after = count[:-1], count[-1] - count[:-1]
+    one, other = np.maximum(before, 1.0), np.maximum(after, 1.0)
+    apart = force[:-1] / one - (force[-1] - force[:-1]) / other
+    moved = place[:-1] / one - (place[-1] - place[:-1]) / other
+    both = (before >= ROWS_TO_COMPARE) & (after >= ROWS_TO_COMPARE) & (np.abs(moved) <= SAME_PLACE)
+    between = np.where(both, before * after / (one + other) * apart**2, 0.0)
+    explained = between.sum(axis=1) / total
+    best = int(np.argmax(explained))
+    shared = both[best]
+    if not shared.any():
+        return []
+    rows = (before[best] + after[best])[shared]
+    distance = float(np.sqrt(np.average(apart[best][shared] ** 2, weights=rows)))
+    if explained[best] < EXPLAINED or distance < APART * spread:
+        return []
+    split = (best + 1) * len(recording) // BLOCKS
+    return [
+        usable(
+            f"before and after about row {split} the force at the same position and stroke differs by "
+            f"{amount(distance, recording.units['force'])}, {distance / spread:.0%} of its spread: the file "
+            "probably holds two objects or two zeros, or the object changed (drift, settling); identify "
+            f"each part by itself with --rows 0:{split} and --rows {split}:{len(recording)}"
+        )
+    ]
+
+
+def _appended_to_itself(recording: Recording) -> int | None:
+    """First row of a copy of the beginning that goes on to the end of the file."""
+    x, f = recording.position, recording.force
+    n = len(x)
+    least = int(LEAST_COPY * n)
+    if least < PATTERN:
+        return None
+    starts = np.arange(n // 3, n - least + 1)
+    for k in (*range(PATTERN), *np.linspace(PATTERN, least - 1, PATTERN).astype(int).tolist()):
+        starts = starts[(x[starts + k] == x[k]) & (f[starts + k] == f[k])]
+    for start in starts[:MOST_COPIES].tolist():
+        copied = slice(0, n - start)
+        same = np.array_equal(x[start:], x[copied]) and np.array_equal(f[start:], f[copied])
+        if same and len(np.unique(f[copied])) > PATTERN:
+            return int(start)
+    return None
+
+
+@dataclass(frozen=True)
+class _Strokes:
+    """Curves of one recording."""
+
+    way: int
+    """+1: all rows go into the object, -1: out of it, 0: both, or not known"""
+    curves: Mapping[int, Curve]
+    """Of the rows of each direction, and of all rows (0)"""
+
+    @staticmethod
+    def of(recording: Recording, side: Float1D | None) -> _Strokes:
+        """The curves of a recording with the direction (n,) of its rows; None takes it from the recording."""
+        travel = Travel.of(recording.position)
+        words = sides(recording, travel) if side is None else side
+        into, out = words > 0, words < 0
+        moving = max(int(np.count_nonzero(into | out)), 1)
+        mean = float(np.count_nonzero(into)) / moving, float(np.count_nonzero(out)) / moving
+        way = 1 if mean[0] >= ONE_WAY else -1 if mean[1] >= ONE_WAY else 0
+        rows = {0: travel.inside, 1: travel.inside & into, -1: travel.inside & out}
+        return _Strokes(way, {key: _curve(recording, at) for key, at in rows.items() if at.any()})
+
+
+def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
+    """Findings on recordings of one object whose forces differ at the same positions.
+
+    Recordings of one stroke each are compared with the same stroke of the others. A press and a release may
+    differ as the strokes of one object do.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    side : (n,) array, optional
+        Direction of the rows of all recordings, where it was taken from their order or from the force.
+    """
+    if len(recordings) < 2 or any(recording.input_names for recording in recordings):
+        return []
+    ends = np.cumsum([len(recording) for recording in recordings])[:-1]
+    directions = [None] * len(recordings) if side is None else np.split(side, ends)
+    strokes = [_Strokes.of(*each) for each in zip(recordings, directions, strict=True)]
+    apart = [
+        [min(_apart(one, other), 1.0) for other in strokes[:MOST_RECORDINGS]]
+        for one in strokes[:MOST_RECORDINGS]
+    ]
+    reference = int(np.argmin(np.sum(apart, axis=1)))
+    found = []
+    for index, each in enumerate(strokes):
+        if index == reference:
+            continue
+        difference = _apart(strokes[reference], each)
+        if difference <= DIFFERENT:
+            continue
+        name, other = _name(recordings, index), _name(recordings, reference)
+        if (explained := _ratio(*_pair(strokes[reference], each))) is not None:
+            role, ratio, units = explained
+            found.append(
+                no(
+                    f"{name} agrees with {other} only if its {role} is multiplied by {ratio:.4g}: one of "
+                    f"them is probably in another unit ({units}); name the unit of the {role} column with "
+                    "--units"
+                )
+            )
+        elif np.isfinite(difference):
+            found.append(
+                usable(
+                    f"{name} and {other} differ by {difference:.0%} of the force's spread at the same "
+                    "positions: they are probably of two objects or have two zeros; identify them one by one"
+                )
+            )
+    return found
+
+
+def _name(recordings: Sequence[Recording], index: int) -> str:
+    files = recordings[index].source.files
+    return files[0] if files else f"recording {index + 1}"
+
+
+def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
+    """Mean force over position of some rows."""
+    x, f = recording.position[rows], recording.force[rows]
+    lower, length = float(x.min()), float(np.ptp(x))
+    if not length > 0.0:
+        return x[:1], f[:1]
+    cells = int(np.clip(len(x) // POINT_ROWS, 2, CURVE_POINTS))
+    cell = np.minimum((cells * ((x - lower) / length)).astype(np.intp), cells - 1)
+    count = np.bincount(cell, minlength=cells)
+    known = count > 0
+    return (
+        np.bincount(cell, x, cells)[known] / count[known],
+        np.bincount(cell, f, cells)[known] / count[known],
+    )
+
+
+def _pair(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
+    """The curves by which two recordings are compared: of the stroke that both hold, where one holds one."""
+    way = 0 if one.way * other.way < 0 else one.way or other.way
+    return one.curves.get(way, one.curves[0]), other.curves.get(way, other.curves[0])
+
+
+def _apart(one: _Strokes, other: _Strokes) -> float:
+    """The difference of two recordings; 0 where they differ as press and release of one object do."""
+    difference = _curve_difference(*_pair(one, other))
+    if one.way * other.way < 0 and np.isfinite(difference):
+        press, release = (one, other) if one.way > 0 else (other, one)
+        (x, f), (at, force) = press.curves[0], release.curves[0]
+        shared = (at >= x[0]) & (at <= x[-1])
+        above = np.mean(np.interp(at[shared], x, f) >= force[shared])
+        ranges = float(np.ptp(f)), float(np.ptp(force))
+        if above >= PRESS_ABOVE and max(ranges) <= SAME_RANGE * min(ranges):
+            return 0.0
+    return difference
+
+
+def _curve_difference(one: Curve, other: Curve) -> float:
+    """RMS difference over the spread of the first force; infinite where the positions do not overlap."""
+    (x, f), (at, force) = one, other
+    shared = (at >= x[0]) & (at <= x[-1])
+    reach = min(x[-1], at[-1]) - max(x[0], at[0])
+    spread = float(np.std(f))
+    if reach < SHARED * max(x[-1] - x[0], at[-1] - at[0]) or np.count_nonzero(shared) < 3 or spread == 0.0:
+        return float("inf")
+    apart = force[shared] - np.interp(at[shared], x, f)
+    return float(np.sqrt(np.mean(apart**2))) / spread
+
+
+def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
+    """The role and the ratio of two units that explain the difference best; None where none does."""
+    x, f = other
+    tried = []
+    for ratio, units in UNIT_RATIOS.items():
+        for by in (ratio, 1.0 / ratio):
+            tried.append((_curve_difference(one, (by * x, f)), "position", by, units))
+            tried.append((_curve_difference(one, (x, by * f)), "force", by, units))
+    best = min(tried, key=lambda each: each[0])
+    return best[1:] if best[0] <= SAME else None

@@ -1,0 +1,388 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the cells of a table to SI arrays, and where they came from."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D, Int8Vector
+from ..errors import InputError
+from .columns import Choice, Column, choose_columns
+from .files import sha256_of_file
+from .rows import RowCheck
+from .table import Cells, Places, Table, parse_number, to_numbers
+from .units import COLUMN_SUFFIX
+from .writing import Layout
+
+UNSTATED = ""
+"""The unit of an array that was handed over without one: SI, but not said which."""
+
+MIN_ROWS = 10
+"""Fewer usable rows are no recording."""
+
+MIN_POSITIONS = 3
+"""Fewer distinct positions show no force over position."""
+
+FALLING = -0.3
+"""Correlation of force and position below which the force counts as falling over the whole file. A mirrored
+axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction stay between -0.3 and 0.2."""
+
+Range = tuple[int | None, int | None]
+"""Half-open range of rows, counted from 0; None leaves an end open."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where data came from: enough to find it again, and to tell whether other data is the same."""
+
+    files: tuple[str, ...]
+    sha256: str
+    """SHA-256 of each file (of the arrays, for data that never was a file), separated by spaces."""
+    rows: int
+    columns: Mapping[str, str]
+    """Role (position, force, time, direction, or an input's name) to the column's name in the file."""
+    held_out_every: int = 0
+    """k where the rows i with i mod k = k - 1 were separated from the others; 0: all rows are together."""
+    held_out: bool = False
+    """True for the rows that were held out, False for those that were kept."""
+
+    @staticmethod
+    def merged(sources: Iterable[Source]) -> Source:
+        """One source for data taken from several recordings."""
+        parts = list(sources)
+        first = parts[0]
+        return replace(
+            first,
+            files=tuple(file for part in parts for file in part.files),
+            sha256=" ".join(part.sha256 for part in parts),
+            rows=sum(part.rows for part in parts),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """All rows of a measured motion, of which a recording holds a part.
+
+    Velocity and play depend on the rows before and after a row. Rows that were held out keep the motion
+    between them, so that both are formed from all rows.
+    """
+
+    position: Float1D
+    """(m,)"""
+    time: Float1D | None
+    """(m,) [s]"""
+    rows: NDArray[np.intp]
+    """(n,) rows that the recording holds"""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """Columns of a table that were chosen, and how their cells become SI values."""
+
+    name: str
+    """Of the table, for messages"""
+    choice: Choice
+    direction: str | None
+    status: str | None
+    """Column that says of each row whether its force was the model's alone"""
+    negated: frozenset[str]
+    drop: bool
+    """Drop and count rows that cannot be used; else refuse the table at the first one"""
+    metadata: Mapping[str, str]
+
+    @staticmethod
+    def of(
+        table: Table,
+        name: str,
+        *,
+        position: str | None,
+        force: str | None,
+        time: str | None,
+        direction: str | None,
+        inputs: Sequence[str] = (),
+        units: Mapping[str, str] | None,
+        negate: Sequence[str] = (),
+        drop: bool,
+    ) -> Conversion:
+        """Choose the columns of a table; the arguments are those of `read_recording`."""
+        metadata = dict(table.metadata)
+        layout = Layout.taken_from(name, metadata)
+        choice = choose_columns(
+            name,
+            table.names,
+            position=position or layout.roles.get("position"),
+            force=force or layout.roles.get("force"),
+            time=time or layout.roles.get("time"),
+            direction=direction or layout.roles.get("direction"),
+            inputs=tuple(inputs) or layout.inputs,
+            units=units,
+            unstated=layout.roles.values(),
+            text=table.text_names,
+            steady=table.steady_names,
+        )
+        status = layout.roles.get("status")
+        if status is not None and status not in table.names:
+            raise InputError(f"{name} has no column {status!r}, which its metadata names as the status")
+        by_role = {"position": choice.position.name, "force": choice.force.name}
+        used = {*by_role.values(), *(column.name for column in choice.inputs)}
+        negated = [by_role.get(each, each) for each in negate]
+        for each, column in zip(negate, negated, strict=True):
+            if column not in used:
+                raise InputError(
+                    f"{name}: --negate {each} names no column that is used ({', '.join(sorted(used))})"
+                )
+        turned = frozenset(column for column in negated if negated.count(column) % 2)
+        return Conversion(name, choice, choice.direction, status, turned, drop, metadata)
+
+    @property
+    def columns(self) -> list[Column]:
+        """The columns of numbers."""
+        choice = self.choice
+        return [each for each in (choice.position, choice.force, choice.time, *choice.inputs) if each]
+
+    @property
+    def numbers(self) -> list[str]:
+        """Names of the columns of numbers."""
+        return [column.name for column in self.columns]
+
+    @property
+    def text(self) -> list[str]:
+        """Names of the columns of words."""
+        return [name for name in (self.direction, self.status) if name is not None]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI unit of position and force."""
+        roles = {"position": self.choice.position, "force": self.choice.force}
+        return {role: column.unit.si if column.unit else UNSTATED for role, column in roles.items()}
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Role, or name of an input, to the name of its column."""
+        choice = self.choice
+        columns = {"position": choice.position.name, "force": choice.force.name}
+        columns |= {"time": choice.time.name} if choice.time is not None else {}
+        columns |= {"direction": self.direction} if self.direction is not None else {}
+        return columns | {_si_name(column): column.name for column in choice.inputs}
+
+    def checked(
+        self, table: Places, cells: Mapping[str, Cells], first: int = 0
+    ) -> tuple[RowCheck, Int8Vector | None]:
+        """Check the rows of a table from `first` on; returns the check and the direction of every row.
+
+        Raises
+        ------
+        InputError
+            A row cannot be used and rows are not to be dropped, or its direction is not known.
+        """
+        check = RowCheck(self.name, table, first, len(cells[self.choice.position.name]), self.drop)
+        if self.status is not None:
+            check.as_modelled(cells[self.status])
+        for name in self.numbers:
+            check.finite(name, cells[name])
+        words = None if self.direction is None else check.directions(self.direction, cells[self.direction])
+        if self.choice.time is not None:
+            check.increasing(self.choice.time.name, cells[self.choice.time.name])
+        return check, words
+
+    def si(self, column: Column, cells: Mapping[str, Cells]) -> Float1D:
+        """Values of a column in SI units, with the sign that was asked for."""
+        values: Float1D = cells[column.name]
+        factor = (1.0 if column.unit is None else column.unit.factor) * (
+            -1.0 if column.name in self.negated else 1.0
+        )
+        return values if factor == 1.0 else values * factor
+
+    def note(self, torque_constant: float | None = None, dialect: Sequence[str] = ()) -> str:
+        """The column of each role, and how the table was read, in one sentence."""
+        choice = self.choice
+        parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
+        if torque_constant is not None:
+            parts[-1] += f" times {torque_constant:g} N*m/A"
+        elif choice.force.unit is not None and choice.force.unit.si == "A":
+            parts[-1] += " (a current; it stays in A)"
+        parts.append(f"time is {choice.time.name}" if choice.time else "there is no time")
+        parts.append(f"direction is {self.direction}" if self.direction else "there is no direction")
+        if choice.inputs:
+            parts.append(f"inputs are {', '.join(column.name for column in choice.inputs)}")
+        return ", ".join(parts) + (f"; read as: {', '.join(dialect)}" if dialect else "")
+
+
+def converted(
+    table: Table,
+    name: str,
+    *,
+    file: Path | None = None,
+    direction: str | None,
+    rows: Range | None = None,
+    zero: Range | None = None,
+    torque_constant: float | None = None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Read a table as a whole; returns the fields of a `Recording`.
+
+    Parameters
+    ----------
+    table : Table
+    name : str
+        Of the table, for messages.
+    file : Path, optional
+        The file that the table is; without it the source is the fingerprint of the arrays.
+    direction, rows, zero, torque_constant, options
+        Those of `read_recording`.
+    """
+    how = Conversion.of(table, name, direction=direction, **options)
+    cells = table.read(numbers=how.numbers, text=how.text)
+    stroke = how.direction
+    if (
+        stroke == "segment"
+        and direction is None
+        and all(parse_number(word) is not None for word in cells[stroke])
+    ):
+        # Numbered segments state no direction.
+        cells[stroke], how = to_numbers(cells[stroke]), replace(how, direction=None)
+    choice = how.choice
+    notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
+    total = len(cells[choice.position.name])
+    start, stop = _row_range(name, rows, total)
+    whole = cells
+    if (start, stop) != (0, total):
+        notes.append(f"rows {start} to {stop - 1} of 0 to {total - 1} are used")
+        cells = {each: column[start:stop] for each, column in cells.items()}
+    check, words = how.checked(table, cells, start)
+    if not check.kept.all():
+        cells = {each: column[check.kept] for each, column in cells.items()}
+        words = None if words is None else words[check.kept]
+    notes += check.notes
+    x, f = how.si(choice.position, cells), how.si(choice.force, cells)
+    units = how.units
+    if torque_constant is not None:
+        if not (math.isfinite(torque_constant) and torque_constant > 0):
+            raise InputError(f"--torque-constant-Nm-per-A is {torque_constant}; it must be a number > 0")
+        if units["force"] != "A":
+            raise InputError(
+                f"{name}: --torque-constant-Nm-per-A turns a current into a torque, but the force is "
+                f"{choice.force.name}, which is not in A"
+            )
+        f, units["force"] = f * torque_constant, "N*m"
+    if zero is not None:
+        first, last = _row_range(name, zero, total)
+        numbers = np.arange(start, stop)[check.kept]
+        free = (numbers >= first) & (numbers < last)
+        if not free.any():
+            raise InputError(f"{name}: --zero {first}:{last} holds none of the rows that are used")
+        offset = float(np.mean(f[free]))
+        f = f - offset
+        notes.append(
+            f"{offset:.6g} {units['force']}, the mean force of rows {first} to {last - 1}, is taken off"
+        )
+    _require_enough(name, choice.position, x, check.notes)
+    time = None if choice.time is None else how.si(choice.time, cells)
+    inputs = [how.si(column, cells) for column in choice.inputs]
+    used = {*how.numbers, how.direction}
+    partly = (start, stop) != (0, total)
+    return {
+        "position": x,
+        "force": f,
+        "time": time,
+        "direction": words,
+        "inputs": np.column_stack(inputs) if inputs else np.empty((len(x), 0)),
+        "input_names": tuple(map(_si_name, choice.inputs)),
+        "columns": {each: column for each, column in cells.items() if each not in used},
+        "metadata": how.metadata,
+        "units": units,
+        "source": Source(
+            files=() if file is None else (str(file),),
+            sha256=digest_of(x, f, time, *inputs, words) if file is None else sha256_of_file(file),
+            rows=len(x),
+            columns=how.names,
+        ),
+        "notes": (how.note(torque_constant, table.notes), *notes, *_noticed(x, f, words)),
+        "part_of": _motion(how, whole, start + np.flatnonzero(check.kept)) if partly else None,
+    }
+
+
+def digest_of(*arrays: NDArray[Any] | None) -> str:
+    """SHA-256 of arrays, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    for array in arrays:
+        if array is not None:
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def mirrored(correlation: float, against: bool = False) -> list[str]:
+    """The note on a force that falls with position, or on a position that moves against its direction."""
+    signs = []
+    if correlation < FALLING:
+        signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
+    if against:
+        signs.append("the position falls where the direction goes into the object")
+    if not signs:
+        return []
+    return [
+        f"{' and '.join(signs)}: if the position grows out of the object give --negate position, "
+        "if the force is positive when pulling give --negate force"
+    ]
+
+
+def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
+    """Report once what looks mirrored; no sign is turned without an option."""
+    x, f = _scaled(x), _scaled(f)
+    correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
+    against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0
+    return mirrored(correlation, against)
+
+
+def _scaled(values: Float1D) -> Float1D:
+    """The values divided by a power of two, so that no square overflows and no digit changes."""
+    _, exponent = np.frexp(np.abs(values).max(initial=0.0))
+    return np.asarray(np.ldexp(values, -exponent))
+
+
+def _motion(how: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
+    """The motion of all rows of a file, of which these are used; None if it has no continuous time."""
+    if how.choice.time is None:
+        return None
+    position, time = how.si(how.choice.position, cells), how.si(how.choice.time, cells)
+    usable = np.isfinite(position) & np.isfinite(time)
+    if not usable[rows].all() or np.any(np.diff(time[usable]) <= 0.0):
+        return None
+    number = np.cumsum(usable) - 1
+    return Motion(position[usable], time[usable], number[rows])
+
+
+def _row_range(name: str, rows: Range | None, total: int) -> tuple[int, int]:
+    first, last = rows or (None, None)
+    start, stop = first or 0, total if last is None else last
+    if not 0 <= start < stop <= total and rows is not None:
+        raise InputError(
+            f"{name}: rows {start}:{stop} were asked for; it has {total} rows, and START must be below STOP"
+        )
+    return start, stop
+
+
+def _si_name(column: Column) -> str:
+    """The name of an input after conversion, so that the name still states the unit."""
+    return column.name if column.unit is None else f"{column.stem}_{COLUMN_SUFFIX[column.unit.si]}"
+
+
+def _require_enough(name: str, position: Column, x: Float1D, left_out: Sequence[str]) -> None:
+    if len(x) < MIN_ROWS:
+        told = "".join(f"; {note}" for note in left_out)
+        raise InputError(f"{name} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}{told}")
+    distinct = len(np.unique(x))
+    if distinct < MIN_POSITIONS:
+        plural = "s" * (distinct > 1)
+        raise InputError(
+            f"{name}: column {position.name} holds {distinct} distinct value{plural}; "
+            f"force over position needs at least {MIN_POSITIONS}; choose another column with --position NAME"
+        )

@@ -1,0 +1,439 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Opens a file of columns by its kind; Parquet, and the kinds that are read as a whole."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, listed, shortened, visible
+from .csv_file import CsvFile
+from .dialect import decimal_mark, find_header, first_row_as_header, named, refuse_marks
+from .files import readable
+from .table import MISSING, Cells, LongTable, Table, parse_with, to_numbers
+
+_BUFFER_BYTES = 1 << 20
+"""Bytes read ahead of each column of Parquet."""
+
+MOST_HEADER_ROWS = 200
+"""Rows of a sheet in which its header must stand."""
+
+STEADY_ROWS = 1000
+"""Rows in which a column with one or two values counts as steady."""
+
+
+_HEADER = 128
+"""Bytes before the first element."""
+
+_MATRIX, _COMPRESSED = 14, 15
+"""Types of elements that hold an array, and a compressed one, which has a checksum."""
+
+_ITEM_BYTES = {
+    **dict.fromkeys((1, 2, 14, 15, 16), 1),
+    **dict.fromkeys((3, 4, 17), 2),
+    **dict.fromkeys((5, 6, 7, 18), 4),
+    **dict.fromkeys((9, 12, 13), 8),
+}
+"""Bytes of an item of each type of element."""
+
+_NUMERIC = range(6, 16)
+"""Classes of arrays of numbers: they hold flags, dimensions, name, values, and imaginary parts if complex."""
+
+_COMPLEX = 1 << 11
+"""Bit of the flags of an array."""
+
+
+def open_table(path: Path) -> Table:
+    """Open a file of columns; the end of its name tells its kind.
+
+    Raises
+    ------
+    InputError
+        The file is not of its kind, or the library that reads it is not installed.
+    """
+    kinds: dict[str, Callable[[Path], Table]] = {
+        ".parquet": ParquetFile,
+        ".xlsx": _excel,
+        ".xlsm": _excel,
+        ".npz": _numpy,
+        ".mat": _matlab,
+        ".mcap": _mcap,
+    }
+    return kinds.get(path.suffix.lower(), CsvFile)(path)
+
+
+class MemoryTable(Table):
+    """Columns that were read as a whole.
+
+    Parameters
+    ----------
+    path : Path
+    columns : mapping of str to (n,) array
+        float64, or objects of str.
+    metadata : mapping, optional
+    notes : sequence of str, optional
+        How the file was read.
+    first : (str, int), optional
+        Word for a row and number of the first one, for the sentences.
+    decimal : str
+        Decimal mark of numbers that are stored as text.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        columns: Mapping[str, Cells],
+        metadata: Mapping[str, str] | None = None,
+        notes: Sequence[str] = (),
+        first: tuple[str, int] = ("row", 0),
+        decimal: str = ".",
+    ) -> None:
+        self._path, self._columns, self._first, self._decimal = path, dict(columns), first, decimal
+        self.names = tuple(self._columns)
+        self.metadata = dict(metadata or {})
+        self.notes = tuple(notes)
+        self.text_names = {name for name, cells in self._columns.items() if cells.dtype == object}
+        self.steady_names = {
+            name for name, cells in self._columns.items() if len(set(cells[:STEADY_ROWS].tolist())) < 3
+        }
+        if len(self.names) < 2:
+            raise InputError(
+                f"{path} has no two columns ({listed(self.names)}); a recording needs a position and a force"
+            )
+
+    def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
+        columns = {}
+        for name, cells in self._columns.items():
+            if name in text:
+                cells = np.array([_as_text(cell) for cell in cells], dtype=object)
+            elif name in numbers and cells.dtype == object:
+                found = to_numbers(cells, self._decimal)
+                refuse_marks(f"{self._path}: column {name}", cells[np.isnan(found)], self._decimal, ";")
+                cells = found
+            columns[name] = cells
+        return columns
+
+    def place(self, row: int) -> str:
+        word, number = self._first
+        return f"{word} {number + row}"
+
+    def cell(self, row: int, name: str) -> str:
+        return _as_text(self._columns[name][row])
+
+
+def _as_text(value: Any) -> str:
+    return "" if value is None or value != value else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _needed(name: str, path: Path, kind: str, extra: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise InputError(
+            f"{path} is {kind}, which needs {name.split('.')[0]}: "
+            f"install it with pip install 'palpate[{extra}]'"
+        ) from None
+
+
+class ParquetFile(LongTable):
+    """A Parquet recording."""
+
+    def __init__(self, path: Path) -> None:
+        parquet = _needed("pyarrow.parquet", path, "Parquet", "parquet")
+        self._path = path
+        with readable(path, "Parquet"):
+            # read in small pieces: a file may be larger than memory, and so may one of its row groups
+            self._file = parquet.ParquetFile(path, buffer_size=_BUFFER_BYTES, pre_buffer=False)
+            schema = self._file.schema_arrow
+            self._stored = tuple(str(name) for name in schema.names)
+            self.names = tuple(map(visible, self._stored))
+            self.text_names = {
+                name
+                for name, field in zip(self.names, schema, strict=True)
+                if str(getattr(field.type, "value_type", field.type)) in ("string", "large_string")
+            }
+            self.metadata = {
+                visible(key.decode()): visible(value.decode())
+                for key, value in (schema.metadata or {}).items()
+                # What the writing libraries note for themselves says nothing about the measurement.
+                if key not in (b"pandas", b"ARROW:schema")
+            }
+        if len(set(self.names)) < len(self.names):
+            raise InputError(f"{path}: a column name stands twice in {listed(self.names)}")
+        if len(self.names) == 1:
+            raise InputError(
+                f"{path}: there is one column ({shortened(self.names[0])}); a recording needs a position and "
+                "a force"
+            )
+
+    def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
+        with readable(self._path, "Parquet"):
+            return _arrow_cells(self._file.read(), self.names, numbers, text)
+
+    def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
+        runs, start, held = [], 0, 0
+        for group in range(self._file.num_row_groups):
+            held += self._file.metadata.row_group(group).num_rows
+            if held >= rows or group == self._file.num_row_groups - 1:
+                runs.append((start, group + 1))
+                start, held = group + 1, 0
+        return self._file.metadata.num_rows, runs
+
+    def blocks(
+        self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
+    ) -> Iterator[tuple[int, dict[str, Cells]]]:
+        groups = range(*part)
+        first = 0
+        pairs = zip(self._stored, self.names, strict=True)
+        wanted = [(stored, name) for stored, name in pairs if name in numbers or name in text]
+        columns, names = [stored for stored, _ in wanted], [name for _, name in wanted]
+        with readable(self._path, "Parquet"):
+            batches = self._file.iter_batches(batch_size=rows, row_groups=list(groups), columns=columns)
+        while True:
+            with readable(self._path, "Parquet"):
+                batch = next(batches, None)
+                if batch is None:
+                    return
+                cells = _arrow_cells(batch, names, numbers, text)
+            yield first, cells
+            first += batch.num_rows
+
+    def rows_before(self, part: tuple[int, int]) -> int:
+        return sum(self._file.metadata.row_group(group).num_rows for group in range(part[0]))
+
+    def place(self, row: int) -> str:
+        return f"row {row}"
+
+    def cell(self, row: int, name: str) -> str:
+        for group in range(self._file.num_row_groups):
+            rows = self._file.metadata.row_group(group).num_rows
+            if row < rows:
+                stored = self._stored[self.names.index(name)]
+                with readable(self._path, "Parquet"):
+                    return _word(self._file.read_row_group(group, columns=[stored]).column(0)[row].as_py())
+            row -= rows
+        raise IndexError(row)
+
+
+def _arrow_cells(
+    table: Any, names: Sequence[str], numbers: Collection[str], text: Collection[str]
+) -> dict[str, Cells]:
+    """The columns of a table or batch of Arrow."""
+    columns: dict[str, Cells] = {}
+    for index, name in enumerate(names):
+        values = table.column(index).to_pandas().to_numpy()
+        numeric = values.dtype.kind in "iufb"
+        if name in text or (name not in numbers and not numeric):
+            columns[name] = np.array([_word(value) for value in values], dtype=object)
+        else:
+            columns[name] = values.astype(np.float64) if numeric else to_numbers(_as_objects(values))
+    return columns
+
+
+def _word(value: Any) -> str:
+    return "" if value is None or value != value else str(value)
+
+
+def _as_objects(values: Cells) -> Cells:
+    return np.array([_word(value) for value in values], dtype=object)
+
+
+def _excel(path: Path) -> Table:
+    """The first sheet of a workbook that holds cells."""
+    openpyxl = _needed("openpyxl", path, "an Excel file", "excel")
+    with readable(path, "Excel (.xlsx)"):
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        sheets = [(sheet.title, [*sheet.iter_rows(values_only=True)]) for sheet in book.worksheets]
+        book.close()
+    filled = [(title, values) for title, values in sheets if values]
+    if not filled:
+        raise InputError(f"{path} has no sheet with cells")
+    title, values = filled[0]
+    kept = [k for k, row in enumerate(values) if any(cell is not None for cell in row)]
+    width = max(k + 1 for row in (values[k] for k in kept) for k, cell in enumerate(row) if cell is not None)
+    values = [values[k][:width] for k in kept]
+    rows = [["" if cell is None else str(cell) for cell in row] for row in values[:MOST_HEADER_ROWS]]
+    header, told = named(f"{path}, row {kept[0] + 1}", find_header(rows) or first_row_as_header(rows))
+    where = f"{path}, row {kept[min(header.first, len(kept) - 1)] + 1}"
+    decimal = decimal_mark(where, rows[header.first :], ";") if header.numbers else "."
+    notes = [f"sheet {shortened(title)}"] if len(filled) > 1 else []
+    if header.row:
+        notes.append(f"{header.row} row{'s' * (header.row > 1)} before the header")
+    if header.units_row is not None:
+        notes.append("units in a second header row")
+    data = values[header.first :]
+    columns = {name: _cells([row[k] for row in data], decimal) for k, name in enumerate(header.names)}
+    metadata = {}
+    for row in rows[: header.row]:
+        key, _, value = row[0].partition(":")
+        metadata[visible(key.strip())] = visible(" ".join(" ".join([value, *row[1:]]).split()))
+    if len(kept) > header.first and kept[-1] - kept[header.first] + 1 != len(data):
+        notes.append("empty rows are left out")
+    first = kept[header.first] + 1 if len(kept) > header.first else 0
+    return MemoryTable(path, columns, metadata, [*notes, *told], ("row", first), decimal)
+
+
+def _cells(values: Sequence[Any], decimal: str) -> Cells:
+    """Numbers where every value is one or is missing, else text."""
+    if all(
+        value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)) for value in values
+    ):
+        return np.array([np.nan if value is None else float(value) for value in values])
+    text = np.array(["" if value is None else str(value) for value in values], dtype=object)
+    if all(word.strip() in MISSING or parse_with(word, decimal) is not None for word in text):
+        return to_numbers(text, decimal)
+    return text
+
+
+def _numpy(path: Path) -> Table:
+    """Arrays of an .npz file, by their names."""
+    with readable(path, "NumPy (.npz)"), path.open("rb") as stream:
+        arrays = np.load(stream, allow_pickle=False)
+        found = {name: arrays[name] for name in arrays.files}
+    return _of_arrays(path, found)
+
+
+def _matlab(path: Path) -> Table:
+    """Vectors of a .mat file, by their names; the fields of a structure stand beside them."""
+    from scipy.io import loadmat
+
+    with readable(path, "MATLAB (.mat)"):
+        _refuse_damaged(path.read_bytes())
+        try:
+            found = loadmat(path, squeeze_me=True, struct_as_record=True)
+        except NotImplementedError:
+            raise InputError(
+                f"{path} is MATLAB 7.3 (HDF5); save it in MATLAB as version 7: save('NEW.mat', '-v7')"
+            ) from None
+    arrays: dict[str, Any] = {}
+    found = {name: np.asarray(value) for name, value in found.items() if not name.startswith("__")}
+    structures = [name for name, value in found.items() if value.dtype.names]
+    for name, value in found.items():
+        if name in structures and value.ndim == 0:
+            prefix = f"{name}." if len(structures) > 1 else ""
+            arrays |= {f"{prefix}{field}": value[field][()] for field in value.dtype.names}
+        else:
+            arrays[name] = value
+    return _of_arrays(path, arrays)
+
+
+def _refuse_damaged(content: bytes) -> None:
+    """Refuse a MATLAB file of version 5 whose elements do not fit into each other; others pass.
+
+    `scipy.io.loadmat` crashes on some of them.
+
+    Raises
+    ------
+    ValueError
+        Names the byte at which the first such element begins.
+    """
+    if len(content) < _HEADER or 0 in content[:4] or content[125] + content[124] != 1:
+        return
+    _elements(content, _HEADER, len(content), "<" if content[126:128] == b"IM" else ">")
+
+
+def _elements(content: bytes, at: int, end: int, order: str) -> list[tuple[int, int]]:
+    """Check the elements from one byte to another; returns the type and first byte of the data of each."""
+    found = []
+    while at < end:
+        start = at
+        if at + 8 > end:
+            raise _damaged(start)
+        kind, size = struct.unpack_from(f"{order}II", content, at)
+        data = at + 8
+        if kind >> 16:  # a small element: type, size and data share 8 bytes
+            kind, size, data = kind & 0xFFFF, kind >> 16, at + 4
+            at += 8
+        else:
+            at = data + (size if kind == _COMPRESSED else -(-size // 8) * 8)
+        room = (start + 8 if data == start + 4 else end) - data
+        if kind not in _ITEM_BYTES or size % _ITEM_BYTES[kind] or size > room:
+            raise _damaged(start)
+        if kind == _MATRIX and size:
+            inside = _elements(content, data, data + size, order)
+            first = inside[0][1]
+            flags = int.from_bytes(content[first : first + 4], "little" if order == "<" else "big")
+            if flags & 0xFF in _NUMERIC and len(inside) != (5 if flags & _COMPLEX else 4):
+                raise _damaged(start)
+        found.append((kind, data))
+    return found
+
+
+def _damaged(at: int) -> ValueError:
+    return ValueError(f"the element at byte {at} is damaged")
+
+
+def _of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
+    """The vectors of the most frequent length as columns; single values are metadata."""
+    arrays = {visible(str(name)): np.squeeze(np.asarray(value)) for name, value in found.items()}
+    vectors = {name: each for name, each in arrays.items() if each.ndim == 1 and each.dtype.kind in "iufbUO"}
+    lengths = Counter(len(array) for array in vectors.values())
+    if not lengths:
+        raise InputError(f"{path} holds no vectors, only {listed(arrays) or 'nothing'}")
+    length = max(lengths, key=lambda each: (lengths[each], each))
+    columns = {name: _vector(array) for name, array in vectors.items() if len(array) == length}
+    metadata = {name: visible(str(each)) for name, each in arrays.items() if each.ndim == 0}
+    others = [name for name in arrays if name not in columns and name not in metadata]
+    notes = [f"left out {listed(others)}, not vectors of {length} values"] if others else []
+    return MemoryTable(path, columns, metadata, notes)
+
+
+def _vector(array: Any) -> Cells:
+    if array.dtype.kind in "iufb":
+        return np.asarray(array, dtype=np.float64)
+    return np.array([str(value) for value in array], dtype=object)
+
+
+def _mcap(path: Path) -> Table:
+    """JSON messages of an MCAP file: each topic is a table of its numbers, beside the time of its log."""
+    reader = _needed("mcap.reader", path, "MCAP", "mcap")
+    topics: dict[str, list[dict[str, Any]]] = {}
+    others: Counter[str] = Counter()
+    with readable(path, "MCAP"), path.open("rb") as stream:
+        for _, channel, message in reader.make_reader(stream).iter_messages():
+            if channel.message_encoding != "json":
+                others[channel.message_encoding] += 1
+                continue
+            row = {"log_time_s": message.log_time, **dict(_flat(json.loads(message.data)))}
+            topics.setdefault(channel.topic, []).append(row)
+    if not topics:
+        told = f"only messages in {listed(others)}" if others else "no messages"
+        raise InputError(
+            f"{path} holds {told}; JSON messages are read. Convert it to JSON messages or export CSV"
+        )
+    sizes = {topic: len({name for row in rows for name in row}) for topic, rows in topics.items()}
+    wide = [topic for topic, size in sizes.items() if size > 2]
+    if len(wide) != 1:
+        raise InputError(
+            f"{path}: {len(wide)} topics hold two values or more ({listed(wide or sizes)}); position and "
+            "force must stand in the only such topic. Write them to one topic or export them as CSV"
+        )
+    rows = topics[wide[0]]
+    names = dict.fromkeys(name for row in rows for name in row)
+    start = rows[0]["log_time_s"]
+    for row in rows:
+        row["log_time_s"] = (row["log_time_s"] - start) * 1e-9
+    columns = {visible(name): _cells([row.get(name) for row in rows], ".") for name in names}
+    notes = [f"topic {shortened(wide[0])}"]
+    if len(topics) > 1 or others:
+        notes.append("other topics are left out")
+    return MemoryTable(path, columns, {}, notes, ("message", 0))
+
+
+def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Numbers and words of a message, by names such as ``wrench.force_N``."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _flat(item, f"{name}.{key}" if name else str(key))
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _flat(item, f"{name}.{index}")
+    elif isinstance(value, (int, float, str)) and not isinstance(value, bool):
+        yield name or "value", value

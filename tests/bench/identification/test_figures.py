@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures and page of identification: drawn from the output of its studies."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bench.identification.figures import main
+
+PNG = b"\x89PNG"
+
+
+def _left(folder: Path, name: str, results: Any) -> None:
+    where = {
+        "machine": "2 cores",
+        "python": "3",
+        "date": "2026-01-02",
+        "commit": "abc",
+        "scale": 1.0,
+        "load": 0.5,
+    }
+    (folder / f"{name}.json").write_text(json.dumps({"where": where, "results": results}))
+
+
+def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict[str, Any]:
+    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0, "draws": 12}
+    ours = method == "palpate"
+    return {
+        "problem": problem,
+        "method": method,
+        "nrmse": nrmse,
+        "nrmse_range": [nrmse / 2, 2 * nrmse],
+        "n_parameters": n_parameters,
+        "n_parameters_range": [n_parameters - 3, n_parameters + 3],
+        "n_wavelets": 6 if ours else None,
+        "n_wavelets_range": [5, 7] if ours else None,
+        **times,
+    }
+
+
+@pytest.fixture
+def identified(tmp_path: Path) -> Path:
+    """What the benchmarks of identification leave where there is no measured data."""
+    rows = [
+        _reached("P1", "palpate", 3e-4, 20),
+        _reached("P1", "splines", 5e-4, 44),
+        {"problem": "P1", "method": "MARS", "skipped": "needs pyearth"},
+        _reached("P3", "palpate", 8e-4, 58),
+    ]
+    _left(tmp_path, "compare_methods", rows)
+    _left(tmp_path, "filters", [{"way": "matched", "fastest_hz": [1.0, 2.0], "nrmse": [1e-3, 2e-3]}])
+    _left(tmp_path, "parsimony", [{"claim": "no wavelet", "right": 99, "draws": 100, "seconds": 0.1}])
+    return tmp_path
+
+
+def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: Path) -> None:
+    names = ("compare_methods", "filters", "parsimony", "real_data", "dynamic")
+    page = identified / "identification.md"
+    tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
+    # the first time a table is filled there is none
+    page.write_text(tables.replace("old filters\n", ""))
+    main([str(identified), "--to", str(identified)])
+    for name in ("parameters", "time", "filters"):
+        assert (identified / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
+    text = page.read_text(encoding="utf-8")
+    assert "| P1, palpate | 3.00e-04 (1.50e-04 to 6.00e-04) | 6 (5 to 7) | 20 (17 to 23) |" in text
+    assert "| P1, splines | 5.00e-04 (2.50e-04 to 1.00e-03) |  | 44 (41 to 47) | 0.25 |" in text
+    assert "MARS" not in text
+    assert "| no wavelet | 99 | 100 |" in text
+    assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; median (least" in text
+    assert "of up to 12 draws" in text
+    # what was not measured this time stays as it was
+    assert "old real_data" in text
+    assert "old parsimony" not in text
+    assert text.count("| matched |") == 1
+
+
+def _measured(nrmse: float, **more: Any) -> dict[str, Any]:
+    splines = {"nrmse": 0.01, "n_parameters": 200, "seconds": 0.1}
+    row = {"file": "dome", "nrmse": nrmse, "n_parameters": 100, "seconds": 1.0, "finite": True}
+    both = {"splines": splines, "passive_splines": {**splines, "nrmse": 0.02}}
+    return {**row, **both, "baselines": {"splines": splines}, **more}
+
+
+def test_measured_objects_stand_beside_their_splines_and_where_strokes_cross(identified: Path) -> None:
+    domes = [_measured(0.015, floor=0.009, share_at_turn=0.8), _measured(0.03)]
+    variants = {"domes_h_of_any_sign": [_measured(0.011)], "domes_force_25_ms_earlier": [_measured(0.006)]}
+    _left(identified, "real_data", {"domes": domes, **variants, "springs": [_measured(0.009)]})
+    page = identified / "identification.md"
+    names = ("compare_methods", "filters", "parsimony", "real_data", "crossing")
+    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
+    main([str(identified), "--to", str(identified)])
+    text = page.read_text(encoding="utf-8")
+    assert "| domes (2 files), palpate | 0.0225 | 100 | 1 | 3.00 (2 above 1.3) | 1.50 (1 above 1.3) |" in text
+    assert "| springs (1 files), palpate | 0.0090 | 100 | 1 | 0.90 | 0.45 |" in text
+    assert "| dome | 0.0150 | 0.0110 | 0.0100 | 0.0200 | 0.0090 | 80 % | 0.0060 | 0.0100 |" in text
+
+
+def test_a_missing_or_foreign_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match=r"compare_methods.json does not exist; make bench writes it"):
+        main([str(tmp_path), "--to", str(tmp_path)])
+    (tmp_path / "compare_methods.json").write_text("[1, 2]")
+    with pytest.raises(SystemExit, match=r"is no output of bench/identification/compare_methods.py"):
+        main([str(tmp_path), "--to", str(tmp_path)])

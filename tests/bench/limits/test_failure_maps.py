@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where each method fails: pictures and page are drawn from the output of the program."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bench.limits import failure_maps
+from bench.limits.failure_maps import map_table, write
+from bench.studies import ROOT, fill_tables
+
+PAGE = ROOT / "docs" / failure_maps.PAGE
+NUMBERS = json.loads((PAGE.parent / "figures" / "failure-maps.json").read_text(encoding="utf-8"))
+NAMES = [each["name"] for each in NUMBERS["maps"]]
+
+
+def printed(*names: str) -> dict[str, Any]:
+    """Output of the program with some of its maps."""
+    maps = [each for each in NUMBERS["maps"] if each["name"] in names]
+    return {"maps": maps, "guards": NUMBERS["guards"]}
+
+
+def test_writes_pictures_numbers_and_tables(tmp_path: Path) -> None:
+    quick = ("encoder", "pole", "guard")
+    page = tmp_path / PAGE.name
+    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "guards", "where")))
+    write(printed(*quick), tmp_path, 1.25)
+    for name in quick:
+        assert (tmp_path / "figures" / f"failure-{name}.png").stat().st_size > 5000
+    numbers = json.loads((tmp_path / "figures" / "failure-maps.json").read_text())
+    assert [each["name"] for each in numbers["maps"]] == list(quick)
+    assert numbers["seconds"] == 1.2
+    assert {"machine", "date", "palpate", "simulated"} <= set(numbers)
+    text = page.read_text()
+    assert "old" not in text
+    assert "measured over theory" in text
+    assert numbers["date"] in text
+
+
+def test_a_page_without_its_marks_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    page = tmp_path / PAGE.name
+    page.write_text("nothing to fill\n")
+    with pytest.raises(SystemExit, match="'<!-- pole -->'"):
+        write(printed("pole"), tmp_path, 1.0)
+    assert page.read_text() == "nothing to fill\n"
+
+
+def test_the_table_names_the_ratio_and_where_nothing_failed() -> None:
+    line = {"name": "one", "at": [1, 2, 3], "measured": [4.0, 6.0, None], "theory": [4.0, 5.0, 6.0]}
+    shown = {"name": "map", "along": "x", "limit": "y", "searched": 10.0, "linear": False, "lines": [line]}
+    assert "| one | 1.0000 to 1.2000; elsewhere nothing failed up to 10 |" in map_table(shown)
+    shown |= {"linear": True}
+    assert map_table(shown).startswith("| x | 1 | 2 | 3 |\n")
+    assert "| one | 4 | 6 | nan |" in map_table(shown)
+
+
+def test_marks_with_nothing_between_are_filled_too(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("<!-- one -->\n<!-- end -->\nbetween\n<!-- two -->\nold\n<!-- end -->\n")
+    fill_tables(page, {"one": "1\n", "two": "2\n"})
+    assert page.read_text() == "<!-- one -->\n1\n<!-- end -->\nbetween\n<!-- two -->\n2\n<!-- end -->\n"
+
+
+def test_the_command_without_its_program_names_the_build(tmp_path: Path) -> None:
+    script = tmp_path / "bench" / "limits" / "failure_maps.py"
+    script.parent.mkdir(parents=True)
+    script.write_text(Path(failure_maps.__file__).read_text(encoding="utf-8"), encoding="utf-8")
+    studies = ROOT / "bench" / "studies.py"
+    (tmp_path / "bench" / studies.name).write_text(studies.read_text(encoding="utf-8"), encoding="utf-8")
+    command = [sys.executable, str(script), "--to", str(tmp_path)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert "--target failure_maps" in run.stderr
+
+
+def test_the_page_has_a_picture_and_a_table_for_every_map() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    for name in NAMES:
+        assert text.count(f"(figures/failure-{name}.png)") == 1
+        assert text.count(f"<!-- {name} -->\n") == 1
+        assert (PAGE.parent / "figures" / f"failure-{name}.png").exists()
+    assert text.count("<!-- guards -->\n") == 1
+    assert len(re.findall(r"<!-- end -->", text)) == len(NAMES) + 2
+
+
+def test_the_numbers_of_the_page_are_those_of_its_file() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert NUMBERS["date"] in text
+    for each in NUMBERS["maps"]:
+        assert f"<!-- {each['name']} -->\n{map_table(each)}<!-- end -->" in text

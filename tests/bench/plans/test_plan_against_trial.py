@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The plan against exhaustive trial: the page, and the command that fills it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+PAGE = ROOT / "docs" / "plan-against-trial.md"
+NUMBERS = PAGE.parent / "figures" / "plan-against-trial.json"
+
+
+def test_the_command_runs_without_measured_data_and_says_what_it_left_out(tmp_path: Path) -> None:
+    page = tmp_path / PAGE.name
+    page.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "figures").mkdir()
+    environment = {key: value for key, value in os.environ.items() if key != "PALPATE_DATA"}
+    command = [
+        sys.executable,
+        str(ROOT / "bench" / "plans" / "plan_against_trial.py"),
+        "--to",
+        str(tmp_path),
+    ]
+    quick = ["--grid", "0", "--seconds", "1"]
+    run = subprocess.run([*command, *quick], capture_output=True, text=True, env=environment, check=False)
+    assert run.returncode == 0, run.stderr
+    assert "Left out: the measured switches" in page.read_text(encoding="utf-8")
+    rows = json.loads((tmp_path / "figures" / NUMBERS.name).read_text(encoding="utf-8"))
+    assert {row["object"] for row in rows} == {"spring and wall", "snap-through"}
+    assert not any(row["shakes"] for row in rows)
+
+
+def test_the_page_shows_seven_objects_on_three_devices_each() -> None:
+    rows = json.loads(NUMBERS.read_text(encoding="utf-8"))
+    assert len(rows) == 21
+    text = PAGE.read_text(encoding="utf-8")
+    for row in rows:
+        assert f"| {row['object']} | {row['device']} | {row['plan']} |" in text
+
+
+def test_on_a_device_that_is_too_weak_the_plan_rests_and_plain_direct_rendering_fails() -> None:
+    weak = [row for row in json.loads(NUMBERS.read_text(encoding="utf-8")) if "weak" in row["device"]]
+    assert len(weak) == 7
+    for row in weak:
+        assert not row["shakes"]
+        assert row["direct_shakes"], row

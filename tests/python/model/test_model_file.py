@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every model file of the corpus, the published schema, and texts that are no JSON."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import random
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import palpate.model
+from conftest import ROOT
+from palpate import InputError, load_model
+from palpate._core.device import DeviceProfile
+from palpate._core.io import check_model
+from palpate._core.rendering import structure_names
+
+CORPUS = ROOT / "tests" / "models"
+GOOD: list[dict[str, str]] = json.loads((CORPUS / "good.json").read_text(encoding="utf-8"))
+BAD: dict[str, dict[str, Any]] = {
+    entry["name"]: entry for entry in json.loads((CORPUS / "bad.json").read_text(encoding="utf-8"))
+}
+SCHEMA: dict[str, Any] = json.loads(
+    (Path(palpate.model.__file__).parent / "model.schema.json").read_text(encoding="utf-8")
+)
+
+
+def good_text(name: str) -> str:
+    return (CORPUS / "good" / f"{name}.json").read_text(encoding="utf-8")
+
+
+def patched(content: Any, patch: list[dict[str, Any]]) -> Any:
+    """The content after a JSON patch of add, replace and remove."""
+    for change in patch:
+        *way, last = change["path"].split("/")[1:]
+        parent = content
+        for key in way:
+            parent = parent[int(key) if isinstance(parent, list) else key]
+        place = int(last) if isinstance(parent, list) else last
+        if change["op"] == "remove":
+            del parent[place]
+        else:
+            parent[place] = change["value"]
+    return content
+
+
+def bad_bytes(entry: dict[str, Any]) -> bytes:
+    if "text" in entry:
+        return str(entry["text"]).encode()
+    text = good_text(entry["base"])
+    if "patch" in entry:
+        return json.dumps(patched(json.loads(text), entry["patch"])).encode()
+    by = entry["by"].replace("@", entry["repeat"] * entry["times"]) if "times" in entry else entry["by"]
+    return text.encode().replace(entry["replace"].encode("latin-1"), by.encode("latin-1"), 1)
+
+
+def refusal(path: Path, content: bytes) -> str:
+    """The sentence with which a file of this content is refused, without its name."""
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refused:
+        load_model(path)
+    sentence = str(refused.value)
+    assert "\n" not in sentence
+    assert sentence.startswith(f"{path}: ")
+    return sentence.removeprefix(f"{path}: ")
+
+
+def refused(path: Path) -> str | None:
+    """The sentence that refuses a file, or None."""
+    try:
+        load_model(path)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def test_the_list_names_every_good_file() -> None:
+    assert {entry["file"] for entry in GOOD} == {f"good/{path.name}" for path in CORPUS.glob("good/*.json")}
+
+
+@pytest.mark.parametrize("entry", GOOD, ids=lambda entry: Path(entry["file"]).stem)
+def test_a_good_file_loads_and_is_saved_the_same(entry: dict[str, str], tmp_path: Path) -> None:
+    original = json.loads((CORPUS / entry["file"]).read_text(encoding="utf-8"))
+    saved = load_model(CORPUS / entry["file"]).save(tmp_path / "again.json")
+    again = json.loads(saved.read_text(encoding="utf-8"))
+    assert again == {"notes": {}, **original}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_is_refused_with_its_name_and_field(name: str, tmp_path: Path) -> None:
+    sentence = refusal(tmp_path / "bad.json", bad_bytes(BAD[name]))
+    if BAD[name]["field"]:
+        assert sentence.startswith(f"{BAD[name]['field']} ")
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("alpha_negative", "network.alpha[0][0] is -1.0: must be > 0"),
+        ("alpha_text", 'network.alpha[0][0] is "40": must be a number'),
+        ("missing_network_weight", "network.weight is missing"),
+        ("unknown_key", "colour is not a key of this format (free keys go under notes)"),
+        ("version_2", "version is 2: must be 1, the version that this palpate reads"),
+        ("beta_too_short", "network.beta has 1 values: must have 2, one for each wavelet of alpha"),
+        ("unknown_position_unit", "units.position is \"mm\": must be 'rad', 'm', 'count' or ''"),
+        ("dimension_fraction", "network.dimension is 1.5: must be a whole number"),
+        ("plan_text", 'plan is "direct": must be an object'),
+        ("domain_reversed", "domain.lower[0] is 0.7: must be below domain.upper[0] = 0.6"),
+        ("n_wavelets_other", "fit.n_wavelets is 3: must be 2, the wavelets of the network"),
+    ],
+)
+def test_errors_say_path_value_and_what_would_be_right(name: str, sentence: str, tmp_path: Path) -> None:
+    assert refusal(tmp_path / "bad.json", bad_bytes(BAD[name])) == sentence
+
+
+def test_what_is_not_json_is_refused_with_its_line(tmp_path: Path) -> None:
+    assert re.match(r"this is not JSON: .*line 2, column", refusal(tmp_path / "a", bad_bytes(BAD["comment"])))
+
+
+def test_a_model_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"^there is no file .*none\.json$"):
+        load_model(tmp_path / "none.json")
+
+
+def test_a_long_value_is_shortened(tmp_path: Path) -> None:
+    content = json.loads(good_text("position"))
+    content["kind"] = "x" * 1000
+    assert len(refusal(tmp_path / "a.json", json.dumps(content).encode())) < 150
+
+
+def objects(schema: dict[str, Any], content: Any, path: str) -> Iterator[tuple[str, dict[str, Any], Any]]:
+    """Each object in a file with its path and its schema."""
+    if "$ref" in schema:
+        schema = SCHEMA["$defs"][schema["$ref"].split("/")[-1]]
+    for choice in schema.get("anyOf", ()):
+        if content is not None and choice != {"type": "null"}:
+            yield from objects(choice, content, path)
+    if schema.get("type") == "array":
+        for index, item in enumerate(content[:1]):
+            yield from objects(schema["items"], item, f"{path}/{index}")
+    if "properties" in schema:
+        yield path, schema, content
+        for name, part in schema["properties"].items():
+            if name in content:
+                yield from objects(part, content[name], f"{path}/{name}")
+
+
+def spoiled(schema: dict[str, Any], content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Changes of an object that its schema forbids: JSON patches without the path of the object."""
+    yield "unknown_key", {"op": "add", "value": 0}
+    for name in schema["required"]:
+        yield name, {"op": "remove"}
+    for name, part in schema["properties"].items():
+        part = next((choice for choice in part.get("anyOf", ()) if choice != {"type": "null"}), part)
+        if part.get("type") in ("number", "integer"):
+            wrong: list[Any] = ["text", True]
+            wrong += [part["minimum"] - 1] if "minimum" in part else []
+            wrong += [part["maximum"] + 1] if "maximum" in part else []
+            wrong += [part["exclusiveMinimum"]] if "exclusiveMinimum" in part else []
+            wrong += [1.5] if part["type"] == "integer" else []
+        else:
+            wrong = [1.5]
+        for value in wrong:
+            yield name, {"op": "add", "value": value}
+
+
+@pytest.mark.parametrize("file", ["plan_network_hysteresis", "certificate_massless", "position", "periodic"])
+def test_the_reader_refuses_what_the_schema_forbids(file: str) -> None:
+    content = json.loads(good_text(file))
+    for path, schema, part in objects(SCHEMA, content, ""):
+        assert schema["additionalProperties"] is False
+        for name, change in spoiled(schema, part):
+            wrong = patched(copy.deepcopy(content), [{"path": f"{path}/{name}", **change}])
+            with pytest.raises(InputError):
+                check_model(wrong)
+
+
+def test_the_schema_has_the_words_and_fields_of_the_core() -> None:
+    parts = SCHEMA["$defs"]
+    assert tuple(parts["Plan"]["properties"]["structure"]["enum"]) == structure_names
+    assert list(parts["Device"]["properties"]) == list(DeviceProfile().to_dict())
+    certificate = load_model(CORPUS / "good" / "plan_and_certificate.json").certificate
+    assert certificate is not None
+    assert set(parts["Certificate"]["properties"]) == set(certificate)
+    for name in ("Bounds", "Device"):
+        assert set(parts[name]["properties"]) == set(certificate[name.lower()])
+
+
+TEXT = good_text("position")
+MUTATIONS = 60 * int(os.environ.get("PALPATE_TEST_SCALE", "1"))
+NUMBERS_REFUSED = ["1e400", "-1e400", "1" + "0" * 400, "9" * 5000, "01", "+1", ".5", "1.", "0x10", "Infinity"]
+NUMBERS_REFUSED += ["-Infinity", "NaN", "true", '"1"', "[1]", "{}", "null", "1.7976931348623159e308"]
+NUMBERS_TAKEN = ["-0", "-0.0", "1e-400", "1E+2", "18446744073709551616", "9007199254740993", "4.9e-324"]
+
+
+def with_bias(number: str) -> bytes:
+    return re.sub(r'"bias": [^,\n}]+', f'"bias": {number}', TEXT, count=1).encode()
+
+
+def with_notes(notes: str) -> bytes:
+    return json.dumps({**json.loads(TEXT), "notes": {"x": "@@"}}).replace('"@@"', notes).encode()
+
+
+def in_text(inside: bytes) -> bytes:
+    word = '"created_by": "'
+    return TEXT.replace(word, word + "@@").encode().replace(b"@@", inside)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        TEXT.replace("\n", "\r\n").encode(),
+        in_text(b"\\ud83d\\ude00"),
+        in_text(b"\\u0000"),
+        in_text(b"\x7f"),
+        with_notes("[" * 98 + "]" * 98),
+        with_notes('[{"a": 1}, {"a": 2}]'),
+        *(with_bias(number) for number in NUMBERS_TAKEN),
+    ],
+)
+def test_unusual_json_is_read(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_bytes(content)
+    load_model(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "empty"),
+        (b" \n", "this is not JSON"),
+        (b"\xff\xfe{}", "this is not JSON"),
+        (TEXT.encode("utf-16"), "NUL byte"),
+        (b"\xef\xbb\xbf" + TEXT.encode(), "begins with a byte order mark: save it as UTF-8 without one"),
+        (TEXT.encode() * 2, "this is not JSON"),
+        (TEXT.encode() + b"\0", "holds a NUL byte"),
+        (TEXT.encode() + b"\f", "this is not JSON"),
+        (b'{"a": 1, "\\u0061": 1}', 'the key "a" stands twice in one object'),
+        (with_notes('{"a": 1, "a": 2}'), 'the key "a" stands twice in one object'),
+        (with_notes("[" * 99 + "]" * 99), "nested more than 100 levels deep"),
+        (b"[" * 100_000, "nested more than 100 levels deep"),
+        *((in_text(inside), "this is not JSON") for inside in (b"\t", b"\\ud800", b"\\udc00", b"\\x")),
+        *((in_text(inside), "this is not JSON") for inside in (b"\xed\xa0\x80", b"\xe9", b"\xc0\xaf")),
+        *((with_bias(number), ": ") for number in NUMBERS_REFUSED),
+    ],
+)
+def test_what_readers_read_differently_is_refused(content: bytes, sentence: str, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_bytes(content)
+    with pytest.raises(InputError, match=re.escape(sentence)) as refused:
+        load_model(tmp_path / "a.json")
+    assert str(tmp_path / "a.json") in str(refused.value)
+    assert str(refused.value).isprintable()
+
+
+def test_a_pipe_is_refused_without_waiting_for_a_writer(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe"):
+        load_model(tmp_path / "pipe")
+
+
+def test_mutations_are_read_or_refused_with_one_sentence(tmp_path: Path) -> None:
+    chance = random.Random(17)
+    path = tmp_path / "a.json"
+    for _ in range(MUTATIONS):
+        mutated = bytearray(TEXT.encode())
+        for _ in range(chance.choice([1, 1, 2])):
+            place = chance.randrange(len(mutated))
+            mutated[place] = (
+                chance.choice(b'0123456789-+.eE"{}[],: \\\n\0\xff')
+                if chance.random() < 0.8
+                else mutated[place] ^ (1 << chance.randrange(8))
+            )
+        path.write_bytes(mutated)
+        error = refused(path)
+        assert error is None or (error.isprintable() and error.startswith(str(path)))

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small models with known parameters."""
+
+from typing import Any
+
+from palpate import Model
+
+
+def model_by_hand(**changes: Any) -> Model:
+    """f = 5 x + one wavelet over 0 to 0.5 rad, at most 3 N*m; with changes."""
+    arguments: dict[str, Any] = {
+        "units": {"position": "rad", "force": "N*m"},
+        "alpha": [[20.0]],
+        "beta": [[0.3]],
+        "weight": [0.1],
+        "linear": [5.0],
+        "lower": [0.0],
+        "upper": [0.5],
+    }
+    return Model.from_network(**{**arguments, **changes})
+
+
+def keyswitch_by_hand(**changes: Any) -> Model:
+    """A tactile switch of 4 mm travel whose press lies 0.1 N above its release."""
+    return model_by_hand(
+        **{
+            "units": {"position": "m", "force": "N"},
+            "alpha": [[2000.0]],
+            "beta": [[0.002]],
+            "weight": [-0.2],
+            "linear": [100.0],
+            "bias": 0.3,
+            "weight_hysteresis": [0.0],
+            "linear_hysteresis": [0.0],
+            "bias_hysteresis": 0.05,
+            "upper": [0.004],
+            "below": "free",
+            **changes,
+        }
+    )
