@@ -235,7 +235,11 @@ def mars(X: Array, y: Array) -> Fitted:
 METHODS = (
     Method("palpate", palpate_with()),
     Method("palpate, selection alone", palpate_with(search=SearchOptions(refine=False))),
-    Method("palpate, quasi-Newton", palpate_with(search=SearchOptions(refinement="quasi-newton")), most_rows=100_000),
+    Method(
+        "palpate, quasi-Newton",
+        palpate_with(search=SearchOptions(refinement="quasi-newton")),
+        most_rows=100_000,
+    ),
     Method("OMP on a Mexican-hat frame", frame_pursuit, most_rows=100_000),
     Method("make_lsq_spline", lsq_spline, inputs=(1,)),
     Method("UnivariateSpline", univariate_spline, inputs=(1,), most_rows=100_000),

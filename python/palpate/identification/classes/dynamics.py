@@ -233,8 +233,8 @@ class Dynamics:
             share, error = regression.held_out_gain(use, without, with_it)
             found = dict(zip(with_it, regression.solved(use, with_it), strict=True))[name]
             way = "falls" if share > 0.0 else "rises"
-            fresh = f"the squared error on held-out stretches {way} by {100 * abs(share):.3g} "
-                f"+- {100 * error:.2g} %"
+            by = f"{100 * abs(share):.3g} +- {100 * error:.2g} %"
+            measured = f"the squared error on held-out stretches {way} by {by}"
             if share > error and found > 0.0:
                 notes.append(f"{name} accepted: {changes}, {measured}")
                 continue
