@@ -21,12 +21,13 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullLocator
 
+from palpate.cli.figures import figure_file
+from palpate.cli.printing import number
+
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.studies import fill_tables, markdown_table
 
-from palpate.cli.figures import figure_file
-from palpate.cli.output import number
 from palpate.plotting.look import grid
 
 ANY_SIGN, EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"

@@ -26,12 +26,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
+from palpate.cli.figures import figure_file
+from palpate.cli.printing import number
+
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.studies import ROOT, fill_tables, markdown_table, where, write_json
 
-from palpate.cli.figures import figure_file
-from palpate.cli.output import number
 from palpate.plotting.look import grid
 
 PROGRAM = ROOT / "build" / "release" / "bench" / "failure_maps"

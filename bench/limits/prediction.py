@@ -21,14 +21,15 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import StrMethodFormatter
 from numpy.typing import NDArray
 
+from palpate.cli.figures import figure_file
+from palpate.cli.printing import number
+
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.studies import fill_tables, markdown_table, write_json
 
 from palpate import DeviceProfile, Hand, Model, Scheme, identify
 from palpate._core.stability import ForceBounds, certify_bounds, force_bounds
-from palpate.cli.figures import figure_file
-from palpate.cli.output import number
 from palpate.planning import Plan, force_error, simulate
 from palpate.plotting.look import grid
 from palpate.recording.sample import sample_recording

@@ -17,14 +17,15 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from palpate.cli.figures import figure_file
+from palpate.cli.printing import number
+
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.solvers.ratios import measured_claims
 from bench.solvers.results import BenchmarkResults, Row, arguments, nanoseconds
 from bench.studies import markdown_table, write_text
 
-from palpate.cli.figures import figure_file
-from palpate.cli.output import number
 from palpate.plotting.look import grid
 from palpate.verdict import FORCE_JND
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from .output import number, print_table, talk
-from .printing import print_line
-
-if TYPE_CHECKING:
-    from ..baselines import Compared
-    from ..recording import Recording
+from ..baselines import Compared, compare
+from ..recording import Recording
+from .printing import number, print_line, print_table, talk
 
 
 def baselines_option(command: Any) -> Any:
@@ -31,7 +28,6 @@ def fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -
     """The baselines, fitted to what is not held out."""
     if hold_out_every is None:
         raise click.UsageError("--baselines compares on held-out rows and needs --hold-out-every K")
-    from ..baselines import compare
 
     talk("fitting the baselines ...")
     return compare(recordings, hold_out_every)

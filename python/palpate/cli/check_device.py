@@ -11,18 +11,21 @@ from pathlib import Path
 import click
 
 from .._core import __version__
+from ..devices import check_device as check
 from ..errors import InputError
+from ..model import load_model
+from ..planning import DeviceProfile
 from ..verdict import Verdict, no
-from .arguments import PATH
 from .device_options import device_options
+from .exit_status import end_with
 from .live_line import live_line
-from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
-from .verb import Verb
+from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
+from .verb import PATH, verb
 
 _MARKS = {True: "ok", False: "WRONG", None: "-"}
 
 
-@click.command(cls=Verb, epilog="Example: palpate check-device --device usb --push")
+@verb("palpate check-device --device usb --push", ends_at_once=False, no_args_is_help=False)
 @device_options
 @click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
 @click.option("--duration-s", type=float, default=10.0, help="Total duration.")
@@ -69,9 +72,6 @@ def check_device(
     while the drive is disabled: with --push, and only where the rest is right, the device is enabled for
     pushes of half a percent of its force. Do not render before that. Exit code 1: not suitable.
     """
-    from ..devices import check_device as check
-    from ..model import load_model
-    from ..planning import DeviceProfile
 
     if write_profile is not None:
         if not push:

@@ -5,36 +5,35 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import InputError
-from .arguments import PATH, json_option
-from .ending import interrupted_at_once
-from .output import (
-    end_with,
-    finishing,
-    number,
-    print_json,
-    print_numbers,
-    print_table,
-    print_verdict,
-    require_writable,
-    talk,
-)
-from .pictures import (
+from ..identification import identify
+from ..identification.classes.findings import error_findings
+from ..planning import Comparison, compare_structures, describe, rig_for
+from ..recording.sample import sample_recording
+from ..verdict import Verdict
+from ..verification import verify
+from .exit_status import end_with, finishing
+from .figures import (
     close_loops,
     picture_closed_loops,
     picture_structures,
     picture_verification,
     print_closed_loops,
 )
-from .printing import print_line
-from .verb import Verb
-
-if TYPE_CHECKING:
-    from ..planning import Comparison
+from .printing import (
+    number,
+    print_json,
+    print_line,
+    print_numbers,
+    print_table,
+    print_verdict,
+    require_writable,
+    talk,
+)
+from .verb import PATH, json_option, verb
 
 IDENTIFY_SEED, FRESH_SEED = 1, 2
 """The two recordings of the sample: one to identify, one that the model has not seen."""
@@ -43,10 +42,9 @@ RENDERED_S = 4.0
 """Simulated time of each rendering [s]."""
 
 
-@click.command(cls=Verb, epilog="Example: palpate demo -o demo")
+@verb("palpate demo -o demo", no_args_is_help=False)
 @click.option("-o", "--output", type=PATH, metavar="FOLDER", default=Path("demo"), help="Where the files go.")
 @json_option
-@interrupted_at_once()
 def demo(output: Path, as_json: bool) -> None:
     """Identify, verify and render a sample, without any input or device.
 
@@ -54,12 +52,6 @@ def demo(output: Path, as_json: bool) -> None:
     stop are simulated; a model is identified from one of them, verified on the other, and rendered on a
     simulated device with each structure.
     """
-    from ..identification import identify
-    from ..identification.classes.findings import error_findings
-    from ..planning import compare_structures, describe, rig_for
-    from ..recording.sample import sample_recording
-    from ..verdict import Verdict
-    from ..verification import verify
 
     _require_folder(output)
     talk(f"everything in this demo is simulated, nothing was measured; its files go to {output}")

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 
 import click
 
-from .arguments import PATH
+from .verb import PATH
 
 F = TypeVar("F", bound=Callable[..., Any])
 

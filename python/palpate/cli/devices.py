@@ -12,14 +12,12 @@ from .._core.device import longest_watchdog_ms, shortest_watchdog_ms
 from ..devices import DeviceError, Found, find_devices, install_rule, open_usb
 from ..errors import InputError
 from ..verdict import GOOD, Verdict, no, usable
-from .arguments import json_option
-from .ending import WorkError
-from .output import end_with, number, print_json, print_verdict, talk
-from .printing import print_line
-from .verb import Verb
+from .exit_status import WorkError, end_with
+from .printing import number, print_json, print_line, print_verdict, talk
+from .verb import json_option, verb
 
 
-@click.command(cls=Verb, epilog="Example: palpate devices")
+@verb("palpate devices", no_args_is_help=False)
 @click.option(
     "--install-udev-rule",
     is_flag=True,

@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure files: axes as wide as a printed column for the functions of `plotting`, drawn without a screen."""
+"""Figure files, drawn without a screen on axes of a printed column, and the figures that verbs make."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from .._core.rendering import Scheme
 from ..errors import InputError
+from ..model import Model
+from ..planning import Comparison, Plan, describe, force_at
+from ..recording import Recording
 from ..recording.files import replacing
-from .printing import visible
+from ..verification import ClosedLoop, Verification, force_driven, motion_driven, uncertainty
+from .printing import number, print_table, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +42,18 @@ _STYLE: Any = {
 }
 
 _FORMATS = (".png", ".pdf", ".svg")
+
+_LIGHTER = 0.01
+"""Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
+
+
+_MOST_NAMES = 2
+"""Source files that a title names."""
+
+_DRIVEN = {
+    "motion-driven": "recorded motion drives the device",
+    "force-driven": "recorded force drives the object",
+}
 
 
 def require_figure_name(path: Path) -> None:
@@ -72,3 +92,165 @@ def figure_file(
                 each.label_outer()
         with replacing(path) as temporary:
             figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+
+
+def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
+    """Both ways to close the loop.
+
+    The recorded motion drives the device. The recorded force drives the object: with the mass and damping
+    that the paper's explicit environment adds to it, and with the little that the implicit one needs.
+    """
+    paper = force_driven(model, recording)
+    light = Scheme(
+        structure="implicit",
+        mass=_LIGHTER * paper.scheme.mass,
+        damping=_LIGHTER * paper.scheme.damping,
+        play_radius=paper.scheme.play_radius,
+    )
+    return [motion_driven(model, recording), paper, force_driven(model, recording, light)]
+
+
+def print_closed_loops(loops: Sequence[ClosedLoop]) -> None:
+    """How far each closed loop is from the recording: in force when driven by motion, else in position."""
+    print_table(
+        ("closed loop", "NRMSE"),
+        [(f"{loop.view}, {describe(loop.scheme)}", number(loop.nrmse)) for loop in loops],
+    )
+
+
+def _is_simulated(recording: Recording) -> bool:
+    return "simulated" in recording.metadata
+
+
+def source_name(files: Iterable[str]) -> str:
+    """The names of source files without their folders, for the title of a figure."""
+    names = [Path(file).name for file in files]
+    if len(names) > _MOST_NAMES:
+        return f"{names[0]} and {len(names) - 1} more"
+    return " and ".join(names) or "arrays"
+
+
+def _error_text(reference: NDArray[np.float64], other: NDArray[np.float64]) -> str:
+    """The NRMSE of the forces that a figure compares."""
+    spread = float(np.std(reference))
+    error = float(np.sqrt(np.mean((other - reference) ** 2)))
+    return f"NRMSE {number(error / spread) if spread else 'not defined'} on {len(reference)} rows"
+
+
+def picture_verification(
+    path: Path,
+    model: Model,
+    verified: Sequence[tuple[Recording, Verification]],
+    identified_on: Sequence[Recording] = (),
+) -> None:
+    """Measured and modelled force over position, residuals beneath; several recordings in one figure.
+
+    With the recordings that the model was identified on, its 95 % band is drawn too, where it is known.
+    """
+    from ..plotting import draw_measured_and_modelled
+
+    directions = [
+        recording.direction[verification.rows]
+        for recording, verification in verified
+        if recording.direction is not None
+    ]
+    all_directed = len(directions) == len(verified)
+    one_curve = not model.hysteretic or all_directed
+    recording = Recording.from_arrays(
+        np.concatenate([recording.position[verification.rows] for recording, verification in verified]),
+        np.concatenate([recording.force[verification.rows] for recording, verification in verified]),
+        direction=np.concatenate(directions) if all_directed else None,
+        units=verified[0][0].units,
+    )
+    modelled = np.concatenate([verification.force for _, verification in verified])
+    simulated = any(_is_simulated(recording) for recording, _ in verified)
+    files = source_name(file for each, _ in verified for file in each.source.files)
+    title = f"{files}\n{_error_text(recording.force, modelled)}"
+    with figure_file(path, height_inches=4.0, rows=(2.5, 1.0), title=title) as (force, residual):
+        draw_measured_and_modelled(
+            force,
+            residual,
+            recording,
+            modelled,
+            one_curve=one_curve,
+            seen="simulated data" if simulated else "measured",
+            standard_error=_standard_error(model, identified_on, recording),
+        )
+
+
+def _standard_error(
+    model: Model, identified_on: Sequence[Recording], drawn: Recording
+) -> NDArray[np.float64] | None:
+    """Of the model's force at the rows that are drawn; None where it is not known."""
+    if not identified_on or (model.hysteretic and drawn.direction is None):
+        return None
+    try:
+        known = uncertainty(model, identified_on)
+    except InputError:
+        return None
+    stroke = None if drawn.direction is None else drawn.direction.astype(np.float64)
+    return known.force(drawn.position, stroke)
+
+
+def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
+    """Rendered force beside the model's own at the measured position, differences beneath."""
+    from ..plotting import draw_measured_and_modelled
+
+    modelled = force_at(plan, rendered.position, rendered.sample_period)
+    one_curve = not (plan.model.hysteretic or plan.model.of_velocity)
+    title = (
+        f"model of {source_name(plan.model.data.files)}, rendered: {plan.structure}\n"
+        f"{_error_text(modelled, rendered.force)}"
+    )
+    with figure_file(path, height_inches=4.0, rows=(2.5, 1.0), title=title) as (force, residual):
+        draw_measured_and_modelled(force, residual, rendered, modelled, one_curve=one_curve, seen="rendered")
+
+
+def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[ClosedLoop]) -> None:
+    """Recorded and rendered force over position, one panel for each closed loop of a recording."""
+    from ..plotting import draw_real_against_rendered
+
+    height, rows = 0.5 + 2.2 * len(loops), (1.0,) * len(loops)
+    with figure_file(
+        path, height_inches=height, rows=rows, title=source_name(recording.source.files)
+    ) as axes:
+        for each, loop in zip(axes, loops, strict=True):
+            draw_real_against_rendered(
+                each,
+                (loop.recorded_position, loop.recorded_force),
+                (loop.rendered_position, loop.rendered_force),
+                loop.units,
+                title=f"{_DRIVEN[loop.view]}\n{describe(loop.scheme)}: NRMSE {number(loop.nrmse)}",
+                real_name="recorded (simulated)" if _is_simulated(recording) else "recorded",
+            )
+        handles, names = axes[0].get_legend_handles_labels()
+        axes[0].figure.legend(
+            handles, names, frameon=False, markerscale=1.5, loc="outside lower center", ncols=2
+        )
+
+
+def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, *, of: str) -> None:
+    """The force error of each structure that was rendered; `of` says what was rendered."""
+    from ..plotting import draw_structures
+
+    shown = [(row.name, row.error) for row in rows if row.error is not None]
+    with figure_file(path, height_inches=0.9 + 0.3 * len(shown), title=of) as (axes,):
+        draw_structures(
+            axes,
+            [name for name, _ in shown],
+            [error.mean for _, error in shown],
+            [error.end for _, error in shown],
+            force_unit,
+        )
+
+
+def picture_path(path: Path, model: Model) -> None:
+    """How a model was found: error of every network that was considered, its criterion beneath."""
+    from ..plotting import draw_path
+
+    if not model.path:
+        raise InputError("the model does not say how it was found: it holds no path of networks")
+    fit = model.fit
+    title = f"{source_name(model.data.files)}\n{fit.n_wavelets} wavelets, NRMSE {number(fit.nrmse)}"
+    with figure_file(path, height_inches=4.0, rows=(1.4, 1.0), title=title) as (error, criterion):
+        draw_path(error, criterion, model.path, model.units["force"])

@@ -7,42 +7,38 @@ import time
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import numpy as np
 
-from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
+from ..identification import identify as identify_model
+from ..identification.classes.findings import error_findings
+from ..identification.options import RESERVED_INPUTS
+from ..identification.search.criteria import reporting_to
+from ..recording import Recording
+from ..verdict import Verdict
+from ..verification import Verification, verify
+from ..verification.verification import circumstances
 from .beside_baselines import as_records, baselines_option, fit_baselines, print_beside
-from .ending import interrupted_at_once
-from .figures import require_figure_name
+from .exit_status import end_with, finishing
+from .figures import picture_verification, require_figure_name
 from .identify_options import identify_options
 from .large_files import LargeFiles, large_file_options
-from .output import (
-    end_with,
-    finishing,
+from .printing import (
     number,
     print_json,
     print_numbers,
     print_verdict,
+    progress,
     require_distinct,
     require_writable,
     talk,
 )
-from .pictures import picture_verification
-from .progress import progress
-from .verb import Verb
-
-if TYPE_CHECKING:
-    from ..recording import Recording
-    from ..verification import Verification
+from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, verb
 
 
-@click.command(
-    cls=Verb,
-    no_args_is_help=True,
-    epilog="Example: palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png",
-)
+@verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png")
 @click.argument("recording_files", metavar="RECORDING...", type=PATH, nargs=-1, required=True)
 @click.option(
     "-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="The model file to write."
@@ -60,7 +56,6 @@ if TYPE_CHECKING:
 @json_option
 @reading_options
 @identify_options
-@interrupted_at_once()
 def identify(
     recording_files: tuple[Path, ...],
     output: Path,
@@ -79,13 +74,6 @@ def identify(
     first line printed says which. The model is as simple as the data allows: a constant, a line, a wavelet
     network, and hysteresis where press and release differ.
     """
-    from ..identification import identify as identify_model
-    from ..identification.classes.findings import error_findings
-    from ..identification.options import RESERVED_INPUTS
-    from ..identification.search.criteria import reporting_to
-    from ..verdict import Verdict
-    from ..verification import verify
-    from ..verification.verification import circumstances
 
     if plot is not None:
         require_figure_name(plot)

@@ -9,16 +9,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import click
 
-from .arguments import ReadingOptions
-from .output import talk
-from .printing import echo
-
-if TYPE_CHECKING:
-    from ..model import Model
+from ..identification.identify_files import identify_files
+from ..model import Model
+from .printing import echo, talk
+from .verb import ReadingOptions
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -52,7 +50,6 @@ class LargeFiles:
 
     def identify(self, files: Sequence[Path], reading: ReadingOptions, options: dict[str, Any]) -> Model:
         """The model, and on the way how far it is."""
-        from ..identification.identify_files import identify_files
 
         left = {f"--{name}": value for name, value in reading.options.items() if name not in _READS}
         self.require_alone({name.replace("_", "-"): value for name, value in left.items()})

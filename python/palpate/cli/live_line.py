@@ -9,9 +9,8 @@ from contextlib import contextmanager
 
 from ..devices import DeviceError
 from ..errors import InputError
-from .ending import terminated_as_interrupted
-from .output import number
-from .progress import OverwrittenLine
+from .exit_status import terminated_as_interrupted
+from .printing import OverwrittenLine, number
 
 
 @contextmanager

@@ -10,9 +10,8 @@ from importlib import import_module
 
 import click
 
-from .ending import INTERRUPTED, ending_of
-from .printing import drop_what_cannot_be_written, prepare_streams, print_line
-from .verb import Verbs
+from .exit_status import INTERRUPTED, ending_of
+from .printing import Verbs, drop_what_cannot_be_written, prepare_streams, print_line
 
 _VERBS = {
     "identify": "Identify a model from recordings.",
@@ -50,9 +49,7 @@ class _LazyVerbs(Verbs):
 
 def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from .._core import __version__
-
-        print_line(f"palpate {__version__}")
+        print_line(f"palpate {import_module('._core', 'palpate').__version__}")
         ctx.exit()
 
 

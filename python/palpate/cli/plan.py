@@ -5,18 +5,25 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+import numpy as np
 
-from .arguments import PATH, json_option, plot_option
-from .ending import interrupted_at_once
-from .figures import require_figure_name
-from .output import (
-    end_with,
-    finishing,
+from .._core.stability import Certificate, felt_slope, force_bounds
+from ..model import load_model
+from ..model.model_file import certificate_record
+from ..planning import DeviceProfile, Plan, example_profiles, profile_file
+from ..planning.choices import explicit_scheme, usual_play_radius
+from ..planning.root_locus import root_locus
+from ..planning.search import plan as choose
+from .exit_status import end_with, finishing
+from .figures import figure_file, require_figure_name, source_name
+from .printing import (
+    Verb,
     number,
     print_json,
+    print_line,
     print_numbers,
     print_paragraph,
     print_verdict,
@@ -24,13 +31,7 @@ from .output import (
     require_writable,
     talk,
 )
-from .printing import print_line
-from .verb import Verb
-
-if TYPE_CHECKING:
-    from .._core.device import DeviceProfile
-    from .._core.stability import Certificate
-    from ..planning import Plan
+from .verb import PATH, json_option, plot_option, verb
 
 
 class Samples(click.ParamType[int | str]):
@@ -59,7 +60,6 @@ class _PlanVerb(Verb):
 
 def _list_examples(*, as_json: bool) -> None:
     """Print every example profile with its file and its sources."""
-    from ..planning import example_profiles
 
     examples = example_profiles()
     if as_json:
@@ -73,11 +73,7 @@ def _list_examples(*, as_json: bool) -> None:
             print_paragraph(paragraph, indent="  ")
 
 
-@click.command(
-    cls=_PlanVerb,
-    no_args_is_help=True,
-    epilog="Example: palpate plan press.json --device knob.toml -o press.json",
-)
+@verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
@@ -115,7 +111,6 @@ def _list_examples(*, as_json: bool) -> None:
     help="List the example profiles with their sources, and end.",
 )
 @json_option
-@interrupted_at_once()
 def plan(
     model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
 ) -> None:
@@ -127,9 +122,6 @@ def plan(
     in its place stands under plan. Exit code 1: no structure holds, or the felt force differs by more than is
     accepted. Nothing is written then.
     """
-    from ..model import load_model
-    from ..planning import DeviceProfile, profile_file
-    from ..planning.search import plan as choose
 
     profile_path = profile_file(device)
     if plot is not None:
@@ -181,7 +173,6 @@ def structure_words(plan: Plan) -> str:
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
-    from ..model.model_file import certificate_record
 
     error = plan.force_error
     felt, steepest = _felt_slopes(plan, certificate)
@@ -258,7 +249,6 @@ def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
 
     Where it was taken out of the model, the certificate's bounds are of what is left.
     """
-    from .._core.stability import felt_slope
 
     steepest = max(0.0, certificate.bounds.slope_max)
     if plan.structure == "direct":
@@ -269,14 +259,8 @@ def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
     """The locus of the plan's explicit structure, or of the one that the device would need."""
-    import numpy as np
 
-    from .._core.stability import force_bounds
-    from ..planning.choices import explicit_scheme, usual_play_radius
-    from ..planning.root_locus import root_locus
     from ..plotting import draw_root_locus
-    from .figures import figure_file
-    from .pictures import source_name
 
     radius = usual_play_radius(plan.model, profile)
     bounds = force_bounds(plan.rendered, radius)

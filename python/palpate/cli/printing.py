@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The only place that writes text to standard output and standard error.
+"""The only place that writes text to standard output (results) and standard error (talk, progress).
 
 Control characters are escaped here, so that no column name, file name or model can control a terminal. Lines
 are wrapped between words on a terminal only: files and programs get one line for each item. Paragraphs are
@@ -9,19 +9,38 @@ wrapped everywhere.
 from __future__ import annotations
 
 import io
+import json
+import math
 import os
 import shutil
 import sys
+import tempfile
 import textwrap
-from contextlib import suppress
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
 
 import click
+
+from ..errors import InputError
+from ..verdict import Verdict
 
 WIDEST = 80
 """Text wider than this is hard to read on any screen."""
 
 _NARROWEST_VALUE = 24
 """Columns beside a name below which its value continues under the name instead."""
+
+_EVERY_S = 10.0
+"""Seconds between two lines where standard error is no terminal."""
+
+_REFRESH_S = 0.1
+"""Seconds between two states of the line on a terminal."""
+
+_NARROWEST_HELP = 30
+"""Columns that help takes at least."""
 
 
 class OutputError(Exception):
@@ -130,3 +149,190 @@ def drop_what_cannot_be_written() -> None:
             stream.flush()
         except OSError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+
+
+def talk(sentence: str) -> None:
+    """Print a sentence for a person, on standard error."""
+    print_line(sentence, err=True)
+
+
+def print_json(result: Mapping[str, Any]) -> None:
+    """Print one object on standard output, in ASCII; a number that is not finite becomes null."""
+    echo(json.dumps(_finite(result), allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def number(value: float) -> str:
+    """Four significant digits: what a person compares."""
+    return f"{value:.4g}"
+
+
+def print_numbers(rows: Mapping[str, str]) -> None:
+    """Print one line for each number: its name, aligned, and its value."""
+    width = max(map(len, rows))
+    for name, value in rows.items():
+        print_value(name, value, width)
+
+
+def print_verdict(verdict: Verdict) -> None:
+    """Print the verdict on standard output, before any number: its level, then a line for each reason."""
+    print_line(f"verdict: {verdict.level}")
+    for reason in verdict.reasons:
+        print_paragraph(reason, indent="  ")
+
+
+def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table whose first column is text and whose others are numbers, aligned right.
+
+    On a terminal that is too narrow the numbers stand on a line of their own, below the text.
+    """
+    lines = [[visible(cell) for cell in line] for line in (header, *rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(header))]
+    terminal = terminal_width()
+    apart = terminal is not None and sum(widths) + 2 * (len(widths) - 1) > terminal
+    if terminal is not None and sum(widths[1:]) + 2 * len(widths) > terminal:
+        widths = [0] * len(widths)
+    for line in lines:
+        numbers = "  ".join(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True))
+        if apart:
+            print_line(line[0])
+            print_line(f"  {numbers}".rstrip())
+        else:
+            print_line(f"{line[0]:<{widths[0]}}  {numbers}".rstrip())
+
+
+def print_paragraph(text: str, *, indent: str = "") -> None:
+    """Print text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
+    print_line(indent + text, elsewhere=WIDEST)
+
+
+def require_writable(target: Path, *, inputs: Sequence[Path] = ()) -> None:
+    """Refuse a file that could not be written at the end, before the work begins.
+
+    Raises
+    ------
+    InputError
+        Its folder does not exist or cannot be written, it is a folder, or it is one of the inputs.
+    """
+    if not target.parent.is_dir():
+        raise InputError(f"{target} cannot be written: there is no folder {target.parent}")
+    if target.is_dir():
+        raise InputError(f"{target} cannot be written: it is a folder")
+    for given in inputs:
+        if given.exists() and target.exists() and target.samefile(given):
+            raise InputError(f"{target} is an input as well; writing the result there would destroy it")
+    try:
+        with tempfile.TemporaryFile(dir=target.parent):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{target} cannot be written: its folder takes no new file ({error.strerror})"
+        ) from None
+
+
+def require_distinct(*targets: Path | None) -> None:
+    """Refuse two results that would be written to one file."""
+    given = [target.absolute() for target in targets if target is not None]
+    for target in given:
+        if given.count(target) > 1:
+            raise InputError(f"two results would both be written to {target}")
+
+
+class OverwrittenLine:
+    """One line on a terminal that each new text replaces. Nothing is printed where there is no terminal."""
+
+    def __init__(self) -> None:
+        self.on_terminal = sys.stderr.isatty()
+        self._used = False
+
+    def show(self, text: str) -> None:
+        """Replace the line, cut to the width of the terminal."""
+        if self.on_terminal:
+            width = shutil.get_terminal_size().columns - 1
+            echo(f"\r{visible(text):<{width}.{width}}", err=True, nl=False)
+            self._used = True
+
+    def clear(self) -> None:
+        """Remove the line."""
+        if self._used:
+            self.show("")
+            echo("\r", err=True, nl=False)
+            self._used = False
+
+    def end(self) -> None:
+        """Leave the line as it is and begin the next one."""
+        if self._used:
+            echo("", err=True)
+            self._used = False
+
+
+class Progress:
+    """Prints how far some work is, with the seconds since it began."""
+
+    def __init__(self, work: str) -> None:
+        self._work = work
+        self._line = OverwrittenLine()
+        self._start = self._shown = time.monotonic()
+
+    def __call__(self, state: str) -> None:
+        """Report a state; it is printed if the last one was long enough ago."""
+        now = time.monotonic()
+        if now - self._shown >= (_REFRESH_S if self._line.on_terminal else _EVERY_S):
+            self._shown = now
+            text = f"{self._work}: {state}, {now - self._start:.0f} s"
+            if self._line.on_terminal:
+                self._line.show(text)
+            else:
+                talk(text)
+
+    def clear(self) -> None:
+        """Remove the line from a terminal."""
+        self._line.clear()
+
+
+@contextmanager
+def progress(work: str) -> Iterator[Progress]:
+    """Give a `Progress` whose line is removed at the end, also when the work fails."""
+    shown = Progress(work)
+    try:
+        yield shown
+    finally:
+        shown.clear()
+
+
+class _Formatter(click.HelpFormatter):
+    """Click's formatter, except that it follows a terminal below 50 columns too."""
+
+    def __init__(
+        self, indent_increment: int = 2, width: int | None = None, max_width: int | None = None
+    ) -> None:
+        terminal = shutil.get_terminal_size().columns
+        super().__init__(indent_increment, max(_NARROWEST_HELP, min(terminal, WIDEST)))
+
+    def write_dl(self, rows: Iterable[tuple[str, str]], col_max: int = 30, col_spacing: int = 2) -> None:
+        super().write_dl(list(rows), min(col_max, self.width // 3), col_spacing)
+
+
+class _Context(click.Context):
+    formatter_class = _Formatter
+
+
+class Verb(click.Command):
+    """A command with our help."""
+
+    context_class = _Context
+
+
+class Verbs(click.Group):
+    """A group of commands with our help."""
+
+    context_class = _Context

@@ -8,21 +8,19 @@ from typing import Any
 
 import click
 
+from ..devices import record as record_object
 from ..errors import InputError
+from ..model import load_model
 from ..recording.files import require_absent
-from .arguments import PATH, json_option
 from .device_options import device_options
+from .exit_status import end_with
 from .live_line import live_line
-from .output import end_with, number, print_json, print_numbers, print_verdict, require_writable, talk
+from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
 from .session_verdict import session_verdict
-from .verb import Verb
+from .verb import PATH, json_option, verb
 
 
-@click.command(
-    cls=Verb,
-    no_args_is_help=True,
-    epilog="Example: palpate record press.csv --device simulated --object press.json --probe",
-)
+@verb("palpate record press.csv --device simulated --object press.json --probe", ends_at_once=False)
 @click.argument("recording", metavar="OUT.csv", type=PATH)
 @device_options
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
@@ -68,8 +66,6 @@ def record(
     object holds the force limit. The force is the transducer's; without one it is what the motor holds, the
     friction of the device included. Ctrl-C ends it in an orderly way.
     """
-    from ..devices import record as record_object
-    from ..model import load_model
 
     require_writable(recording, inputs=() if object_file is None else (object_file,))
     if not force:

@@ -9,22 +9,21 @@ from typing import Any
 import click
 
 from .._core.run import LoopSettings, usual_telemetry_hz
+from .._core.run import render as render_live
+from ..model import load_model
+from ..planning import Plan
 from ..recording.files import require_absent
-from .arguments import PATH, json_option
+from .exit_status import end_with
 from .live_line import live_line
-from .output import end_with, print_json, print_numbers, print_verdict, require_writable, talk
+from .printing import print_json, print_numbers, print_verdict, require_writable, talk
 from .scheme_options import scheme_options
 from .session_verdict import session_verdict
-from .verb import Verb
+from .verb import PATH, json_option, verb
 
 _LOOP = LoopSettings()
 
 
-@click.command(
-    cls=Verb,
-    no_args_is_help=True,
-    epilog="Example: palpate render press.json --duration-s 10 --record felt.csv",
-)
+@verb("palpate render press.json --duration-s 10 --record felt.csv", ends_at_once=False)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
@@ -85,9 +84,6 @@ def render(
     requires a plan with a certificate for it. Ctrl-C stops the loop: it sends zero force, closes the device
     and the recording, and prints the summary.
     """
-    from .._core.run import render as render_live
-    from ..model import load_model
-    from ..planning import Plan
 
     if record is not None:
         require_writable(record, inputs=(model_file,))

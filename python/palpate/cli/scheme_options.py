@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import click
 
 from .._core.rendering import Scheme, most_prediction_taps, structure_names
-from .output import talk
-
-if TYPE_CHECKING:
-    from .._core.simulation import TestRig
-    from ..model import Model
-    from ..planning import Plan
+from .._core.simulation import TestRig
+from ..model import Model
+from ..planning import Plan
+from .printing import talk
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -79,7 +77,6 @@ def scheme_options(command: F) -> F:
 
 def chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
     """What was asked for; else the plan that stands in the model; else the default, which is told."""
-    from ..planning import Plan
 
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:

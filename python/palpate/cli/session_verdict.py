@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..verdict import Verdict
-from .output import talk
+from .printing import talk
 
 
 def session_verdict(summary: Mapping[str, Any]) -> Verdict:

@@ -4,37 +4,34 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from ..model import Model, load_model
+from ..planning import Plan
 from ..verdict import GOOD, Verdict, usable
-from .arguments import PATH, json_option
-from .figures import figure_file, require_figure_name
-from .output import (
-    end_with,
-    finishing,
+from ..verification import Stroke, compare
+from .exit_status import end_with, finishing
+from .figures import figure_file, picture_path, require_figure_name
+from .plan import structure_words
+from .printing import (
     number,
     print_json,
+    print_line,
     print_numbers,
     print_table,
     print_verdict,
     require_writable,
 )
-from .pictures import picture_path
-from .printing import print_line
-from .verb import Verb
-
-if TYPE_CHECKING:
-    from ..model import Model
-    from ..verification import Stroke
+from .verb import PATH, json_option, verb
 
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
           "slope_bounds", "data")  # fmt: skip
 """Fields of the model file that --json repeats as they are."""
 
 
-@click.command(cls=Verb, no_args_is_help=True, epilog="Example: palpate show press.json")
+@verb("palpate show press.json")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--beside",
@@ -54,7 +51,6 @@ def show(model_file: Path, beside: Path | None, plot: Path | None, as_json: bool
 
     Exit code 1: the verdict of the model is "no".
     """
-    from ..model import load_model
 
     if plot is not None:
         require_figure_name(plot)
@@ -94,8 +90,6 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
     """Structure, device and verdict of the plan in a model file."""
     if model.plan is None:
         return None
-    from ..planning import Plan
-    from .plan import structure_words
 
     plan = Plan.of(model)
     return {
@@ -109,7 +103,6 @@ def _compare(
     model: Model, model_file: Path, other: Model, other_file: Path, *, plot: Path | None, as_json: bool
 ) -> None:
     """Print how far two models are from each other, with a verdict on both and on their difference."""
-    from ..verification import compare
 
     strokes = compare(model, other)
     verdict = model.verdict + other.verdict + _noticed(strokes)

@@ -9,32 +9,27 @@ from typing import Any
 
 import click
 
+from ..model import load_model
+from ..planning import force_error, force_range, judge, rig_for
+from ..planning import simulate as render
 from ..recording.files import require_absent
-from .arguments import PATH, json_option, plot_option
-from .ending import interrupted_at_once
-from .figures import require_figure_name
-from .output import (
-    end_with,
-    finishing,
+from .exit_status import end_with, finishing
+from .figures import picture_rendering, require_figure_name
+from .printing import (
     number,
     print_json,
     print_numbers,
     print_verdict,
+    progress,
     require_distinct,
     require_writable,
     talk,
 )
-from .pictures import picture_rendering
-from .progress import progress
 from .scheme_options import chosen_plan, scheme_options
-from .verb import Verb
+from .verb import PATH, json_option, plot_option, verb
 
 
-@click.command(
-    cls=Verb,
-    no_args_is_help=True,
-    epilog="Example: palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv",
-)
+@verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @scheme_options
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time.")
@@ -42,7 +37,6 @@ from .verb import Verb
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
 @plot_option("rendered force beside the model's, differences beneath")
 @json_option
-@interrupted_at_once()
 def simulate(
     model_file: Path,
     duration_s: float,
@@ -59,9 +53,6 @@ def simulate(
     a plan is rendered as planned, on the device that it was certified for, unless a structure is asked for.
     This shows what happens, and proves nothing.
     """
-    from ..model import load_model
-    from ..planning import force_error, force_range, judge, rig_for
-    from ..planning import simulate as render
 
     if plot is not None:
         require_figure_name(plot)

@@ -4,17 +4,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import InputError
-from .arguments import PATH, ReadingOptions, json_option, plot_option, reading_options
-from .ending import interrupted_at_once
-from .figures import require_figure_name
-from .output import (
-    end_with,
-    finishing,
+from ..model import load_model
+from ..verification import ClosedLoop, columns_of
+from ..verification import verify as verify_model
+from .exit_status import end_with, finishing
+from .figures import (
+    close_loops,
+    picture_closed_loops,
+    picture_verification,
+    print_closed_loops,
+    require_figure_name,
+)
+from .printing import (
     number,
     print_json,
     print_numbers,
@@ -23,16 +28,10 @@ from .output import (
     require_writable,
     talk,
 )
-from .pictures import close_loops, picture_closed_loops, picture_verification, print_closed_loops
-from .verb import Verb
-
-if TYPE_CHECKING:
-    from ..verification import ClosedLoop
+from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, verb
 
 
-@click.command(
-    cls=Verb, no_args_is_help=True, epilog="Example: palpate verify press.json fresh.csv --plot residuals.png"
-)
+@verb("palpate verify press.json fresh.csv --plot residuals.png")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.argument("recording_file", metavar="RECORDING", type=PATH)
 @plot_option("measured and modelled force over position, residuals beneath")
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
 )
 @json_option
 @reading_options
-@interrupted_at_once()
 def verify(
     model_file: Path,
     recording_file: Path,
@@ -63,9 +61,6 @@ def verify(
     the recorded force drives the object and the resulting position is compared. The exit code is 1 if the
     verdict is no.
     """
-    from ..model import load_model
-    from ..verification import columns_of
-    from ..verification import verify as verify_model
 
     if recording_file.suffix == ".json" != model_file.suffix:
         raise InputError(f"the model comes first: palpate verify {recording_file} {model_file}")

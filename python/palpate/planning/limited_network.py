@@ -198,11 +198,9 @@ def _fitted(
     lossy = hysteretic and sliding_bounds(model).loss_min >= 0.0
     bounds = domain_bounds(problem, hysteresis=lossy, slopes=slopes)
     solution = impose(problem, problem.solve(basis), bounds)
-    found = FittedNetwork.of(solution, problem.readout, lower, travel, inputs=("position",))
+    found = FittedNetwork.of(solution, problem.readout, lower, travel, inputs=("position",)).parameters()
     new = {
-        name: value
-        for name, value in found.parameters().items()
-        if name not in ("lower", "upper") and value is not None
+        name: value for name, value in found.items() if name not in ("lower", "upper") and value is not None
     }
     limited = with_network(model, **new)
     if not lossy:

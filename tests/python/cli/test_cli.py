@@ -14,9 +14,9 @@ import click
 import pytest
 
 from palpate import InputError
-from palpate.cli.ending import WorkError, ending_of
+from palpate.cli.exit_status import WorkError, ending_of, finishing
 from palpate.cli.main import main, palpate
-from palpate.cli.output import finishing, print_json, require_distinct, require_writable
+from palpate.cli.printing import print_json, require_distinct, require_writable
 
 VERBS = ["identify", "verify", "simulate", "show", "demo"]
 

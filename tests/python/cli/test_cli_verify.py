@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, load_model, read_recording, verify
+from palpate.cli.figures import close_loops, picture_closed_loops, picture_verification
 from palpate.cli.main import main
-from palpate.cli.pictures import close_loops, picture_closed_loops, picture_verification
 
 JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated"]
 JSON_FIELDS += ["verdict", "units"]

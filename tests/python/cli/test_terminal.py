@@ -17,8 +17,7 @@ import pytest
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, identify, load_model
 from palpate.cli.main import main
-from palpate.cli.printing import visible
-from palpate.cli.progress import Progress
+from palpate.cli.printing import Progress, visible
 from palpate.identification.search.criteria import reporting_to
 from test_cli_identify import spring
 
@@ -188,7 +187,7 @@ def test_identification_reports_every_network_that_it_tries(here: Path) -> None:
 def test_ctrl_c_ends_a_long_computation_of_a_library_at_once() -> None:
     code = (
         "import click, numpy as np\n"
-        "from palpate.cli.ending import interrupted_at_once\n"
+        "from palpate.cli.exit_status import interrupted_at_once\n"
         "with interrupted_at_once():\n"
         "    matrix = np.random.default_rng(0).normal(size=(4000, 4000))\n"
         "    print('begins', flush=True)\n"

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from palpate import Recording, identify, read_recording, verify
-from palpate.cli.pictures import picture_path, picture_verification
+from palpate.cli.figures import picture_path, picture_verification
 from palpate.plotting import draw_measured_and_modelled, draw_real_against_rendered, draw_structures
 from palpate.plotting.look import MOST_POINTS, label, scale_for, strokes, thinned
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a run ends when it does not end well: an exit code and one sentence."""
+"""Exit status of every verb, and the one sentence that goes with a failure."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import click
 
+from ..verdict import Verdict
 from .printing import OutputError, echo, end_line_on_terminal, print_line
 
 FAILED = 1
@@ -143,3 +144,28 @@ def _usage_sentence(error: click.ClickException) -> str:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
+
+
+def end_with(verdict: Verdict) -> None:
+    """End the verb with the exit code of its verdict.
+
+    Raises
+    ------
+    click.exceptions.Exit
+        The verdict is no: exit code 1.
+    """
+    if verdict.level == "no":
+        raise click.exceptions.Exit(FAILED)
+
+
+@contextmanager
+def finishing() -> Iterator[None]:
+    """While results are written and printed Ctrl-C is ignored: it comes before all of them, or too late."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
