@@ -22,7 +22,7 @@ detent = palpate.Model(
     bias=0.0,
     lower=[0.0],
     upper=[0.5],
-    fit=Fit(rung="network", stop_reason="written by hand", nrmse=0.0, n_wavelets=1, n_parameters=5),
+    fit=Fit(model_class="network", stop_reason="written by hand", nrmse=0.0, n_wavelets=1, n_parameters=5),
     data=Source(files=(), sha256="", rows=0, columns={}),
 )
 

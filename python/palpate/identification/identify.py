@@ -122,7 +122,12 @@ def model_of(
 ) -> Model:
     """The model of an identified network, with the verdict on it."""
     path: list[PathStep] = [
-        {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.model_class}
+        {
+            "n_wavelets": at.n_wavelets,
+            "rmse": at.rmse,
+            "criterion": at.criterion,
+            "model_class": at.model_class,
+        }
         for at in network.path
     ]
     return Model(
@@ -139,7 +144,7 @@ def model_of(
         if options.search.filters == "paper-explicit"
         else network.damping,
         fit=Fit(
-            rung=network.model_class,
+            model_class=network.model_class,
             stop_reason=network.stop_reason,
             nrmse=network.nrmse,
             n_wavelets=len(network.weight),

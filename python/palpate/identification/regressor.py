@@ -78,7 +78,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     stop_reason_ : str
         The criterion that stopped growth, "max_wavelets", or "data" where it allows no further parameter.
     path_ : list of dict
-        Every network that was considered: n_wavelets, rmse, criterion, rung.
+        Every network that was considered: n_wavelets, rmse, criterion, model_class.
     n_features_in_, feature_names_in_
         As in every scikit-learn estimator.
 
@@ -316,7 +316,7 @@ def _model_of(
             "n_wavelets": at.n_wavelets,
             "rmse": at.rmse,
             "criterion": at.criterion if math.isfinite(at.criterion) else None,
-            "rung": at.model_class,
+            "model_class": at.model_class,
         }
         for at in found.path
     ]
@@ -326,7 +326,7 @@ def _model_of(
         units={"position": "", "force": ""},
         **found.parameters(),
         fit=Fit(
-            rung=found.model_class,
+            model_class=found.model_class,
             stop_reason=found.stop_reason,
             nrmse=found.rmse / spread if spread > 0 else 0.0,
             n_wavelets=len(found.alpha),

@@ -18,7 +18,16 @@ from palpate.cli.identify_options import HELP
 from palpate.cli.main import main, palpate
 from palpate.recording.sample import sample_recording
 
-JSON_FIELDS = ["model", "n_wavelets", "n_parameters", "rung", "stop_reason", "nrmse", "verdict", "seconds"]
+JSON_FIELDS = [
+    "model",
+    "n_wavelets",
+    "n_parameters",
+    "model_class",
+    "stop_reason",
+    "nrmse",
+    "verdict",
+    "seconds",
+]
 
 
 @pytest.fixture
@@ -57,7 +66,7 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert list(result) == JSON_FIELDS
     assert result["model"] == "m.json"
     assert (result["n_wavelets"], result["n_parameters"]) == (model.n_wavelets, model.n_parameters)
-    assert (result["rung"], result["stop_reason"]) == (model.fit.rung, model.stop_reason)
+    assert (result["model_class"], result["stop_reason"]) == (model.fit.model_class, model.stop_reason)
     assert result["nrmse"] == model.fit.nrmse
     assert result["seconds"] > 0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stopping on rows that were kept back, rungs earned on them, and outliers."""
+"""Stopping on held-out rows, model classes accepted on them, and outliers."""
 
 from typing import Any
 
@@ -118,7 +118,7 @@ def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
     assert sum(note.startswith("position refused: bic falls by") for note in network.notes) >= 1
 
 
-def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:
+def test_what_each_model_class_gains_on_held_out_rows_stands_in_the_notes() -> None:
     notes = identify(sample_recording(1, duration_s=20.0)).notes["identification"]
     assert any(
         note.startswith("linear accepted: bic falls by ") and "held-out rows falls by" in note

@@ -56,7 +56,7 @@ def test_a_play_between_those_tried_is_found_and_costs_no_wavelets(radius: float
     force = 1.5 * np.tanh(12 * (x - 0.2)) + side * (0.1 + 0.1 * x)
     force += np.random.default_rng(2).normal(0.0, noise, len(x)) if noise else 0.0
     model = identify(Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x))))
-    assert (model.fit.rung, model.damping, model.mass) == ("hysteresis", None, None)
+    assert (model.fit.model_class, model.damping, model.mass) == ("hysteresis", None, None)
     assert model.play_radius == pytest.approx(radius, rel=0.005)
     assert model.n_wavelets <= 8
     assert model.fit.nrmse * np.std(force) < 1.02 * noise + 1e-4 * np.ptp(force)

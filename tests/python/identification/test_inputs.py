@@ -27,7 +27,7 @@ def contact(seed: int, n: int = 4000) -> Recording:
 
 def test_a_force_of_position_and_velocity_is_identified_and_verified_on_fresh_data() -> None:
     model = identify(contact(0))
-    assert (model.kind, model.inputs, model.fit.rung) == (
+    assert (model.kind, model.inputs, model.fit.model_class) == (
         "position_velocity",
         ("position", "velocity"),
         "velocity",

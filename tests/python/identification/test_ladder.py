@@ -144,16 +144,16 @@ def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> Non
         assert told.startswith("hysteresis refused: bic rises by ")
 
 
-@pytest.mark.parametrize(("gain", "rung"), [(0.01, "constant"), (0.03, "position")])
+@pytest.mark.parametrize(("gain", "model_class"), [(0.01, "constant"), (0.03, "position")])
 def test_a_gain_on_fresh_rows_below_its_standard_error_earns_nothing(
-    gain: float, rung: str, monkeypatch: pytest.MonkeyPatch
+    gain: float, model_class: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Samples, "held_out_gain", lambda *rungs: (gain, 0.02))
+    monkeypatch.setattr(Samples, "held_out_gain", lambda *candidates: (gain, 0.02))
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    assert network.model_class == rung
-    verdict = "accepted" if rung == "position" else "refused"
+    assert network.model_class == model_class
+    verdict = "accepted" if model_class == "position" else "refused"
     assert all(note.split()[1] == f"{verdict}:" for note in network.notes)
     assert all(note.endswith(f"falls by {100 * gain:g} +- 2 %") for note in network.notes)
 
@@ -191,8 +191,8 @@ def test_every_network_on_the_way_stands_in_the_path() -> None:
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    rungs = [point.model_class for point in network.path]
-    assert rungs[:2] == ["constant", "linear"]
+    classes = [point.model_class for point in network.path]
+    assert classes[:2] == ["constant", "linear"]
     sizes = [point.n_wavelets for point in network.path if point.model_class == "position"]
     assert sizes[:-1] == list(range(len(sizes) - 1))
     assert sizes[-1] == len(network.weight)

@@ -67,8 +67,8 @@ def test_a_curve_and_a_surface_are_found() -> None:
             == 2 * X.shape[1] * network.n_wavelets_ + network.n_wavelets_ + X.shape[1] + 1
         )
         assert network.stop_reason_ == "bic"
-        assert network.path_[0]["rung"] == "constant"
-        assert {"n_wavelets", "rmse", "criterion", "rung"} == set(network.path_[-1])
+        assert network.path_[0]["model_class"] == "constant"
+        assert {"n_wavelets", "rmse", "criterion", "model_class"} == set(network.path_[-1])
 
 
 @pytest.mark.parametrize("seed", range(3))

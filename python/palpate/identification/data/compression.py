@@ -135,7 +135,7 @@ class Compressor:
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
-            # All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same
+            # All sides of a cell and of its neighbours share one slope, so that it costs all model classes the same
             # few degrees of freedom.
             block = self._pooled()
             dy = _without_slopes(dy, dx, block, weight)
