@@ -24,7 +24,7 @@ def draw_path(
     error_axes, criterion_axes : matplotlib.axes.Axes
         Where to draw; they should share their horizontal axis.
     path : sequence of mapping
-        Networks in the order in which they were considered: model_class, n_wavelets, rmse, criterion (or None).
+        Networks in the order in which they were considered: model_class, n_wavelets, rmse, criterion.
     force_unit : str
         Of rmse.
     """

@@ -133,7 +133,7 @@ def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -
     assert any(note.startswith("hysteresis: h >= 0 imposed") for note in network.notes)
 
 
-def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> None:
+def test_noise_in_rows_that_one_model_class_does_not_see_is_no_evidence_for_it() -> None:
     """Where a motion begins its hysteresis input is unknown: luck with the noise there is no gain."""
     for draw in range(20 if not LONG else 200):
         time = np.arange(3000) / (2000.0 + 30.0 * draw)
@@ -245,7 +245,7 @@ def test_a_named_hysteresis_needs_directions_or_time() -> None:
         fit_environment(x[:, None], x, None, IdentifyOptions(inputs="position,hysteresis"))
 
 
-def test_named_inputs_decide_the_rung() -> None:
+def test_named_inputs_decide_the_model_class() -> None:
     random = np.random.default_rng(4)
     x = np.concatenate([np.linspace(0.0, 1.0, 100), np.linspace(1.0, 0.0, 100)])
     side = np.repeat([1.0, -1.0], 100)
