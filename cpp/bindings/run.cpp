@@ -70,13 +70,13 @@ class Watcher {
     int views_ = 0;
 };
 
-py::object python_of(const Fields& fields);
+py::object python_of(const NamedValues& fields);
 
 template <class T>
 py::object python_of(const std::vector<T>& values) {
     py::list list;
     for (const T& value : values) {
-        if constexpr (std::is_same_v<T, Fields>) {
+        if constexpr (std::is_same_v<T, NamedValues>) {
             list.append(python_of(value));
         } else {
             list.append(value);
@@ -98,9 +98,9 @@ py::object python_of(const T& value) {
     return py::cast(value);
 }
 
-py::object python_of(const Fields& fields) {
+py::object python_of(const NamedValues& fields) {
     py::dict dict;
-    for (const Field& field : fields) {
+    for (const NamedValue& field : fields) {
         dict[py::str(field.name)] =
             std::visit([](const auto& value) { return python_of(value); }, field.value);
     }

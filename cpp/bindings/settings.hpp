@@ -32,7 +32,7 @@ template <class T>
 void set_fields(T& settings, const pybind11::kwargs& given, const Setters<T>& setters) {
     namespace py = pybind11;
     for (const auto& [key, value] : given) {
-        const auto name = key.cast<std::string>();
+        const std::string name = py::str(key);
         const auto known = setters.find(name);
         if (known == setters.end()) {
             throw py::type_error("there is no argument '" + name + "'");

@@ -114,10 +114,11 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
                          "B_c, force per velocity" + scaled(usual.coupling.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--mass", scheme.mass,
-                         "m of implicit and explicit" + scaled(usual.inertia.mass, "kg*m^2")))
+                         "Mass of the object, where it has mass" + scaled(usual.inertia.mass, "kg*m^2")))
         ->check(positive());
-    group(app.add_option("--damping", scheme.damping,
-                         "B_o of implicit and explicit" + scaled(usual.inertia.damping, "N*m*s/rad")))
+    group(app.add_option(
+              "--damping", scheme.damping,
+              "Damping of the object, where it has mass" + scaled(usual.inertia.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--play-radius", scheme.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"))

@@ -25,15 +25,15 @@ namespace {
 constexpr std::size_t shown_ticks = 8;
 constexpr int calls_a_line = 5;  ///< the live line changes ten times a second
 
-nlohmann::json json_of(const Fields& fields);
+nlohmann::json json_of(const NamedValues& fields);
 
 nlohmann::json json_of(std::monostate /*nothing*/) {
     return nullptr;
 }
 
-nlohmann::json json_of(const std::vector<Fields>& list) {
+nlohmann::json json_of(const std::vector<NamedValues>& list) {
     nlohmann::json array = nlohmann::json::array();
-    for (const Fields& fields : list) {
+    for (const NamedValues& fields : list) {
         array.push_back(json_of(fields));
     }
     return array;
@@ -44,9 +44,9 @@ nlohmann::json json_of(const T& value) {  // a number that is not finite is writ
     return value;
 }
 
-nlohmann::json json_of(const Fields& fields) {
+nlohmann::json json_of(const NamedValues& fields) {
     nlohmann::json object = nlohmann::json::object();
-    for (const Field& field : fields) {
+    for (const NamedValue& field : fields) {
         object[field.name] = std::visit([](const auto& value) { return json_of(value); }, field.value);
     }
     return object;

@@ -86,7 +86,7 @@ def _list_examples(*, as_json: bool) -> None:
 @click.option("--coupling-stiffness", type=float, default=None, help="K_c; chosen from the device.")
 @click.option("--coupling-damping", type=float, default=None, help="B_c; chosen from the device.")
 @click.option("--mass", type=float, default=None, help="m; the model's own. 0 leaves it out.")
-@click.option("--damping", type=float, default=None, help="B_o; the model's own. 0 leaves it out.")
+@click.option("--damping", type=float, default=None, help="Of the object; the model's own. 0 leaves it out.")
 @click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
 @click.option(
     "--predict",
@@ -207,7 +207,7 @@ def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: f
             f"K_c = {number(scheme.coupling_stiffness)}, B_c = {number(scheme.coupling_damping)}"
         )
     if scheme.has_mass:
-        rows["object"] = f"m = {number(scheme.mass)}, B_o = {number(scheme.damping)}"
+        rows["object"] = f"mass {number(scheme.mass)}, damping {number(scheme.damping)}"
     if scheme.predict:
         rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
     if scheme.play_radius:

@@ -48,13 +48,13 @@ def scheme_options(command: F) -> F:
                 "--mass",
                 type=float,
                 show_default=f"{_DEFAULT.mass:g} kg*m^2, scaled",
-                help="m of implicit and explicit, in force per acceleration.",
+                help="Mass of the object, where it has mass, in force per acceleration.",
             ),
             click.option(
                 "--damping",
                 type=float,
                 show_default=f"{_DEFAULT.damping:g} N*m*s/rad, scaled",
-                help="B_o of implicit and explicit, in force per velocity.",
+                help="Damping of the object, where it has mass, in force per velocity.",
             ),
             click.option(
                 "--play-radius",

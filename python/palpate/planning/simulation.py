@@ -269,7 +269,7 @@ def describe(scheme: Scheme) -> str:
         words.append("compensated")
     if scheme.predict:
         words.append(f"predict {scheme.predict}")
-    if scheme.structure in ("implicit", "explicit"):
+    if scheme.has_mass:
         words += [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"]
     return ", ".join(words)
 

@@ -15,7 +15,7 @@ _LINES = ("-", "--", ":", "-.")
 
 
 def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit: str) -> None:
-    """Poles over the damping B_o, one line style for each slope; the chosen damping marked.
+    """Poles over the damping of the object, one line style for each slope; the chosen damping marked.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit:
     locus : RootLocus
         What to draw.
     damping : float
-        The chosen B_o, for the legend [force*s/position].
+        The chosen damping, for the legend [force*s/position].
     slope_unit : str
         Of the slopes, for the legend.
     """
@@ -46,7 +46,7 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit:
             color="black",
             markerfacecolor="white",
             zorder=3,
-            label=f"the same, $B_o$ = {damping:.3g}",
+            label=f"the same, damping {damping:.3g}",
         )
     axes.set_aspect("equal")
     axes.set_xlim(-1.3, 1.3)

@@ -118,7 +118,7 @@ def force_driven(
     scheme : Scheme, optional
         Structure ("explicit" or "implicit"), mass and damping; the paper's explicit environment with its mass
         and damping when not given. An explicit environment that would be unstable for the model's steepest
-        slope, which must be below (4 m - 2 B_o T) / T^2, is replaced by the implicit one, and the notes say
+        slope, which must be below `explicit_slope_limit`, is replaced by the implicit one, and the notes say
         so.
     period_s, stroke_speed
         As for :func:`motion_driven`.

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "limits/trials.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session_text.hpp"
@@ -19,6 +20,7 @@
 namespace palpate {
 namespace {
 
+using bench::EvenHysteresis;
 using test::Spring;
 
 TEST(Prediction, AdvancesARampByHalfASampleForEveryNumberOfTaps) {

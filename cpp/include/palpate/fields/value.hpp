@@ -9,15 +9,15 @@
 
 namespace palpate {
 
-struct Field;
-using Fields = std::vector<Field>;
+struct NamedValue;
+using NamedValues = std::vector<NamedValue>;
 
 /// A value of a report, which becomes JSON or a Python object. An empty one and a number that is not finite are null.
 using Value = std::variant<std::monostate, bool, std::uint64_t, double, std::string, std::vector<double>,
-                           std::vector<std::string>, Fields, std::vector<Fields>>;
+                           std::vector<std::string>, NamedValues, std::vector<NamedValues>>;
 
 /// One named value of a report.
-struct Field {
+struct NamedValue {
     std::string name;
     Value value;
 };

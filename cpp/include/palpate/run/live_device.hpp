@@ -16,7 +16,7 @@ namespace palpate {
 /// What a device adds to a summary.
 struct DeviceReport {
     std::string name;  ///< of the field that holds `fields`; empty: no field
-    Fields fields;
+    NamedValues fields;
     Lines lines;
 };
 

@@ -66,7 +66,8 @@ namespace detail {
         report.fields.push_back({"round_trip", fields(stream.round_trip)});
         report.fields.push_back({"delay", fields(stream.delay)});
         report.fields.push_back(
-            {"delay_samples", Fields{{"p50", samples(0.5)}, {"p99", samples(0.99)}, {"max", samples(1.0)}}});
+            {"delay_samples",
+             NamedValues{{"p50", samples(0.5)}, {"p99", samples(0.99)}, {"max", samples(1.0)}}});
     }
     return report;
 }

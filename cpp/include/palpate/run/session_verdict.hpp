@@ -29,7 +29,7 @@ struct SessionFinding {
 struct SessionExpectation {
     bool recorded = false;      ///< a recording was requested
     double encoder_step = 0.0;  ///< of the device [m or rad]; 0 = not quantised
-    Range domain{};               ///< positions of the rendered model; NaN where a real object is measured
+    Range domain{};             ///< positions of the rendered model; NaN where a real object is measured
     std::string position_unit{};
     std::vector<std::string> warnings{};  ///< from `finish_record`
 };
