@@ -120,7 +120,7 @@ def identify(
         "model": str(output),
         "n_wavelets": model.n_wavelets,
         "n_parameters": model.n_parameters,
-        "rung": model.fit.rung,
+        "model_class": model.fit.model_class,
         "stop_reason": model.stop_reason,
         "nrmse": nrmse,
         "verdict": str(verdict),
@@ -150,7 +150,7 @@ def identify(
                 "model": str(output),
                 "wavelets": str(model.n_wavelets),
                 "parameters": str(model.n_parameters),
-                "kind": f"{model.fit.rung}, stopped by {model.stop_reason}",
+                "kind": f"{model.fit.model_class}, stopped by {model.stop_reason}",
                 "nrmse": f"{number(nrmse)} on {judged}",
                 "seconds": f"{seconds:.2f}",
             }

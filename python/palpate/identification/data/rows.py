@@ -128,7 +128,7 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
         strokes = strokes_of(recordings, named=options.inputs != "auto")
         side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
-    if options.filters == "matched":
+    if options.search.filters == "matched":
         forces = [part.force for part in recordings]
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
@@ -211,11 +211,11 @@ def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
             f"the paper's filters are made for steps of {paper_sample_time_s:g} s; the recording's are from "
             f"{steps.min():g} to {steps.max():g} s"
         )
-    filters = environment_filters(options.filters.removeprefix("paper-"), "paper")
+    filters = environment_filters(options.search.filters.removeprefix("paper-"), "paper")
     velocity = filters.g2.filter(recording.position - recording.position[0])
-    target = recording.force - options.assumed_mass * filters.g1.filter(velocity)
-    if options.filters == "paper-explicit":
-        target = target - options.assumed_damping * velocity
+    target = recording.force - options.search.assumed_mass * filters.g1.filter(velocity)
+    if options.search.filters == "paper-explicit":
+        target = target - options.search.assumed_damping * velocity
     return np.asarray(target)
 
 
