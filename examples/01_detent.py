@@ -17,11 +17,6 @@ detent = palpate.Model.from_network(
     linear=[2.0],
     lower=[0.0],
     upper=[0.5],
-<<<<<<< HEAD
-=======
-    fit=Fit(model_class="network", stop_reason="written by hand", nrmse=0.0, n_wavelets=1, n_parameters=5),
-    data=Source(files=(), sha256="", rows=0, columns={}),
->>>>>>> ident
 )
 
 # 2. The device and the hand: a knob with a 16-bit encoder at 1 kHz, swept through the detent. Simulated.

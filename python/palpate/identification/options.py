@@ -124,16 +124,7 @@ class IdentifyOptions:
     fixed_force: tuple[float, float] | None = None
     """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
     coupling_stiffness: float | None = None
-<<<<<<< HEAD
     """K_c: df/dx <= 0.9 K_c (`compensated_share`) is imposed over the domain [force/position]"""
-    play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
-    """Play radii tried for hysteresis where a file does not tell directions; where it is there, the best
-    one between the least and the largest is found [share of the travel]"""
-    contact_share: float = 0.02
-    """Where |f(lower)| is below this share of the force's range the object is left there: "free" below [-]"""
-=======
-    """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
->>>>>>> ident
     period: float | None = None
     """Period of an environment that repeats, such as a knob [position]"""
     search: SearchOptions = field(default_factory=SearchOptions)
