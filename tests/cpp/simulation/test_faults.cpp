@@ -21,6 +21,7 @@
 #include "palpate/run/session_text.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/test_rig.hpp"
 #include "support.hpp"
 
 namespace palpate {

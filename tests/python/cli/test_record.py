@@ -90,7 +90,7 @@ def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: P
     answer = recorded(out, *probe, device=nobody)
     assert answer.returncode == 0, answer.stderr
     recording = read_recording(out)
-    assert "the friction of the device is in it" in recording.metadata["force"]
+    assert "including the device's friction" in recording.metadata["force"]
     assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
     # The motor holds the handle's damping too: 0.018 N*m at this speed, of 0.72 N*m between the ends.
     model = identify(recording)
