@@ -16,8 +16,8 @@
 #include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
-#include "palpate/simulation/simulated_device.hpp"
 #include "palpate/simulation/closed_loop.hpp"
+#include "palpate/simulation/simulated_device.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "support.hpp"
 
