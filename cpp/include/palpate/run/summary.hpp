@@ -58,7 +58,7 @@ struct Summary {
 };
 
 /// Percentiles of durations [us].
-[[nodiscard]] inline Fields fields(const DurationHistogram& histogram) {
+[[nodiscard]] inline NamedValues fields(const DurationHistogram& histogram) {
     return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
             {"p99_us", 1e-3 * histogram.quantile(0.99)},
             {"p999_us", 1e-3 * histogram.quantile(0.999)},
@@ -66,19 +66,19 @@ struct Summary {
 }
 
 /// The fields of a summary, for JSON and for Python.
-[[nodiscard]] inline Fields fields(const Summary& summary) {
+[[nodiscard]] inline NamedValues fields(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
-    std::vector<Fields> findings;
+    std::vector<NamedValues> findings;
     for (const SessionFinding& finding : summary.findings) {
         findings.push_back({{"level", std::string(finding.level)}, {"sentence", finding.sentence}});
     }
-    Fields ticks_by_status;
+    NamedValues ticks_by_status;
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
         if (loop.ticks_by_status[k] > 0) {
             ticks_by_status.push_back({std::string(status_texts[k].word), loop.ticks_by_status[k]});
         }
     }
-    Fields all{
+    NamedValues all{
         {"verdict", verdict_text(summary.findings)},
         {"findings", findings},
         {"orderly", summary.orderly()},
@@ -102,10 +102,10 @@ struct Summary {
         {"telemetry_dropped", summary.telemetry_dropped},
         {"position_range", std::vector<double>{summary.positions.lower, summary.positions.upper}},
         {"force_range", std::vector<double>{summary.forces.lower, summary.forces.upper}},
-        {"energy", Fields{{"given_in_ramp_J", loop.given_in_ramp},
-                          {"given_J", loop.given},
-                          {"most_stored_J", loop.most_stored},
-                          {"sentence", energy_text(loop)}}},
+        {"energy", NamedValues{{"given_in_ramp_J", loop.given_in_ramp},
+                               {"given_J", loop.given},
+                               {"most_stored_J", loop.most_stored},
+                               {"sentence", energy_text(loop)}}},
         {"without", summary.report.refused},
         {"notes", summary.all_notes()},
     };
