@@ -5,25 +5,18 @@ python examples/01_detent.py
 """
 
 import palpate
-from palpate.model import Fit
 from palpate.planning import force_error
-from palpate.recording import Source
 
 # 1. The object: a soft spring of 2 N*m/rad with a detent at 0.2 rad. Usually a recording gives it, by
 #    palpate.identify; here one wavelet is written down by hand.
-detent = palpate.Model(
-    kind="position",
-    inputs=["position"],
+detent = palpate.Model.from_network(
     units={"position": "rad", "force": "N*m"},
     alpha=[[30.0]],
     beta=[[0.2]],
     weight=[-0.3],
     linear=[2.0],
-    bias=0.0,
     lower=[0.0],
     upper=[0.5],
-    fit=Fit(rung="network", stop_reason="written by hand", nrmse=0.0, n_wavelets=1, n_parameters=5),
-    data=Source(files=(), sha256="", rows=0, columns={}),
 )
 
 # 2. The device and the hand: a knob with a 16-bit encoder at 1 kHz, swept through the detent. Simulated.

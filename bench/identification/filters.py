@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from bench.identification.moving import moved
 from bench.studies import count, write_results
 
-from palpate import Model, identify
+from palpate import Model, SearchOptions, identify
 from palpate.recording import sample_force
 from palpate.recording.sample import LOWER, UPPER
 
@@ -32,11 +32,14 @@ FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
 
 WAYS: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "matched, mass": ({"mass": MASS}, {}),
-    "paper (figure 11), mass": ({"mass": MASS}, {"filters": "paper-implicit", "assumed_mass": MASS}),
+    "paper (figure 11), mass": (
+        {"mass": MASS},
+        {"search": SearchOptions(filters="paper-implicit", assumed_mass=MASS)},
+    ),
     "matched, mass and damping": ({"mass": MASS, "damping": DAMPING}, {}),
     "paper (figure 13), mass and damping": (
         {"mass": MASS, "damping": DAMPING},
-        {"filters": "paper-explicit", "assumed_mass": MASS, "assumed_damping": DAMPING},
+        {"search": SearchOptions(filters="paper-explicit", assumed_mass=MASS, assumed_damping=DAMPING)},
     ),
 }
 """Mass and damping of the object, and the options of its identification."""

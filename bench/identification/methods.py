@@ -20,7 +20,7 @@ from sklearn.linear_model import OrthogonalMatchingPursuit, Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, PolynomialFeatures, SplineTransformer
 
-from palpate import WaveletNetworkRegressor
+from palpate import SearchOptions, WaveletNetworkRegressor
 from palpate._core.model import wavelet_columns
 from palpate.identification.network.basis import truncated_frame
 
@@ -234,8 +234,12 @@ def mars(X: Array, y: Array) -> Fitted:
 
 METHODS = (
     Method("palpate", palpate_with()),
-    Method("palpate, selection alone", palpate_with(refine=False)),
-    Method("palpate, quasi-Newton", palpate_with(refinement="quasi-newton"), most_rows=100_000),
+    Method("palpate, selection alone", palpate_with(search=SearchOptions(refine=False))),
+    Method(
+        "palpate, quasi-Newton",
+        palpate_with(search=SearchOptions(refinement="quasi-newton")),
+        most_rows=100_000,
+    ),
     Method("OMP on a Mexican-hat frame", frame_pursuit, most_rows=100_000),
     Method("make_lsq_spline", lsq_spline, inputs=(1,)),
     Method("UnivariateSpline", univariate_spline, inputs=(1,), most_rows=100_000),

@@ -145,7 +145,7 @@ def ours(
         "nrmse": nrmse,
         "n_parameters": model.n_parameters,
         "n_wavelets": model.n_wavelets,
-        "rung": model.fit.rung,
+        "model_class": model.fit.model_class,
         "seconds": seconds,
         "finite": bool(np.isfinite(nrmse) and nrmse < 1.5),
         **crossed,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ._core import __version__
     from .errors import InputError
-    from .identification import IdentifyOptions, frame_bounds
+    from .identification import IdentifyOptions, SearchOptions, frame_bounds
     from .identification.identify import identify
     from .identification.identify_files import identify_files
     from .identification.regressor import WaveletNetworkRegressor
@@ -34,6 +34,7 @@ _HOME = {
     "__version__": "_core",
     "InputError": "errors",
     "IdentifyOptions": "identification",
+    "SearchOptions": "identification",
     "frame_bounds": "identification",
     "identify": "identification",
     "identify_files": "identification.identify_files",
@@ -62,6 +63,7 @@ __all__ = [
     "Plan",
     "Recording",
     "Scheme",
+    "SearchOptions",
     "Verdict",
     "Verification",
     "WaveletNetworkRegressor",

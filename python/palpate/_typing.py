@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names for the array shapes that pass between the rooms."""
+"""Names of the array shapes that functions take and return."""
 
 from typing import TypeAlias
 

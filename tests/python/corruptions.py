@@ -444,7 +444,7 @@ def outcome_of(case: Case) -> Outcome:
     found.reported = model.fit.nrmse
     verdict = model.verdict
     found.level, found.reasons = verdict.level, verdict.reasons
-    found.size = f"{model.fit.rung}, {model.n_wavelets} wavelets"
+    found.size = f"{model.fit.model_class}, {model.n_wavelets} wavelets"
     try:
         found.true = true_nrmse(model, case.clean)
     except palpate.InputError as error:

@@ -4,7 +4,7 @@ Profiles of haptic devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_delay_s', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class DeviceProfile:
     """
     What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
@@ -13,16 +13,20 @@ class DeviceProfile:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: str = 'simulated-knob', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_unit: str = 'rad') -> None:
+    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
     def __repr__(self) -> str:
         ...
+    def to_dict(self) -> dict:
+        """
+        The fields that are written to a file, by name.
+        """
     @property
     def coulomb_friction(self) -> float:
         """
-        [N or N*m]
+        f_c, physical [N or N*m]; at most the true one.
         """
     @property
     def delay_fraction(self) -> float:
@@ -32,35 +36,37 @@ class DeviceProfile:
     @property
     def delay_s(self) -> float:
         """
-        Time from a sample to the force that is computed from it [s].
+        t_d, time from a sample to the force that is computed from it [s]; 0 to 16 periods.
         """
     @property
     def encoder_step(self) -> float:
         """
-        [m or rad]; 0 = not quantised
+        Delta [m or rad]; 0 = not quantised.
         """
     @property
     def force_limit(self) -> float:
         """
-        [N or N*m]
+        Largest force [N or N*m].
         """
     @property
     def force_step(self) -> float:
         """
-        [N or N*m]; 0 = not quantised
+        Delta_F, of the command [N or N*m]; 0 = not quantised.
         """
     @property
     def id(self) -> str:
-        ...
+        """
+        Its name; a certificate holds for the device of this name and these numbers.
+        """
     @property
     def inertia(self) -> float:
         """
-        [kg or kg*m^2]
+        Of handle and motor [kg or kg*m^2].
         """
     @property
     def jitter_s(self) -> float:
         """
-        How much longer than period_s the time between two samples can get [s].
+        How much longer than T the time between two samples can get [s].
         """
     @property
     def late_samples(self) -> int:
@@ -80,12 +86,12 @@ class DeviceProfile:
     @property
     def position_unit(self) -> str:
         """
-        rad, and forces are in N*m; or m, and they are in N.
+        "rad", with forces in N*m, or "m", with forces in N.
         """
     @property
     def viscous_damping(self) -> float:
         """
-        [N*s/m or N*m*s/rad]
+        b, physical [N*s/m or N*m*s/rad]; at most the true one.
         """
     @property
     def whole_delay_samples(self) -> int:
@@ -154,10 +160,6 @@ def decode_info(data: bytes) -> dict:
     
     firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, transducer,
     measures_velocity, uid.
-    """
-def longest_delay_s(period_s: typing.SupportsFloat | typing.SupportsIndex) -> float:
-    """
-    Longest delay of a profile [s]: 16 periods.
     """
 longest_watchdog_ms: int = 1000
 shortest_watchdog_ms: int = 2

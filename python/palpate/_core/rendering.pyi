@@ -5,7 +5,7 @@ Structures between a model and a device.
 from __future__ import annotations
 import palpate._core.model
 import typing
-__all__: list[str] = ['Scheme', 'compensated_share', 'explicit_slope_limit', 'most_prediction_taps', 'solver_name', 'structure_names']
+__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_object', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
 class Scheme:
     """
     How a model is rendered: the structure and its numbers, SI units.
@@ -84,6 +84,15 @@ class Scheme:
         """
         How the model is connected to the device.
         """
+def default_play_radius(model: palpate._core.model.ForceModel, encoder_step: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Play radius of a model that leaves it to the rendering, else 0.
+    """
+def explicit_object(limit: typing.SupportsFloat | typing.SupportsIndex, *, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex, coupling_damping: typing.SupportsFloat | typing.SupportsIndex, ratio: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, float]:
+    """
+    (mass, damping) of the object with this slope limit in the explicit structure, with a damping of
+    ratio * mass / period_s: the inverse of explicit_slope_limit.
+    """
 def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
     """
     Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
@@ -95,5 +104,6 @@ def solver_name(model: palpate._core.model.ForceModel, scheme: Scheme, period_s:
     None where a structure has no load line.
     """
 compensated_share: float = 0.9
+fewest_encoder_steps_in_play: float = 4.0
 most_prediction_taps: int = 16
 structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')

@@ -64,9 +64,9 @@ class TestRig:
         ...
     def __repr__(self) -> str:
         ...
-    def scheme(self, model: palpate._core.model.ForceModel, *, structure: str | None = None, compensated: bool | None = None, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, coupling_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, mass: typing.SupportsFloat | typing.SupportsIndex | None = None, damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, predict: typing.SupportsInt | typing.SupportsIndex | None = None) -> palpate._core.rendering.Scheme:
+    def scheme(self, model: palpate._core.model.ForceModel, **kwargs) -> palpate._core.rendering.Scheme:
         """
-        Returns the scheme with the given fields, in the model's units. None: the default at the model's scale.
+        Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the model's scale.
         """
     @property
     def device(self) -> palpate._core.device.DeviceProfile:

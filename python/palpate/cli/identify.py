@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import click
 import numpy as np
 
+from ..baselines import Compared, compare
 from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
 from ..identification.options import RESERVED_INPUTS
@@ -20,7 +22,6 @@ from ..recording import Recording
 from ..verdict import Verdict
 from ..verification import Verification, verify
 from ..verification.verification import circumstances
-from .beside_baselines import as_records, baselines_option, fit_baselines, print_beside
 from .exit_status import end_with, finishing
 from .figures import picture_verification, require_figure_name
 from .identify_options import identify_options
@@ -28,7 +29,9 @@ from .large_files import LargeFiles, large_file_options
 from .printing import (
     number,
     print_json,
+    print_line,
     print_numbers,
+    print_table,
     print_verdict,
     progress,
     require_distinct,
@@ -50,7 +53,12 @@ from .verb import PATH, ReadingOptions, json_option, plot_option, reading_option
     metavar="K",
     help="Keep every K-th row out of the identification and report the error on these rows.",
 )
-@baselines_option
+@click.option(
+    "--baselines",
+    "beside",
+    is_flag=True,
+    help="Fit the usual methods to the same rows and compare; needs --hold-out-every.",
+)
 @large_file_options
 @plot_option("measured and modelled force over position, residuals beneath")
 @json_option
@@ -86,7 +94,7 @@ def identify(
     else:
         columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
         recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
-    others = fit_baselines(recordings, hold_out_every) if beside else []
+    others = _fit_baselines(recordings, hold_out_every) if beside else []
     judged_on = recordings
     if hold_out_every is not None:
         parts = [recording.split(hold_out_every) for recording in recordings]
@@ -112,7 +120,7 @@ def identify(
         "model": str(output),
         "n_wavelets": model.n_wavelets,
         "n_parameters": model.n_parameters,
-        "rung": model.fit.rung,
+        "model_class": model.fit.model_class,
         "stop_reason": model.stop_reason,
         "nrmse": nrmse,
         "verdict": str(verdict),
@@ -121,7 +129,7 @@ def identify(
     if hold_out_every is not None:
         result["held_out_rows"] = sum(verification.n for _, verification in verified)
     if beside:
-        result["baselines"] = as_records(others)
+        result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
     compared = sum(verification.n for _, verification in verified)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
@@ -142,13 +150,13 @@ def identify(
                 "model": str(output),
                 "wavelets": str(model.n_wavelets),
                 "parameters": str(model.n_parameters),
-                "kind": f"{model.fit.rung}, stopped by {model.stop_reason}",
+                "kind": f"{model.fit.model_class}, stopped by {model.stop_reason}",
                 "nrmse": f"{number(nrmse)} on {judged}",
                 "seconds": f"{seconds:.2f}",
             }
         )
         if beside:
-            print_beside(nrmse, model.n_parameters, seconds, others)
+            _print_beside(nrmse, model.n_parameters, seconds, others)
         end_with(verdict)
 
 
@@ -157,3 +165,27 @@ def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
     residual = np.concatenate([verification.residual for _, verification in verified])
     force = np.concatenate([recording.force[verification.rows] for recording, verification in verified])
     return float(np.sqrt(np.mean(residual**2)) / np.std(force))
+
+
+def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -> list[Compared]:
+    """The baselines, fitted to what is not held out."""
+    if hold_out_every is None:
+        raise click.UsageError("--baselines compares on held-out rows and needs --hold-out-every K")
+    talk("fitting the baselines ...")
+    return compare(recordings, hold_out_every)
+
+
+def _print_beside(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
+    """The model first, then the baselines."""
+    rows = [("wavelet network", number(nrmse), str(n_parameters), f"{seconds:.2f}")]
+    rows += [
+        (each.name, "refused", "", "")
+        if each.refused
+        else (each.name, number(each.nrmse), str(each.n_parameters), f"{each.seconds:.2f}")
+        for each in others
+    ]
+    print_line()
+    print_table(("on the same held-out rows", "nrmse", "parameters", "seconds"), rows)
+    for each in others:
+        if each.refused:
+            print_line(f"{each.name} is refused: {each.refused}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate plan: the simplest structure that is certified for a model on a device."""
+"""palpate plan: chooses the simplest certified structure for a model on a device."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
-from .._core.stability import Certificate, felt_slope, force_bounds
+from .._core.stability import Certificate
 from ..model import load_model
 from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, profile_file
-from ..planning.choices import explicit_scheme, usual_play_radius
-from ..planning.root_locus import root_locus
 from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
 from .figures import figure_file, require_figure_name, source_name
@@ -85,8 +82,8 @@ def _list_examples(*, as_json: bool) -> None:
 @click.option("--coupling", is_flag=True, help="Render through a virtual coupling.")
 @click.option("--coupling-stiffness", type=float, default=None, help="K_c; chosen from the device.")
 @click.option("--coupling-damping", type=float, default=None, help="B_c; chosen from the device.")
-@click.option("--mass", type=float, default=None, help="m; the model's own. 0 leaves it out.")
-@click.option("--damping", type=float, default=None, help="Of the object; the model's own. 0 leaves it out.")
+@click.option("--mass", type=float, default=None, help="Object mass; the model's own. 0 leaves it out.")
+@click.option("--damping", type=float, default=None, help="Object damping; the model's own. 0 leaves it out.")
 @click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
 @click.option(
     "--predict",
@@ -114,13 +111,13 @@ def _list_examples(*, as_json: bool) -> None:
 def plan(
     model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
 ) -> None:
-    """Choose how a model is rendered on a device, and prove what can be proved of it.
+    """Choose the structure that renders a model on a device, and certify it.
 
-    The simplest structure that is certified is taken: direct; direct with its slope limited to what the
-    device can render; massless behind a coupling; implicit; explicit, which is stable at best. Every refusal
-    says which inequality failed and by how much. The identified network stays in the file; what is rendered
-    in its place stands under plan. Exit code 1: no structure holds, or the felt force differs by more than is
-    accepted. Nothing is written then.
+    The simplest certified structure is taken: direct; direct with its slope limited to the device's limit;
+    massless behind a coupling; implicit; energy-consistent; explicit, which is stable at best. Every refusal
+    names the inequality that failed and by how much. The identified network stays in the file; a limited
+    network stands under plan. Exit code 1: no structure holds, or the force error is larger than accepted.
+    Nothing is written then.
     """
 
     profile_path = profile_file(device)
@@ -148,34 +145,16 @@ def plan(
         if as_json:
             print_json(_result(chosen, certificate, written, seconds))
         else:
-            _tell(chosen, certificate, written, seconds)
+            _print(chosen, certificate, written, seconds)
     end_with(verdict)
 
 
 _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
-_CERTIFICATE = {
-    "certified": "certified",
-    "stable-locally": "stable (local), passivity not certified",
-    "refused": "refused",
-}
-
-
-def structure_words(plan: Plan) -> str:
-    """The structure, and the changes to the identified network that it renders."""
-    words = [plan.structure]
-    if plan.scheme.compensated:
-        words.append("compensated")
-    if plan.scheme.predict:
-        words.append(f"predict {plan.scheme.predict}")
-    if plan.limited is not None:
-        words.append("with a limited network")
-    return ", ".join(words)
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
-
     error = plan.force_error
-    felt, steepest = _felt_slopes(plan, certificate)
+    felt, steepest = plan.felt_slopes
     return {
         "structure": plan.structure,
         "verdict": str(plan.verdict),
@@ -194,41 +173,13 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
     }
 
 
-def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
-    """The verdict first, then the plan, then what was refused on the way to it, then every inequality."""
+def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
+    """Print the verdict, the plan, the refused structures, and every inequality."""
     print_verdict(plan.verdict)
-    scheme = plan.scheme
-    unit = plan.model.units["force"] or "in the model's unit"
-    rows = {"structure": structure_words(plan)}
-    if plan.solver is not None:
-        rows["solver"] = plan.solver
-    if scheme.has_coupling:
-        rows["coupling"] = (
-            f"K_c = {number(scheme.coupling_stiffness)}, B_c = {number(scheme.coupling_damping)}"
-        )
-    if scheme.has_mass:
-        rows["object"] = f"mass {number(scheme.mass)}, damping {number(scheme.damping)}"
-    if scheme.predict:
-        rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
-    if scheme.play_radius:
-        rows["play radius"] = number(scheme.play_radius)
-    felt, steepest = _felt_slopes(plan, certificate)
-    if felt < steepest:
-        rows["softer"] = f"slopes up to {number(steepest)} are felt as up to {number(felt)}"
-    error = plan.force_error
-    rows["force error"] = (
-        f"up to {number(error.largest)} {unit}, {100.0 * error.share:.3g} % of the range; "
-        f"RMS {100.0 * error.rms_share:.3g} % of the spread"
-        if error.largest
-        else "none"
-    )
-    rows["certificate"] = _CERTIFICATE[certificate.verdict]
-    rows["holds for"] = f"up to {number(1e3 * certificate.longest_period_s)} ms between two samples"
-    rows["planned in"] = f"{seconds:.1f} s"
-    rows["written"] = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
+    file = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
     if plan.verdict.level == "no":
-        rows["written"] = "nothing, because the verdict is no"
-    print_numbers(rows)
+        file = "nothing, because the verdict is no"
+    print_numbers({**plan.rows(), "planned in": f"{seconds:.1f} s", "written": file})
     if plan.refused:
         click.echo("\nrefused")
         for sentence in plan.refused:
@@ -238,47 +189,15 @@ def _tell(plan: Plan, certificate: Certificate, written: Path | None, seconds: f
         word = "holds" if line.holds else "fails"
         print_paragraph(f"{line.name}: {word}, {line.rests_on}", indent="  ")
         print_paragraph(line.formula, indent="    ")
-        print_paragraph(
-            f"{number(line.left)} against {number(line.right)}, margin {number(line.margin)}", indent="    "
-        )
+        sides = f"{number(line.left)} against {number(line.right)}, margin {number(line.margin)}"
+        print_paragraph(sides, indent="    ")
     print_paragraph(certificate.why)
 
 
-def _felt_slopes(plan: Plan, certificate: Certificate) -> tuple[float, float]:
-    """The steepest slope that is felt, and that of the model: a coupling in between is soft.
-
-    Where it was taken out of the model, the certificate's bounds are of what is left.
-    """
-
-    steepest = max(0.0, certificate.bounds.slope_max)
-    if plan.structure == "direct":
-        return steepest, steepest
-    felt = felt_slope(steepest, plan.scheme.coupling_stiffness)
-    return felt, felt if plan.scheme.compensated else steepest
-
-
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
-    """The locus of the plan's explicit structure, or of the one that the device would need."""
-
+    """Draw the root locus of the explicit structure."""
     from ..plotting import draw_root_locus
 
-    radius = usual_play_radius(plan.model, profile)
-    bounds = force_bounds(plan.rendered, radius)
-    scheme = plan.scheme
-    if plan.structure != "explicit":
-        scheme = explicit_scheme(
-            bounds,
-            profile,
-            mass=plan.model.mass,
-            damping=None,
-            coupling_stiffness=None,
-            coupling_damping=None,
-            play_radius=radius,
-        )
-    slopes = np.unique([max(bounds.slope_min, -0.9 * scheme.coupling_stiffness), bounds.slope_max])
-    units = plan.model.units
-    unit = f"{units['force']}/{units['position']}".replace("*", "\u00b7") if units["force"] else ""
     title = f"model of {source_name(plan.model.data.files)}, explicit, on {profile.id}"
     with figure_file(path, height_inches=3.8, title=title) as (axes,):
-        locus = root_locus(scheme, slopes, profile.period_s)
-        draw_root_locus(axes, locus, damping=scheme.damping, slope_unit=unit)
+        draw_root_locus(axes, plan, profile)

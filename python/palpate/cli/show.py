@@ -14,7 +14,6 @@ from ..verdict import GOOD, Verdict, usable
 from ..verification import Stroke, compare
 from .exit_status import end_with, finishing
 from .figures import figure_file, picture_path, require_figure_name
-from .plan import structure_words
 from .printing import (
     number,
     print_json,
@@ -90,10 +89,9 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
     """Structure, device and verdict of the plan in a model file."""
     if model.plan is None:
         return None
-
     plan = Plan.of(model)
     return {
-        "structure": structure_words(plan),
+        "structure": plan.description,
         "device": None if plan.certificate is None else plan.certificate.device.id,
         "verdict": str(plan.verdict),
     }

@@ -14,26 +14,26 @@ from scipy.optimize import least_squares
 from .._typing import Float1D, Float2D
 
 _LARGE = 0.9
-"""Pushes above this share of the largest one show the sign of the force: they move the handle alike [-]"""
+"""Least push whose displacement is averaged for the sign of the force [share of the largest push]"""
 _FEWEST_PUSHES = 3
 
 _SEEN = 10.0
-"""A size of push counts where it moved the handle by so many encoder steps [-]"""
+"""Least displacement of a push that is fitted [encoder steps]"""
 
 _SIZES_APART = 1.25
 """Ratio of the largest to the smallest push that separates friction from damping [-]"""
 
 _MOST_LEFT = 0.03
-"""Largest RMS residual, over the RMS motion, of mechanics that are believed [-]"""
+"""Largest RMS residual of accepted mechanics [share of the RMS motion]"""
 
 _ROUNDING = 1.0
-"""Residual that is always believed [encoder steps]"""
+"""RMS residual that is always accepted [encoder steps]"""
 
 _RESERVE = 0.05
-"""Share of the friction that is not counted on, because a real handle is not quite this simple [-]"""
+"""Reserve of the friction, because a real handle differs from the fitted one [share]"""
 
 _SURE = 3.0
-"""Standard errors by which the friction may be less [-]"""
+"""Reserve of the friction [standard errors]"""
 
 _WIDEST = 40.0
 """Range of the logarithms of J and b [-]"""
@@ -44,7 +44,7 @@ _STARTS = (0.05, 0.4)
 
 @dataclass(frozen=True)
 class Mechanics:
-    """What resists the motion of a handle."""
+    """Inertia, damping and friction of a handle."""
 
     inertia: float
     """J [kg or kg*m^2]"""
@@ -57,7 +57,7 @@ class Mechanics:
 
     @property
     def friction_at_least(self) -> float:
-        """The friction that a certificate may count on: less by what the fit can be off by."""
+        """Lower bound of the friction for a certificate: less by the uncertainty of the fit."""
         if self.friction_unsure == 0.0:
             return self.friction
         return max(0.0, (1.0 - _RESERVE) * self.friction - _SURE * self.friction_unsure)
@@ -65,28 +65,28 @@ class Mechanics:
 
 @dataclass(frozen=True)
 class Push:
-    """How a handle answered."""
+    """Response of a handle to pushes."""
 
     moved: float
-    """Mean way of a push in the direction that a right sign gives [m or rad]."""
+    """Mean displacement by a push, > 0 in the direction of a right sign [m or rad]"""
     unsure: float
-    """Standard error of that mean [m or rad]; infinite where it rests on less than three pushes."""
+    """Standard error of that mean [m or rad]; infinite for fewer than three pushes"""
     obeyed: bool
-    """Whether the force that the device says it made has the sign of the one that it was told to make."""
+    """True if the force that the device reports has the sign of the commanded force"""
     delay_samples: int | None
-    """Whole samples from command to force."""
+    """Whole samples from command to force"""
     mechanics: Mechanics | None
-    """Inertia, damping and friction; None where the motion does not tell."""
+    """Inertia, damping and friction; None if they cannot be fitted"""
     unseen: str = ""
-    """Why the motion does not tell the mechanics."""
+    """The reason why they cannot be fitted"""
 
 
 def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction: float | None = None) -> Push:
-    """Read sign, delay and mechanics from the ticks of alternating pushes.
+    """Reads sign, delay and mechanics from the ticks of alternating pushes.
 
-    A force F > 0 pushes towards smaller positions. How far a push moved the handle is counted from where the
-    handle would have gone on to by itself, since a hand may be on it. Everything but the delay is in the
-    device's own time: how late the host was does not matter.
+    A force F > 0 pushes towards smaller positions. A displacement is counted from the motion that the handle
+    would have made without the push, because a hand may hold it. Everything but the delay is in the device's
+    own time, so a late host does not matter.
 
     Parameters
     ----------
@@ -104,20 +104,18 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     ways: list[float] = []
     sizes: list[float] = []
     obedience = 0.0
-    # A reading tells the force that acted until it was taken: a push begins one reading before it is seen.
+    # A reading reports the force that acted until it was taken: a push begins one reading earlier.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
-    for begin in begins[begins > 2]:  # before the first push nobody knows where the handle goes
+    for begin in begins[begins > 2]:  # the motion before the first push is unknown
         held = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
-        told = float(np.sign(sent[max(0, begin + 1 - held) : begin + 1 + held].sum()))
-        obedience += told * float(np.sign(applied[begin + 1]))
-        ways.append(-told * _distance(time, position, begin, held))
+        commanded = float(np.sign(sent[max(0, begin + 1 - held) : begin + 1 + held].sum()))
+        obedience += commanded * float(np.sign(applied[begin + 1]))
+        ways.append(-commanded * _distance(time, position, begin, held))
         sizes.append(float(np.abs(applied[begin + 1 : begin + 1 + held]).max()))
     large = [way for way, size in zip(ways, sizes, strict=True) if size >= _LARGE * max(sizes)]
     ways = large if len(large) >= _FEWEST_PUSHES else ways
-    mechanics, unseen = mechanics_of(
-        {"applied": applied, "position": position, "device_time": time}, encoder_step, friction
-    )
+    mechanics, unseen = _mechanics(applied, position, time, encoder_step, friction)
     enough = len(ways) >= _FEWEST_PUSHES
     return Push(
         moved=float(np.mean(ways)) if ways else 0.0,
@@ -130,7 +128,7 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
 
 
 def _distance(time: Float1D, position: Float1D, begin: int, held: int) -> float:
-    """How far a push moved the handle from where it was going: on a parabola, since hands are slow."""
+    """Displacement of a push from the motion before it, a parabola because hands are slow."""
     before, end = slice(max(0, begin - 2 * held), begin + 1), min(begin + held, len(position) - 1)
     hand = np.polynomial.Polynomial.fit(time[before], position[before], 2)
     return float(position[end] - hand(time[end]))
@@ -144,28 +142,28 @@ def _delay(ticks: Mapping[str, Any]) -> int | None:
     return int(np.median(delays)) if delays else None
 
 
-def mechanics_of(
-    ticks: Mapping[str, Any], encoder_step: float, friction: float | None = None
+def _mechanics(
+    applied: Float1D, position: Float1D, time: Float1D, encoder_step: float, friction: float | None
 ) -> tuple[Mechanics | None, str]:
-    """Fit J dv/dt = -F - b v - f_c sgn(v) to the ways of pushes that begin at rest.
+    """Fits J dv/dt = -F - b v - f_c sgn(v) to the displacements of pushes that begin at rest.
 
     Parameters
     ----------
-    ticks : mapping
-        ``applied``, ``position``, ``device_time``: (n,) each, without repeated samples.
+    applied, position, time : (n,) array
+        Samples of the device without repeated ones.
     encoder_step : float
         [m or rad]
     friction : float, optional
-        f_c, where it is known: pushes of one size are then enough [N or N*m].
+        f_c, if it is known; pushes of one size are then enough [N or N*m].
 
     Returns
     -------
     mechanics : Mechanics or None
-        None where the pushes do not tell.
+        None if they cannot be fitted.
     reason : str
-        Why they do not; empty where they do.
+        The reason; empty if they are fitted.
     """
-    applied, moved, seconds = _windows(ticks)
+    applied, moved, seconds = _windows(applied, position, time)
     if len(applied) == 0:
         return None, "there was no whole push"
     size = np.abs(applied).max(axis=1)
@@ -205,12 +203,8 @@ def mechanics_of(
     return Mechanics(inertia, damping, largest * float(fit.x[2]), unsure), ""
 
 
-def _windows(ticks: Mapping[str, Any]) -> tuple[Float2D, Float2D, Float2D]:
-    """Force (p, n), way (p, n + 1) and duration (p, n) of the samples of each push and as long after it.
-
-    A reading shows the force that acted until it was taken, so a push begins one reading before it is seen.
-    """
-    applied, position, time = (np.asarray(ticks[name]) for name in ("applied", "position", "device_time"))
+def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2D, Float2D, Float2D]:
+    """Force (p, n), displacement (p, n + 1) and duration (p, n) of each push and an equal time after it."""
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     ends = np.flatnonzero(~pushing[1:] & pushing[:-1])
@@ -222,7 +216,7 @@ def _windows(ticks: Mapping[str, Any]) -> tuple[Float2D, Float2D, Float2D]:
 
 
 def _start(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, float]:
-    """Logarithms of J and b, from the impulse of a push, its way and its duration."""
+    """Logarithms of J and b, from the impulse, displacement and duration of a push."""
     impulse = float(np.median(np.abs((applied * seconds).sum(axis=1))))
     way = float(np.median(np.abs(moved).max(axis=1)))
     duration = float(np.median(seconds.sum(axis=1)))
@@ -230,7 +224,7 @@ def _start(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, f
 
 
 def _way(applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float) -> Float2D:
-    """Way (p, n + 1) of a handle at rest under forces (p, n) held for durations, in closed form for each."""
+    """Displacement (p, n + 1) of a handle at rest under forces (p, n) held for durations, in closed form."""
     way = np.zeros((len(applied), applied.shape[1] + 1))
     velocity = np.zeros(len(applied))
     decay = inertia / damping

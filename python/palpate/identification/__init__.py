@@ -5,6 +5,6 @@ from .environment import fit_environment
 from .identify import identify
 from .network.basis import frame_bounds
 from .network.fitted import FittedNetwork
-from .options import IdentifyOptions
+from .options import IdentifyOptions, SearchOptions
 
-__all__ = ["FittedNetwork", "IdentifyOptions", "fit_environment", "frame_bounds", "identify"]
+__all__ = ["FittedNetwork", "IdentifyOptions", "SearchOptions", "fit_environment", "frame_bounds", "identify"]

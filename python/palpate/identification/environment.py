@@ -367,7 +367,7 @@ def _identified(
 ) -> FittedNetwork:
     """The accepted model in the units of the data, with its error on the rows."""
     data, best, options, report = selected.rows, selected.best, selected.options, selected.report
-    near_zero = max(best.rmse, options.contact_share * float(np.ptp(data.force[data.reported])))
+    near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(data.force[data.reported])))
     notes, findings = report.notes, report.findings
     if (period := options.period) is not None:
         note, of_period = period_notes(data.lower[0] + data.reach[0] * data.path, period)

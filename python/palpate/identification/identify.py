@@ -22,7 +22,7 @@ from .data.outliers import without_isolated
 from .data.rows import observations, require_in_range
 from .environment import fit_environment
 from .network.fitted import FittedNetwork
-from .options import RESERVED_INPUTS, IdentifyOptions, described_fields, kind_of, options_from
+from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
 
 
 def identify(
@@ -103,7 +103,7 @@ def _show_options() -> None:
     signature = inspect.signature(identify)
     keyword, given = inspect.Parameter.KEYWORD_ONLY, list(signature.parameters.values())[:-1]
     options = [
-        inspect.Parameter(each.name, keyword, default=each.default, annotation=kind_of(each))
+        inspect.Parameter(each.name, keyword, default=default_of(each), annotation=kind_of(each))
         for each in fields(IdentifyOptions)
     ]
     identify.__signature__ = signature.replace(parameters=given + options)  # type: ignore[attr-defined]
@@ -122,7 +122,12 @@ def model_of(
 ) -> Model:
     """The model of an identified network, with the verdict on it."""
     path: list[PathStep] = [
-        {"n_wavelets": at.n_wavelets, "rmse": at.rmse, "criterion": at.criterion, "rung": at.model_class}
+        {
+            "n_wavelets": at.n_wavelets,
+            "rmse": at.rmse,
+            "criterion": at.criterion,
+            "model_class": at.model_class,
+        }
         for at in network.path
     ]
     return Model(
@@ -134,10 +139,12 @@ def model_of(
         above="linear",
         period=options.period,
         play_radius=network.play_radius,
-        mass=network.mass if options.filters == "matched" else options.assumed_mass,
-        damping=options.assumed_damping if options.filters == "paper-explicit" else network.damping,
+        mass=network.mass if options.search.filters == "matched" else options.search.assumed_mass,
+        damping=options.search.assumed_damping
+        if options.search.filters == "paper-explicit"
+        else network.damping,
         fit=Fit(
-            rung=network.model_class,
+            model_class=network.model_class,
             stop_reason=network.stop_reason,
             nrmse=network.nrmse,
             n_wavelets=len(network.weight),

@@ -6,12 +6,13 @@ import inspect
 import math
 import textwrap
 from collections.abc import Mapping
-from dataclasses import Field, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from .._core.rendering import compensated_share
 from ..arguments import shown
 from ..errors import InputError
 
@@ -27,13 +28,10 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 """Settings that are words, and what each may be."""
 
-COUPLING_SHARE = 0.9
-"""Behind a coupling K_c a force can be compensated only while its slope stays below K_c: the margin."""
-
 
 @dataclass(frozen=True)
-class IdentifyOptions:
-    """Settings of :func:`palpate.identify`; each field is a keyword of it.
+class SearchOptions:
+    """Settings of the search for a network, which few identifications need to change.
 
     Raises
     ------
@@ -41,17 +39,10 @@ class IdentifyOptions:
         Naming the field, its value and what would be right.
     """
 
-    inputs: str | tuple[str, ...] = "auto"
-    """"auto": the ladder decides, over the position and the recording's further inputs. Or names, as a tuple
-    or with commas between: position, then hysteresis, velocity (from time) or columns."""
-    max_wavelets: int = 64
-    """Largest network that is tried [-]"""
-    criterion: str = "bic"
-    """Stopping rule: bic, aicc, gcv, fpe, or on rows kept back: fresh, perceptual"""
     selection: str = "orthogonal"
     """How wavelets are taken from the frame: orthogonal, residual or backward"""
-    rung_evidence: float = 10.0
-    """Fall of the criterion that a more complex rung must show; 10 is called very strong evidence [-]"""
+    evidence: float = 10.0
+    """Fall of the criterion that a more complex model class must show; 10 is very strong evidence [-]"""
     patience: int = 3
     """Wavelets without improvement, for each input, after which growth stops [-]"""
     refine: bool = True
@@ -73,14 +64,57 @@ class IdentifyOptions:
     max_positions: int = 1024
     """Distinct positions that are kept apart, twice as many for each further input; more are gathered in as
     many cells [-]"""
-    loss: str = "squares"
-    """squares, or huber: rows far from the others pull no more than the others do"""
     filters: str = "matched"
     """matched, or as published: paper-implicit (figure 11), paper-explicit (figure 13)"""
     assumed_mass: float = 1e-3
     """m of the paper's figures [force/position s^2]"""
     assumed_damping: float = 0.5
     """B_o of its figure 13 [force/position s]"""
+    play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
+    """Play radii tried for hysteresis where a recording has time but no direction; the best one between the
+    least and the largest is found [share of the travel]"""
+    contact_share: float = 0.02
+    """Where |f(lower)| is below this share of the force's range the object is left there: "free" below [-]"""
+
+    def __post_init__(self) -> None:
+        _require(self)
+        radii: object = self.play_radius
+        if not isinstance(radii, (tuple, list)) or not radii:
+            raise InputError(f"play_radius is {shown(radii)}; it must be a tuple of shares of the travel")
+        for radius in radii:
+            _require_number("play_radius", radius, 0.0)
+
+    @classmethod
+    def parsed(cls, given: Mapping[str, str]) -> "SearchOptions":
+        """The settings from texts, as a command line gives them.
+
+        Raises
+        ------
+        InputError
+            A name is unknown, or a text is not a value of its type.
+        """
+        return cls(**{name: _parsed(name, text) for name, text in given.items()})
+
+
+@dataclass(frozen=True)
+class IdentifyOptions:
+    """Settings of :func:`palpate.identify`; each field is a keyword of it.
+
+    Raises
+    ------
+    palpate.InputError
+        Naming the field, its value and what would be right.
+    """
+
+    inputs: str | tuple[str, ...] = "auto"
+    """"auto": the model selection decides, over the position and the recording's further inputs. Or names, as
+    a tuple or with commas between: position, then hysteresis, velocity (from time) or columns."""
+    max_wavelets: int = 64
+    """Largest network that is tried [-]"""
+    criterion: str = "bic"
+    """Stopping rule: bic, aicc, gcv, fpe, or on held-out rows: fresh, perceptual"""
+    loss: str = "squares"
+    """squares, or huber: rows far from the others pull no more than the others do"""
     hysteresis_nonnegative: bool = True
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
@@ -90,14 +124,11 @@ class IdentifyOptions:
     fixed_force: tuple[float, float] | None = None
     """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
     coupling_stiffness: float | None = None
-    """K_c: df/dx <= 0.9 K_c is imposed over the domain [force/position]"""
-    play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
-    """Play radii tried for hysteresis where a file does not tell directions; where it is there, the best
-    one between the least and the largest is found [share of the travel]"""
-    contact_share: float = 0.02
-    """Where |f(lower)| is below this share of the force's range the object is left there: "free" below [-]"""
+    """K_c: df/dx <= 0.9 K_c (`compensated_share`) is imposed over the domain [force/position]"""
     period: float | None = None
     """Period of an environment that repeats, such as a knob [position]"""
+    search: SearchOptions = field(default_factory=SearchOptions)
+    """Further settings of the search, which few identifications need to change"""
 
     def __post_init__(self) -> None:
         if not isinstance(self.inputs, str):
@@ -110,23 +141,12 @@ class IdentifyOptions:
                     f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
                     "depends on: hysteresis, velocity, columns"
                 )
-        for name, words in CHOICES.items():
-            if not isinstance(value := getattr(self, name), str) or value not in words:
-                raise InputError(f"{name} is {shown(value)}; it must be one of {', '.join(words)}")
-        for name in _SWITCHES:
-            if not isinstance(value := getattr(self, name), (bool, np.bool_)):
-                raise InputError(f"{name} is {shown(value)}; it must be True or False")
-        for name, least in _WHOLE_NUMBERS.items():
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or value < least:
-                raise InputError(f"{name} is {shown(value)}; it must be a whole number of {least} or more")
-        for name, above in _NUMBERS.items():
-            _require_number(name, getattr(self, name), above)
-        radii: object = self.play_radius
-        if not isinstance(radii, (tuple, list)) or not radii:
-            raise InputError(f"play_radius is {shown(radii)}; it must be a tuple of shares of the travel")
-        for radius in radii:
-            _require_number("play_radius", radius, 0.0)
+        _require(self)
+        given: object = self.search
+        if given is None:
+            object.__setattr__(self, "search", SearchOptions())
+        elif not isinstance(given, SearchOptions):
+            raise InputError(f"search is {shown(given)}; it must be a SearchOptions")
         self._require_possible_slopes()
 
     @property
@@ -136,7 +156,7 @@ class IdentifyOptions:
         if self.monotone:
             low = max(low, 0.0)
         if self.coupling_stiffness is not None:
-            high = min(high, COUPLING_SHARE * self.coupling_stiffness)
+            high = min(high, compensated_share * self.coupling_stiffness)
         return None if math.isinf(low) and math.isinf(high) else (low, high)
 
     def _require_possible_slopes(self) -> None:
@@ -156,10 +176,7 @@ class IdentifyOptions:
             raise InputError(f"fixed_force is {shown(self.fixed_force)}; it must be (position, force)")
 
 
-_SWITCHES = ("refine", "hysteresis_nonnegative", "monotone")
-"""Settings that are on or off."""
-
-_WHOLE_NUMBERS = {
+_LEAST = {
     "max_wavelets": 0,
     "patience": 1,
     "refine_steps": 1,
@@ -170,8 +187,8 @@ _WHOLE_NUMBERS = {
 }
 """Whole-number settings and the least that makes sense."""
 
-_NUMBERS = {
-    "rung_evidence": -math.inf,
+_ABOVE = {
+    "evidence": -math.inf,
     "frame_scale": 1.0,
     "frame_step": 0.0,
     "contact_share": -math.inf,
@@ -183,41 +200,92 @@ _NUMBERS = {
 """Real settings and what they must lie above."""
 
 
-def kind_of(field: Field[Any]) -> str:
-    """The type of a field as text."""
-    return field.type if isinstance(field.type, str) else inspect.formatannotation(field.type)
+def _require(options: IdentifyOptions | SearchOptions) -> None:
+    """Checks words, switches and numbers.
+
+    Raises
+    ------
+    InputError
+        Naming the field, its value and what would be right.
+    """
+    for each in fields(options):
+        name, value = each.name, getattr(options, each.name)
+        if name in CHOICES:
+            if not isinstance(value, str) or value not in CHOICES[name]:
+                raise InputError(f"{name} is {shown(value)}; it must be one of {', '.join(CHOICES[name])}")
+        elif isinstance(each.default, bool):
+            if not isinstance(value, (bool, np.bool_)):
+                raise InputError(f"{name} is {shown(value)}; it must be True or False")
+        elif name in _LEAST:
+            if not isinstance(value, int) or isinstance(value, bool) or value < _LEAST[name]:
+                raise InputError(
+                    f"{name} is {shown(value)}; it must be a whole number of {_LEAST[name]} or more"
+                )
+        elif name in _ABOVE:
+            _require_number(name, value, _ABOVE[name])
 
 
-def described_fields() -> str:
-    """The fields of :class:`IdentifyOptions` as a list of parameters, from the texts beneath them."""
+def _parsed(name: str, text: str) -> Any:
+    """The value of a search setting from its text.
+
+    Raises
+    ------
+    InputError
+        There is no such setting, or the text is not of its type.
+    """
+    known = {each.name: each.default for each in fields(SearchOptions)}
+    if name not in known:
+        raise InputError(f"search has no setting {name!r}; it has {', '.join(known)}")
+    default = known[name]
+    if isinstance(default, str):
+        return text
+    if isinstance(default, bool):
+        return {"true": True, "false": False}.get(text.lower(), text)
     try:
-        tree = ast.parse(inspect.getsource(IdentifyOptions)).body[0]
+        if isinstance(default, tuple):
+            return tuple(float(part) for part in text.split(","))
+        return int(text) if isinstance(default, int) else float(text)
+    except ValueError:
+        kinds = {tuple: "numbers joined by commas", int: "a whole number", float: "a number"}
+        raise InputError(f"{name} is {text!r}; it must be {kinds[type(default)]}") from None
+
+
+def kind_of(each: Field[Any]) -> str:
+    """The type of a field as text."""
+    return each.type if isinstance(each.type, str) else inspect.formatannotation(each.type)
+
+
+def default_of(each: Field[Any]) -> Any:
+    """The default of a field of the options."""
+    return each.default if each.default_factory is MISSING else each.default_factory()
+
+
+def described_fields(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> str:
+    """The fields of options as a list of parameters, from the texts beneath them."""
+    try:
+        tree = ast.parse(inspect.getsource(kind)).body[0]
     except (OSError, SyntaxError):  # an installation without its source
         tree = ast.Pass()
     texts: dict[str, str] = {}
-    for field, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else []):
-        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
-            texts[ast.unparse(field.target)] = inspect.cleandoc(ast.literal_eval(text.value))
+    for each, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else []):
+        if isinstance(each, ast.AnnAssign) and isinstance(text, ast.Expr):
+            texts[ast.unparse(each.target)] = inspect.cleandoc(ast.literal_eval(text.value))
     return "".join(
-        f"{each.name} : {kind_of(each)}, default {each.default!r}\n"
+        f"{each.name} : {kind_of(each)}, default {default_of(each)!r}\n"
         + textwrap.indent(texts.get(each.name, "") + "\n", "    ")
-        for each in fields(IdentifyOptions)
+        for each in fields(kind)
     )
 
 
-IdentifyOptions.__doc__ = f"""{inspect.cleandoc(IdentifyOptions.__doc__ or "")}
-
-Parameters
-----------
-{described_fields()}"""
-
-
 def options_from(keywords: Mapping[str, Any]) -> IdentifyOptions:
-    """Options from keywords; a keyword that does not exist is told in one sentence."""
+    """Options from keywords; an unknown keyword is refused."""
     known = [field.name for field in fields(IdentifyOptions)]
     for name in keywords:
         if name not in known:
-            raise InputError(f"identify has no option {name!r}; it has {', '.join(known)}")
+            cure = f"it has {', '.join(known)}"
+            if name in {field.name for field in fields(SearchOptions)}:
+                cure = f"give search=SearchOptions({name}=...)"
+            raise InputError(f"identify has no option {name!r}; {cure}")
     return IdentifyOptions(**keywords)
 
 
@@ -243,3 +311,11 @@ def _is_pair(values: object) -> bool:
         and len(values) == 2
         and all(isinstance(value, is_number) and not math.isnan(value) for value in values)
     )
+
+
+for _options in (IdentifyOptions, SearchOptions):
+    _options.__doc__ = f"""{inspect.cleandoc(_options.__doc__ or "")}
+
+Parameters
+----------
+{described_fields(_options)}"""

@@ -37,25 +37,12 @@ except ImportError as missing:
         "WaveletNetworkRegressor needs scikit-learn 1.6 or later: pip install palpate[sklearn] brings it"
     ) from missing
 
-OF_RECORDINGS = {
-    "inputs",
-    "hysteresis_nonnegative",
-    "slope_bounds",
-    "monotone",
-    "fixed_force",
-    "filters",
-    "assumed_mass",
-    "assumed_damping",
-    "coupling_stiffness",
-    "play_radius",
-    "contact_share",
-    "period",
+SETTINGS = {
+    each.name: None if each.name == "search" else each.default
+    for each in fields(IdentifyOptions)
+    if each.name in ("max_wavelets", "criterion", "loss", "search")
 }
-"""Settings that only a recording gives a meaning to: strokes, contact, motion, a position with its slope."""
-
-SETTINGS = {each.name: each.default for each in fields(IdentifyOptions) if each.name not in OF_RECORDINGS}
-"""Those of :class:`IdentifyOptions` that the regressor takes, with their defaults."""
-
+"""Those of :class:`IdentifyOptions` that need no recording, with defaults; search None: its own."""
 
 NARROWEST = 1e-12
 """A column whose range is below this share of its largest value is constant but for rounding."""
@@ -77,8 +64,8 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     Parameters
     ----------
     **settings
-        Fields of :class:`palpate.IdentifyOptions` that do not need a recording, with the same defaults:
-        max_wavelets, criterion, patience, refine and others, which ``get_params()`` lists.
+        max_wavelets, criterion, loss and search of :class:`palpate.IdentifyOptions`, with the same defaults.
+        The settings of search that describe motion and contact have no effect.
 
     Attributes
     ----------
@@ -91,7 +78,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     stop_reason_ : str
         The criterion that stopped growth, "max_wavelets", or "data" where it allows no further parameter.
     path_ : list of dict
-        Every network that was considered: n_wavelets, rmse, criterion, rung.
+        Every network that was considered: n_wavelets, rmse, criterion, model_class.
     n_features_in_, feature_names_in_
         As in every scikit-learn estimator.
 
@@ -329,7 +316,7 @@ def _model_of(
             "n_wavelets": at.n_wavelets,
             "rmse": at.rmse,
             "criterion": at.criterion if math.isfinite(at.criterion) else None,
-            "rung": at.model_class,
+            "model_class": at.model_class,
         }
         for at in found.path
     ]
@@ -339,7 +326,7 @@ def _model_of(
         units={"position": "", "force": ""},
         **found.parameters(),
         fit=Fit(
-            rung=found.model_class,
+            model_class=found.model_class,
             stop_reason=found.stop_reason,
             nrmse=found.rmse / spread if spread > 0 else 0.0,
             n_wavelets=len(found.alpha),

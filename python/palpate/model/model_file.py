@@ -26,14 +26,14 @@ class PathStep(TypedDict):
     rmse: float
     criterion: float | None
     """Value of the stopping rule, the smaller the better; None where the rule gives none"""
-    rung: str
+    model_class: str
 
 
 @dataclass(frozen=True)
 class Fit:
     """How an identification ended."""
 
-    rung: str
+    model_class: str
     """The simplest model class that was accepted: constant, linear, position, hysteresis, ..."""
     stop_reason: str
     nrmse: float
@@ -46,7 +46,7 @@ class Fit:
     def record(self) -> dict[str, Any]:
         """The fit in a model file, with numbers of NumPy as those of Python."""
         return {
-            "rung": self.rung,
+            "model_class": self.model_class,
             "stop_reason": self.stop_reason,
             "nrmse": float(self.nrmse),
             "n_wavelets": int(self.n_wavelets),
@@ -56,7 +56,7 @@ class Fit:
                     "n_wavelets": int(step["n_wavelets"]),
                     "rmse": float(step["rmse"]),
                     "criterion": None if step["criterion"] is None else float(step["criterion"]),
-                    "rung": step["rung"],
+                    "model_class": step["model_class"],
                 }
                 for step in self.path
             ],

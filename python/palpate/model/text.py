@@ -18,7 +18,7 @@ def describe(model: Model) -> str:
         f"verdict: {model.verdict.level}",
         *(f"  {reason}" for reason in model.verdict.reasons),
         f"{model.kind} model: {model.n_wavelets} wavelets, {model.n_parameters} parameters "
-        f"(rung {fit.rung}, stopped by {fit.stop_reason})",
+        f"(model class {fit.model_class}, stopped by {fit.stop_reason})",
         f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {_names(data.files) or 'arrays'}",
     ]
     if data.held_out_every:

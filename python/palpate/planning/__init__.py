@@ -1,15 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a model to a force that is rendered: how, on what device, and how far off it is."""
+"""Plans how a model is rendered on a device, and simulates the plan.
+
+Model and device -> candidate structures, the simplest first (`candidates`, with `limited_network` where the
+device is too weak) -> certificate -> force error (`static_error`) -> `Plan`, or the reasons of the refusal
+with the device property that would help (`device_needs`). `search` runs these steps. `simulation` renders a
+plan in virtual time.
+"""
 
 from .. import _core
 from .._core.rendering import Scheme, explicit_slope_limit
 from .._core.simulation import Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
-from .comparison import Comparison, compare_structures
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
-from .plan import ACCEPTED_FORCE_ERROR, Plan
-from .simulation import ForceError, describe, force_at, force_error, force_range, judge, rig_for, simulate
+from .plan import ACCEPTED_FORCE_ERROR, Plan, describe
+from .simulation import (
+    Comparison,
+    ForceError,
+    compare_structures,
+    force_at,
+    force_error,
+    force_range,
+    judge,
+    rig_for,
+    simulate,
+)
 from .static_error import StaticForceError
 
 __all__ = [

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, compensated_share
+from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import Certificate, balancing_shift, certify, force_bounds, steepest_stick
 from .choices import (
     LONGEST_PLAY,
@@ -18,7 +18,6 @@ from .choices import (
     explicit_scheme,
     play_radius_for,
     renderable_slopes,
-    usual_play_radius,
 )
 from .limited_network import limit_slopes, scale_hysteresis, sliding_slopes
 from .static_error import static_force_error, with_network
@@ -95,7 +94,7 @@ class Task:
     @property
     def usual_play(self) -> float:
         """The caller's play radius, or the usual one [position]."""
-        return self.play_radius or usual_play_radius(self.model, self.device)
+        return self.play_radius or default_play_radius(self.model, self.device.encoder_step)
 
     def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
         """A scheme for the model, or for a network in its place, with its certificate."""

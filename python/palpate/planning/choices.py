@@ -1,26 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers that a device leaves room for: slopes, coupling, play, mass and damping.
-
-They are proposals. Whether they hold is for the certificate to say.
-"""
+"""Proposes slopes, coupling, play, mass and damping for a device; the certificate decides if they hold."""
 
 from __future__ import annotations
 
 from .. import _core
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, default_play_radius, explicit_object, fewest_encoder_steps_in_play
+from .._core.rendering import Scheme, explicit_object, fewest_encoder_steps_in_play
 from .._core.stability import ForceBounds, certify_bounds, narrowest_play, stiffest_coupling
 from .limited_network import sliding_bounds, sliding_slopes
 
 SPARE = 0.95
-"""Share of what the device allows that is used where nothing else sets a number [-]"""
+"""Coupling stiffness where nothing else sets it [share of the stiffest that the device can hold]"""
 
 LONGEST_PLAY = 0.1
-"""Largest play radius [share of the travel]: a wider one would be felt as play, not as a loss."""
+"""Largest play radius [share of the travel]: a wider one is felt as play, not as hysteresis."""
 
 _WANTED = 1.02
-"""Slope that is asked of a device over that of the model: a network is fitted just below its limits [-]"""
+"""Slope for which a device is used [share of that of the model]: a network is fitted just below its limits"""
 
 _STABLE_SHARES = (0.9, 0.75, 0.6, 0.45, 0.3, 0.15)
 """Coupling stiffness tried for the explicit structure, over the stiffest that the device can hold [-]"""
@@ -33,7 +30,7 @@ _STABLE_RESERVES = (1.1, 1.5, 2.5, 5.0)
 def renderable_slopes(
     device: DeviceProfile, stick: float = 0.0, model: ForceModel | None = None
 ) -> tuple[float, float]:
-    """(lowest, highest) slope that direct rendering is certified for, shared out as the model needs them.
+    """(lowest, highest) slope for which direct rendering is certified, divided according to the model.
 
     With hysteresis these are slopes while sliding, and a stick adds `stick` = h/r.
     """
@@ -65,25 +62,19 @@ def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
     return radius if radius == narrowest else 1.000001 * radius
 
 
-def usual_play_radius(model: ForceModel, device: DeviceProfile) -> float:
-    """Play radius where nothing is certified that depends on it; 0 without hysteresis or with one's own."""
-    return default_play_radius(model, device.encoder_step)
-
-
 def explicit_scheme(
     bounds: ForceBounds,
     device: DeviceProfile,
     *,
-    mass: float | None,
-    damping: float | None,
-    coupling_stiffness: float | None,
-    coupling_damping: float | None,
+    mass: float | None = None,
+    damping: float | None = None,
+    coupling_stiffness: float | None = None,
+    coupling_damping: float | None = None,
     play_radius: float,
 ) -> Scheme:
-    """Coupling, mass and damping for the explicit structure: stable with the stiffest coupling, and for that
-    coupling with the least damping, which is what is felt most.
+    """The explicit structure that is stable with the stiffest coupling, then with the least object damping.
 
-    Where none of those tried is stable, the last of them.
+    The last one tried if none is stable.
     """
     T = device.period_s
     stiffest = coupling_for(device, 0.0)

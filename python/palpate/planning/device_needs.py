@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Device properties that a model needs to be rendered as it was identified: the certificate, inverted."""
+"""Finds the least device properties with which a model is rendered as it was identified."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .limited_network import sliding_bounds
 from .static_error import static_force_error
 
 _AMPLE = (40.0, 14.0, 8.0)
-"""Doublings after which a property is ample. Too much of it can make an explicit structure diverge. [-]"""
+"""Doublings after which a property is ample; too many can make an explicit structure diverge [-]"""
 
 _BISECTIONS = 15
-"""Of the doublings: the least sufficient value within 0.1 % [-]"""
+"""Bisections of the doublings, for the least sufficient value within 0.1 % [-]"""
 
 Fits = Callable[[DeviceProfile], bool]
 
@@ -28,8 +28,8 @@ class _Property:
 
     improved: Callable[[DeviceProfile, float], DeviceProfile]
     """The device with this property better by a factor, rounded to three digits"""
-    told: Callable[[DeviceProfile], str]
-    """The requirement that an improved device just meets"""
+    text: Callable[[DeviceProfile], str]
+    """The requirement that an improved device just meets, in words"""
 
 
 def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
@@ -63,7 +63,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 
     def least(*properties: _Property) -> str:
         found = _improved(device, properties, fits)
-        return "" if found is None else " and ".join(each.told(found) for each in properties)
+        return "" if found is None else " and ".join(each.text(found) for each in properties)
 
     damping, friction, rate, encoder = _properties(task.model, device)
     for short, otherwise in (
@@ -94,7 +94,7 @@ def _properties(
     """Damping, friction, rate and encoder."""
     force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
     steepest = max(sliding_bounds(model).steepest, 1e-9)
-    # Where there is none to be multiplied, it begins with far less than the model asks for.
+    # A property that is 0 cannot be doubled: begin far below the need of the model.
     b = device.viscous_damping or 1e-3 * device.longest_period_s * steepest
     f_c = device.coulomb_friction or 1e-3 * (device.encoder_step * steepest + device.force_step) or 1e-9
 

@@ -27,27 +27,26 @@ from ..identification.network.separable import Block, SeparableProblem
 from .static_error import SAMPLES, strokes, with_network
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
-"""Standard deviation of the kernel [share of the travel], and whether the force has to be restoring at both
-ends: one that begins at once where contact does needs a steep way there, and so does the continuation of one
-that is not zero or less at the lower end, or zero or more at the upper one."""
+"""Standard deviation of the kernel [share of the travel]; True if the force must be restoring at both ends,
+<= 0 at the lower and >= 0 at the upper one: otherwise it begins, or continues, too steeply."""
 
 _RESERVE = 0.985
-"""Share of a limit that the nearest force keeps: the rest is for the error of the network [-]"""
+"""Share of a limit for the nearest force; the rest is for the error of the network [-]"""
 
 _CERTIFIED = 0.997
-"""Share of a limit that is imposed: the rest is for bounds that are wider than what they bound [-]"""
+"""Share of a limit that is imposed; the rest is for bounds wider than the true range [-]"""
 
 _CLOSE = 2e-5
 """RMS error at which no further wavelets are taken [share of the force's range]"""
 
 _CLOSE_SLOPE = 0.01
-"""The same of the slope [share of the smaller limit]"""
+"""Error of the slope at which no further wavelets are taken [share of the smaller limit]"""
 
 _MOST = 64
-"""Further wavelets at most [-]"""
+"""Largest number of further wavelets [-]"""
 
 _NEW = 1e-5
-"""Share of a candidate's squared norm that must stand outside what was chosen for it to be taken [-]"""
+"""Least share of a candidate's squared norm outside the chosen ones [-]"""
 
 _SCALE_RATIO = 1.6
 _SCALE_STEP = 0.75
@@ -100,7 +99,7 @@ def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
 def _limited_once(
     model: ForceModel, low: float, high: float, sigma: float, restoring: bool
 ) -> ForceModel | None:
-    """The model with the change fitted; None where its continuations would be steeper than the limit."""
+    """The model with the change fitted; None if its continuations are steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
     changes = _changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
@@ -121,7 +120,7 @@ def _limited_once(
 def _changes_needed(
     x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: ForceModel, restoring: bool
 ) -> Float2D:
-    """What strokes (k, n) lack for their slopes to lie within limits, kinks rounded; zero elsewhere."""
+    """Changes (k, n) of strokes that limit their slopes, kinks rounded; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
     margin = int(np.ceil(6.0 * sigma / step))
     before = after = 0
@@ -178,7 +177,7 @@ def _extended(force: Float1D, margin: int) -> Float1D:
 def _fitted(
     model: ForceModel, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
 ) -> ForceModel:
-    """Least squares on the wavelets that there were and further ones, the slope limits and h >= 0 imposed."""
+    """Least squares on the model's and further wavelets, with the slope limits and h >= 0 imposed."""
     lower, travel = model.lower, model.upper - model.lower
     box = ((x - lower) / travel)[:, None]
     ones = np.ones_like(x)
@@ -235,9 +234,9 @@ def _chosen(
     sigma: float,
     close: float,
 ) -> Sequence[int]:
-    """Candidates chosen one by one for changes (outputs, n), beside a line and the wavelets that there were.
+    """Candidates chosen one by one for changes (outputs, n), beside a line and the model's wavelets.
 
-    Slopes are fitted beside the values, sigma times a slope weighing as much as a value.
+    Slopes are fitted beside the values; sigma times a slope weighs as much as a value.
     """
 
     def both(values: Float2D, slopes: Float2D) -> Float2D:
@@ -258,7 +257,7 @@ def _chosen(
     residual = targets - basis @ (basis.T @ targets)
     left = columns - basis @ (basis.T @ columns)
     norms = np.square(columns).sum(axis=0)
-    # Everything from here on is in products: a pivoted Cholesky factor of the candidates' Gram matrix.
+    # A pivoted Cholesky factor of the candidates' Gram matrix.
     gram, products = left.T @ left, left.T @ residual
     size = np.diag(gram).copy()
     rest = float(np.square(residual).sum())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plan: how a model is rendered, what is proved of that, and how far the felt force is from the model's."""
+"""Plan: the structure that renders a model, its certificate and its force error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.rendering import Scheme, solver_name
-from .._core.stability import Certificate, certify, device_difference
+from .._core.stability import Certificate, certify, device_difference, felt_slope
 from ..arguments import instance_of
 from ..errors import InputError
 from ..model import Model
@@ -19,16 +19,21 @@ from ..model.model_file import certificate_record
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 from .static_error import StaticForceError, static_force_error
 
+_CERTIFICATE = {
+    "certified": "certified",
+    "stable-locally": "stable (local), passivity not certified",
+    "refused": "refused",
+}
+
 ACCEPTED_FORCE_ERROR = 0.1
-"""Force error that is accepted where nothing else is said [share of the range of the identified force]"""
+"""Force error that is accepted by default [share of the range of the identified force]"""
 
 
 @dataclass(frozen=True)
 class Plan:
     """A model, and the structure and numbers with which it is rendered.
 
-    Made by hand, a plan states what its author wants, and nothing is proved; :func:`palpate.plan` chooses one
-    for a device and certifies it.
+    A plan made by hand has no certificate. :func:`palpate.plan` chooses a plan for a device and certifies it.
 
     Raises
     ------
@@ -40,15 +45,15 @@ class Plan:
     """The identified model, which the plan never changes. Force errors refer to it."""
     scheme: Scheme
     certificate: Certificate | None = None
-    """What was proved of the rendered model, and for which device; None where nothing was looked at"""
+    """Certificate of the rendered model on a device; None if nothing was certified"""
     refused: tuple[str, ...] = ()
-    """Simpler structures that were refused, each with the inequality that failed and by how much"""
+    """Refused simpler structures, each with the inequality that failed and by how much"""
     limited: Model | None = None
-    """The model that is rendered in place of `model`, because the device is too weak; None: `model` itself"""
+    """The model rendered in place of `model` because the device is too weak; None: `model` itself"""
     accept_force_error: float = ACCEPTED_FORCE_ERROR
     """Largest force error that is accepted [share of the range of the identified force]"""
     needs: str = ""
-    """The device property that `model` itself would need; empty where it is rendered, or none helps"""
+    """The device property that `model` itself needs; empty if it is rendered, or if none helps"""
 
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
@@ -68,12 +73,12 @@ class Plan:
 
     @property
     def solver(self) -> str | None:
-        """How the load line is solved at 1 kHz: table or newton; None where there is nothing to solve."""
+        """Solver of the load line at 1 kHz: table or newton; None if there is nothing to solve."""
         return solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
 
     @cached_property
     def force_error(self) -> StaticForceError:
-        """Felt minus identified force at rest: of a limited network, and of the softness of a coupling."""
+        """Felt minus identified force at rest, caused by a limited network and a soft coupling."""
         return static_force_error(self.model, self.rendered, self.scheme)
 
     @property
@@ -86,12 +91,12 @@ class Plan:
 
     @classmethod
     def of(cls, model: Model) -> Plan:
-        """The plan that stands in a model file, with its certificate.
+        """The plan in a model file, with its certificate.
 
         Raises
         ------
         InputError
-            There is none.
+            The model has no plan.
         """
         instance_of("model", model, Model, "make one with palpate.load_model")
         if model.plan is None:
@@ -142,12 +147,61 @@ class Plan:
             "accepted_force_error": self.accept_force_error,
         }
 
+    @property
+    def description(self) -> str:
+        """The structure and its changes to the identified network, in words."""
+        return ", ".join(
+            [*_words(self.scheme), *([] if self.limited is None else ["with a limited network"])]
+        )
+
+    @property
+    def felt_slopes(self) -> tuple[float, float]:
+        """The steepest felt slope and that of the model; a coupling makes it softer [force/position].
+
+        Where the coupling was taken out of the model, the bounds of the certificate are those of the rest.
+        """
+        assert self.certificate is not None
+        steepest = max(0.0, self.certificate.bounds.slope_max)
+        if not self.scheme.has_coupling:
+            return steepest, steepest
+        felt = felt_slope(steepest, self.scheme.coupling_stiffness)
+        return felt, felt if self.scheme.compensated else steepest
+
+    def rows(self) -> dict[str, str]:
+        """The numbers of a certified plan for a person, each under its name."""
+        assert self.certificate is not None
+        scheme, error = self.scheme, self.force_error
+        rows = {"structure": self.description}
+        if self.solver is not None:
+            rows["solver"] = self.solver
+        if scheme.has_coupling:
+            rows["coupling"] = f"K_c = {scheme.coupling_stiffness:.4g}, B_c = {scheme.coupling_damping:.4g}"
+        if scheme.has_mass:
+            rows["object"] = f"mass {scheme.mass:.4g}, damping {scheme.damping:.4g}"
+        if scheme.predict:
+            rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
+        if scheme.play_radius:
+            rows["play radius"] = f"{scheme.play_radius:.4g}"
+        unit = self.model.units["force"] or "in the model's unit"
+        felt, steepest = self.felt_slopes
+        if felt < steepest:
+            rows["softer"] = f"slopes up to {steepest:.4g} are felt as up to {felt:.4g}"
+        rows["force error"] = (
+            f"up to {error.largest:.4g} {unit}, "
+            f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
+            if error.largest
+            else "none"
+        )
+        rows["certificate"] = _CERTIFICATE[self.certificate.verdict]
+        rows["holds for"] = f"up to {1e3 * self.certificate.longest_period_s:.4g} ms between two samples"
+        return rows
+
     def certified_for(self, device: DeviceProfile) -> Plan:
-        """The same plan with what is proved of it on a device, whatever that is."""
+        """The same plan with its certificate on a device, which may be a refusal."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
-        """Refuse what is sure to diverge on this device, and a device that the certificate is not for.
+        """Refuses a plan that diverges on this device, and a device other than that of the certificate.
 
         Raises
         ------
@@ -199,6 +253,21 @@ class Plan:
                 f"to accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
             ),
         )
+
+
+def describe(scheme: Scheme) -> str:
+    """A scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
+    mass = [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"] if scheme.has_mass else []
+    return ", ".join([*_words(scheme), *mass])
+
+
+def _words(scheme: Scheme) -> list[str]:
+    words = [scheme.structure]
+    if scheme.compensated:
+        words.append("compensated")
+    if scheme.predict:
+        words.append(f"predict {scheme.predict}")
+    return words
 
 
 def require_force(model: Model) -> None:

@@ -36,31 +36,32 @@ def plan(
     predict: int | Literal["auto", "off"] = "auto",
     accept_force_error: float = ACCEPTED_FORCE_ERROR,
 ) -> Plan:
-    """Choose the simplest structure that is certified for a model on a device.
+    """Chooses the simplest structure that is certified for a model on a device.
 
-    Direct; direct with the slope limited to what the device can render; massless behind a coupling, when one
-    is asked for; implicit, when the object has mass or dynamics, energy-consistent where it falls too steeply
-    for that; explicit, which is stable at best. What is not given is chosen from the device.
+    The candidate structures are, in this order: direct; direct with the slope limited to the device's limit;
+    massless behind a coupling, if a coupling is required; implicit, if the object has mass or damping;
+    energy-consistent, if its force falls too steeply for that; explicit, which is stable at best. Numbers
+    that are not given are chosen from the device.
 
     Parameters
     ----------
     model : Model
-        A model of one position, or of position and velocity; a plan that stands in it is ignored.
+        A model of one position, or of position and velocity; a plan in it is ignored.
     device : DeviceProfile, str or path
         A profile in the model's unit, the name of an example profile, or the path of a TOML file.
     coupling : bool
-        Render through a virtual coupling, also where that is not needed.
+        True: render through a virtual coupling, also where none is needed.
     coupling_stiffness, coupling_damping : float, optional
-        K_c and B_c [force/position, force*s/position]; either asks for a coupling.
+        K_c and B_c [force/position, force*s/position]; either requires a coupling.
     mass, damping : float, optional
-        Of the object [force*s^2/position, force*s/position]; the model's own where not given, and 0 leaves
-        them out.
+        Mass and damping of the object [force*s^2/position, force*s/position]. Default: those of the model. 0
+        leaves them out.
     play_radius : float, optional
         r of a model with hysteresis [position].
     predict : int, "auto" or "off"
         Samples used to predict the position half a sample ahead, for direct rendering: a force that is held
-        for a sample comes half a sample late on average. "auto" takes the fewest of 1, 2, 4, 8 and 16 that
-        are certified and leave a tick a quarter of a period to be late; "off" is 0.
+        for a sample is half a sample late on average. "auto" takes the fewest of 1, 2, 4, 8 and 16 that are
+        certified for a tick that is late by a quarter of a period; "off" is 0.
     accept_force_error : float
         Largest difference of the felt from the identified force that is accepted, as a share of the range of
         the identified force.
@@ -68,8 +69,8 @@ def plan(
     Returns
     -------
     Plan
-        Read its ``verdict`` first. It is "no" where the force error is larger than accepted, and where no
-        structure holds: the plan is then the last that was tried. Its certificate says what was proved.
+        Read its ``verdict`` first. It is "no" if the force error is larger than accepted, or if no structure
+        holds; the plan is then the last candidate. Its certificate states what was proved.
 
     Raises
     ------

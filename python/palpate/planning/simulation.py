@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render a plan on a simulated device, and say how far the rendered force is from the model's."""
+"""Renders a plan on a simulated device, and measures its force error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..model import Model
 from ..recording import Recording
 from ..recording.units import COLUMN_SUFFIX
 from ..verdict import Finding, Verdict, no, usable
-from .plan import Plan
+from .plan import Plan, describe
 
 START = "handle_start"
 MIDDLE = "handle_middle"
@@ -31,13 +31,19 @@ MEAN_APPLIED = "mean_applied"
 """Stem of the column with the mean force over a tick, which a fractional delay divides."""
 
 _GRID = 1001
-"""Positions at which the force range is looked for."""
+"""Positions at which the force range is computed [-]"""
 _TOLERATED_ERROR = 0.02
-"""Force error over force range up to which nothing is said."""
+"""Largest force error without a finding [share of the force range]"""
 _TOLERATED_TICKS = 0.01
-"""Share of ticks that may be extrapolated, clipped or not solved."""
+"""Largest number of extrapolated, clipped or unsolved ticks without a finding [share of the ticks]"""
 _SMALLEST_DOMAIN_SHARE = 0.1
-"""Of the model's domain that the handle should cover."""
+"""Least motion of the handle without a finding [share of the domain]"""
+
+_COMPENSATED_DAMPING = 0.25
+"""Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
+
+_PREDICT = 4
+"""Samples of the prediction that is compared [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
 
@@ -54,14 +60,14 @@ def simulate(
     duration: float,
     progress: Callable[[int], None] | None = None,
 ) -> Recording:
-    """Render a plan in closed loop, in virtual time: device, hand and controller are simulated.
+    """Renders a plan in closed loop, in virtual time: device, hand and controller are simulated.
 
     The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
 
     Parameters
     ----------
     plan : Plan
-        What is rendered.
+        The plan to render.
     device : DeviceProfile
         The simulated device.
     hand : Hand
@@ -91,14 +97,9 @@ def simulate(
     duration = real_of("duration", duration)
     plan.check_for(device)
     start = float(np.clip(0.0, plan.model.lower[0], plan.model.upper[0]))
-    try:
-        trace = _core.simulation.simulate(
-            plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
-        )
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    trace = _core.simulation.simulate(
+        plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
+    )
     recording = Recording.from_arrays(
         trace["position"],
         trace["applied"],
@@ -154,7 +155,7 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     Parameters
     ----------
     plan : Plan
-        What was rendered.
+        The rendered plan.
     rendered : Recording
         From :func:`simulate`.
     """
@@ -188,12 +189,12 @@ def force_range(plan: Plan) -> float:
 
 
 def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
-    """Judge a simulated rendering by its force error, its motion and its ticks.
+    """Judges a simulated rendering by its force error, its motion and its ticks.
 
     Parameters
     ----------
     plan : Plan
-        What was rendered.
+        The rendered plan.
     rendered : Recording
         From :func:`simulate`.
     error : ForceError
@@ -262,16 +263,58 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     return force
 
 
-def describe(scheme: Scheme) -> str:
-    """A scheme in the words of the comparison: "implicit, m = 0.001, B_o = 0.5"."""
-    words = [scheme.structure]
-    if scheme.compensated:
-        words.append("compensated")
-    if scheme.predict:
-        words.append(f"predict {scheme.predict}")
-    if scheme.has_mass:
-        words += [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"]
-    return ", ".join(words)
+@dataclass(frozen=True)
+class Comparison:
+    """One structure of a comparison: its recording, or the reason why it was refused."""
+
+    scheme: Scheme
+    recording: Recording | None
+    error: ForceError | None
+    refused: str | None
+    """One sentence, or None"""
+
+    @property
+    def name(self) -> str:
+        return describe(self.scheme)
+
+
+def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Comparison, ...]:
+    """Renders a model with each structure and measures its force error.
+
+    The order is that of their force errors: direct, with and without prediction; massless behind a coupling,
+    with the coupling's spring taken out of the model; massless; implicit with mass alone, then with the
+    damping that the explicit structure needs; explicit. A structure that the model or the device rules out is
+    refused with its reason.
+
+    Parameters
+    ----------
+    model : Model
+        A model of one position.
+    rig : TestRig
+        Device, hand and coupling, from :func:`rig_for`.
+    duration : float
+        Simulated time of each rendering [s].
+    """
+    quarter = _COMPENSATED_DAMPING * rig.scheme(model).coupling_damping
+    schemes = (
+        rig.scheme(model, structure="direct", predict=_PREDICT),
+        rig.scheme(model, structure="direct"),
+        rig.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
+        rig.scheme(model, structure="massless"),
+        rig.scheme(model, structure="implicit", damping=0.0),
+        rig.scheme(model, structure="implicit"),
+        rig.scheme(model, structure="explicit"),
+    )
+    return tuple(_render(model, scheme, rig.device, rig.hand, duration) for scheme in schemes)
+
+
+def _render(model: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, duration: float) -> Comparison:
+    try:
+        plan = Plan(model, scheme)
+        recording = simulate(plan, device, hand, duration)
+    except InputError as error:
+        return Comparison(scheme, None, None, str(error))
+    return Comparison(scheme, recording, force_error(plan, recording), None)
 
 
 def _suffix(unit: str) -> str:

@@ -17,22 +17,22 @@ _MARKERS = "os^Dv<>p"
 def draw_path(
     error_axes: Axes, criterion_axes: Axes, path: Sequence[Mapping[str, Any]], force_unit: str
 ) -> None:
-    """Error and criterion over the number of wavelets, one line for each rung of the ladder.
+    """Error and criterion over the number of wavelets, one line for each model class.
 
     Parameters
     ----------
     error_axes, criterion_axes : matplotlib.axes.Axes
         Where to draw; they should share their horizontal axis.
     path : sequence of mapping
-        Networks in the order in which they were considered: rung, n_wavelets, rmse, criterion (or None).
+        Networks in the order in which they were considered: model_class, n_wavelets, rmse, criterion.
     force_unit : str
         Of rmse.
     """
     y = scale_for(force_unit, [step["rmse"] for step in path])
-    rungs = dict.fromkeys(step["rung"] for step in path)
+    classes = dict.fromkeys(step["model_class"] for step in path)
     least = min((step["criterion"] for step in path if step["criterion"] is not None), default=0.0)
-    for marker, rung in zip(_MARKERS, rungs, strict=False):
-        steps = [step for step in path if step["rung"] == rung]
+    for marker, model_class in zip(_MARKERS, classes, strict=False):
+        steps = [step for step in path if step["model_class"] == model_class]
         look: dict[str, Any] = {
             "color": "black",
             "linewidth": 0.6,
@@ -45,7 +45,7 @@ def draw_path(
             [step["n_wavelets"] for step in steps],
             [step["rmse"] * y.factor for step in steps],
             **look,
-            label=rung,
+            label=model_class,
         )
         judged = [step for step in steps if step["criterion"] is not None]
         criterion_axes.plot(

@@ -1,33 +1,100 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The root locus of the explicit structure, drawn for the choice of its damping."""
+"""Root locus of the explicit structure over its object damping."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from ..planning.root_locus import RootLocus
+from .._core.device import DeviceProfile
+from .._core.rendering import Scheme, compensated_share, default_play_radius
+from .._core.stability import force_bounds
+from .._typing import Float1D
+from ..planning import Plan
+from ..planning.choices import explicit_scheme
 
 _LINES = ("-", "--", ":", "-.")
 
+_SAMPLES = 801
+"""Dampings of a locus [-]"""
 
-def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit: str) -> None:
-    """Poles over the damping of the object, one line style for each slope; the chosen damping marked.
+
+@dataclass(frozen=True)
+class RootLocus:
+    """Poles of the linearised explicit structure (paper figure 14) at a held device, over its damping.
+
+    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the slope and K_c together, B both dampings.
+    """
+
+    slopes: Float1D
+    """(k,) slopes of the object [force/position]"""
+    dampings: Float1D
+    """(n,) object damping [force*s/position]"""
+    poles: NDArray[np.complex128]
+    """(k, n, 2)"""
+    chosen: NDArray[np.complex128]
+    """(k, 2) with the damping of the scheme"""
+
+
+def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:
+    """Computes poles for a damping from 0 to the limit of the step, B T = 2 m.
+
+    Parameters
+    ----------
+    scheme : Scheme
+        Mass, coupling and the damping that is marked.
+    slopes : (k,) array
+        Slopes of the object [force/position].
+    period_s : float
+        T [s].
+    """
+    slopes = np.asarray(slopes, dtype=np.float64)
+    largest = max(2.0 * scheme.mass / period_s - scheme.coupling_damping, scheme.damping)
+    # A sample where two poles meet, T B/m = 2 sqrt(c) - c with c = T^2 K/m: their path has a corner there.
+    c = np.maximum(period_s**2 * (slopes + scheme.coupling_stiffness) / scheme.mass, 0.0)
+    meeting = scheme.mass / period_s * (2.0 * np.sqrt(c) - c) - scheme.coupling_damping
+    dampings = np.union1d(np.linspace(0.0, largest, _SAMPLES), meeting[(meeting > 0.0) & (meeting < largest)])
+    return RootLocus(
+        slopes=slopes,
+        dampings=dampings,
+        poles=_poles(scheme, slopes[:, None], dampings[None, :], period_s),
+        chosen=_poles(scheme, slopes, np.full_like(slopes, scheme.damping), period_s),
+    )
+
+
+def _poles(scheme: Scheme, slope: Float1D, damping: Float1D, period_s: float) -> NDArray[np.complex128]:
+    drag = period_s * (damping + scheme.coupling_damping) / scheme.mass
+    middle = period_s**2 * (slope + scheme.coupling_stiffness) / scheme.mass - 2.0 + drag
+    root = np.sqrt((middle**2 - 4.0 * (1.0 - drag)).astype(np.complex128))
+    return np.stack([(-middle + root) / 2.0, (-middle - root) / 2.0], axis=-1)
+
+
+def draw_root_locus(axes: Axes, plan: Plan, device: DeviceProfile) -> None:
+    """Draws the poles of a plan's explicit structure over its damping, one line style for each slope.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
         Where to draw.
-    locus : RootLocus
-        What to draw.
-    damping : float
-        The chosen damping, for the legend [force*s/position].
-    slope_unit : str
-        Of the slopes, for the legend.
+    plan : Plan
+        With another structure than explicit, the explicit one that suits the device is drawn.
+    device : DeviceProfile
+        The device of the plan.
     """
+    radius = default_play_radius(plan.model, device.encoder_step)
+    bounds = force_bounds(plan.rendered, radius)
+    scheme = plan.scheme
+    if plan.structure != "explicit":
+        scheme = explicit_scheme(bounds, device, mass=plan.model.mass, play_radius=radius)
+    slopes = np.unique(
+        [max(bounds.slope_min, -compensated_share * scheme.coupling_stiffness), bounds.slope_max]
+    )
+    units = plan.model.units
+    unit = f"{units['force']}/{units['position']}".replace("*", "\u00b7") if units["force"] else ""
+    locus = root_locus(scheme, slopes, device.period_s)
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color="0.6", linewidth=0.8)
     axes.axhline(0.0, color="0.85", linewidth=0.5)
@@ -35,7 +102,7 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit:
         style = _LINES[k % len(_LINES)]
         for pole in range(2):
             path = locus.poles[k, :, pole]
-            name = f"slope {slope:.4g} {slope_unit}" if pole == 0 else None
+            name = f"slope {slope:.4g} {unit}" if pole == 0 else None
             axes.plot(path.real, path.imag, style, color="black", linewidth=1.0, label=name)
         axes.plot(
             locus.chosen[k].real,
@@ -46,7 +113,7 @@ def draw_root_locus(axes: Axes, locus: RootLocus, *, damping: float, slope_unit:
             color="black",
             markerfacecolor="white",
             zorder=3,
-            label=f"the same, damping {damping:.3g}",
+            label=f"the same, damping {scheme.damping:.3g}",
         )
     axes.set_aspect("equal")
     axes.set_xlim(-1.3, 1.3)

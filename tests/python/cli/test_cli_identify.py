@@ -18,7 +18,16 @@ from palpate.cli.identify_options import HELP
 from palpate.cli.main import main, palpate
 from palpate.recording.sample import sample_recording
 
-JSON_FIELDS = ["model", "n_wavelets", "n_parameters", "rung", "stop_reason", "nrmse", "verdict", "seconds"]
+JSON_FIELDS = [
+    "model",
+    "n_wavelets",
+    "n_parameters",
+    "model_class",
+    "stop_reason",
+    "nrmse",
+    "verdict",
+    "seconds",
+]
 
 
 @pytest.fixture
@@ -57,7 +66,7 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert list(result) == JSON_FIELDS
     assert result["model"] == "m.json"
     assert (result["n_wavelets"], result["n_parameters"]) == (model.n_wavelets, model.n_parameters)
-    assert (result["rung"], result["stop_reason"]) == (model.fit.rung, model.stop_reason)
+    assert (result["model_class"], result["stop_reason"]) == (model.fit.model_class, model.stop_reason)
     assert result["nrmse"] == model.fit.nrmse
     assert result["seconds"] > 0
 
@@ -165,7 +174,7 @@ def test_every_setting_of_the_identification_is_an_option_with_its_default() -> 
 def test_settings_reach_the_identification(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sample_recording(3, 5.0).write(here / "a.csv")
     arguments = ["identify", "a.csv", "-o", "m.json", "--max-wavelets", "2", "--inputs", "position"]
-    assert main([*arguments, "--slope-bounds", "-5", "30", "--no-refine"]) == 0
+    assert main([*arguments, "--slope-bounds", "-5", "30", "--search", "refine=false"]) == 0
     model = load_model(here / "m.json")
     assert model.n_wavelets <= 2
     assert model.slope(np.linspace(-0.2, 0.469, 2001)).max() <= 30.0 * (1 + 1e-6)
@@ -184,7 +193,9 @@ def test_settings_reach_the_identification(here: Path, capsys: pytest.CaptureFix
         (["--units", "position_rad=parsec"], "parsec"),
         (["--rows", "10"], "must be START:STOP"),
         (["--position", "depth"], "no column 'depth'"),
-        (["--play-radius", "wide"], "must be numbers joined by commas"),
+        (["--search", "play_radius=wide"], "play_radius is 'wide'; it must be numbers joined by commas"),
+        (["--search", "luck=1"], "search has no setting 'luck'"),
+        (["--search", "patience"], "must be NAME=VALUE"),
         (["--plot", "m.doc"], "is no figure file"),
         (["--plot", "m.json"], "is no figure file"),
         (["--plot", "nowhere/m.png"], "there is no folder nowhere"),

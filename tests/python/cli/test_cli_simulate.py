@@ -125,7 +125,7 @@ def test_a_rendering_that_ran_away_is_a_failure_of_the_work(
         status[-7:] = "NonFinite"
         return replace(recording, columns={**recording.columns, "status": status})
 
-    monkeypatch.setattr("palpate.planning.simulate", run_away)
+    monkeypatch.setattr("palpate.cli.simulate.render", run_away)
     assert main(["simulate", "m.json", "-o", "r.csv"]) == 1
     verdict, reason, *_ = capsys.readouterr().out.splitlines()
     assert verdict == "verdict: no"

@@ -95,8 +95,6 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL, "--telemetry-port", "70000"], "--telemetry-port"),
         ([MODEL, "--fault", "flu@1"], "fault is 'flu@1', must be KIND@SECONDS"),
         ([MODEL.parent / "two_inputs.json"], "has 2 inputs"),
-        ([MODEL.parents[1] / "bad" / "alpha_zero.json"], "network.alpha[1][0] is 0"),
-        ([MODEL.parents[1] / "bad" / "not_json.json"], "this is not JSON"),
     ],
 )
 def test_what_is_wrong_is_refused_with_one_sentence(words: list[Any], sentence: str) -> None:
@@ -106,6 +104,19 @@ def test_what_is_wrong_is_refused_with_one_sentence(words: list[Any], sentence: 
     assert answer.stderr.startswith("error: ")
     assert answer.stderr.count("\n") == 1
     assert sentence in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [("12.5", "0.0", "network.alpha[1][0] is 0.0: must be > 0"), ("{", "palpate", "this is not JSON")],
+)
+def test_a_bad_model_is_refused_with_one_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+    path = tmp_path / "bad.json"
+    path.write_text(MODEL.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    answer = control(path)
+    assert answer.returncode == 2
+    assert answer.stderr.startswith(f"error: {path}: {sentence}")
+    assert answer.stderr.count("\n") == 1
 
 
 def test_a_usb_device_is_refused_for_what_is_missing() -> None:

@@ -52,7 +52,7 @@ def moved(
 def test_mass_and_damping_are_recovered_from_a_minute_of_motion() -> None:
     for seed in range(1 if SCALE == 1 else 20):
         model = identify(moved(seed, seconds=60.0, mass=1e-3, damping=0.06))
-        assert (model.kind, model.fit.rung) == ("position", "mass and damping")
+        assert (model.kind, model.fit.model_class) == ("position", "mass and damping")
         assert model.mass == pytest.approx(1e-3, rel=0.05)
         assert model.damping == pytest.approx(0.06, rel=0.05)
         fresh = verify(model, moved(seed + 1000, mass=1e-3, damping=0.06))
@@ -61,7 +61,7 @@ def test_mass_and_damping_are_recovered_from_a_minute_of_motion() -> None:
 
 
 @pytest.mark.parametrize(
-    ("there", "rung", "kind"),
+    ("there", "model_class", "kind"),
     [
         ({}, "position", "position"),
         ({"damping": 0.03}, "velocity", "position"),
@@ -71,20 +71,20 @@ def test_mass_and_damping_are_recovered_from_a_minute_of_motion() -> None:
     ids=["neither", "velocity", "hysteresis", "both"],
 )
 def test_velocity_and_hysteresis_are_taken_where_they_are_and_nowhere_else(
-    there: dict[str, float], rung: str, kind: str
+    there: dict[str, float], model_class: str, kind: str
 ) -> None:
     surprises = 0
     for draw in range(DRAWS):
         model = identify(moved(draw, **there))
-        surprises += (model.fit.rung, model.kind) != (rung, kind)
+        surprises += (model.fit.model_class, model.kind) != (model_class, kind)
     assert surprises <= ALLOWED_SURPRISES
 
 
 def test_each_term_is_reported_with_what_it_gains() -> None:
     notes = identify(moved(1, damping=0.03)).notes["identification"]
-    (taken,) = (note for note in notes if note.startswith("damping taken"))
+    (taken,) = (note for note in notes if note.startswith("damping accepted"))
     assert "bic falls by" in taken
-    assert "the squared error on fresh stretches falls by" in taken
+    assert "the squared error on held-out stretches falls by" in taken
     assert any(note.startswith("mass refused: bic ") for note in notes)
 
 
@@ -102,7 +102,7 @@ def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None
 
     model = identify(contact(1))
     assert (model.kind, model.inputs) == ("position_velocity", ("position", "velocity"))
-    assert (model.fit.rung, model.damping) == ("velocity", None)
+    assert (model.fit.model_class, model.damping) == ("velocity", None)
     assert verify(model, contact(2)).rmse < 0.004
     assert any(note.startswith("velocity accepted as an input") for note in model.notes["identification"])
 
@@ -123,7 +123,7 @@ def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input
     """The torque of a motor that drives the joint: it has the sign of the other side."""
     kept, held = jointed(1, -0.3).split(5)
     model = identify(kept)
-    assert (model.fit.rung, model.inputs) == ("velocity", ("position", "velocity"))
+    assert (model.fit.model_class, model.inputs) == ("velocity", ("position", "velocity"))
     result = verify(model, held)
     assert result.nrmse < 0.1
     assert result.n < len(held)
@@ -203,9 +203,9 @@ def test_one_speed_tells_no_damping_from_hysteresis_but_two_do() -> None:
     for seed in range(1 if SCALE == 1 else 20):
         one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)
-        told = [note for note in one.notes["identification"] if note.startswith("velocity was not tried")]
+        told = [note for note in one.notes["identification"] if note.startswith("damping was not tested")]
         assert len(told) == 1
-        assert "does not tell damping from hysteresis" in told[0]
+        assert "damping and hysteresis look alike" in told[0]
         two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45, 0.15, 0.15, 0.45, 0.45], damping=0.06))
         assert two.kind == "position"
         assert two.damping == pytest.approx(0.06, rel=0.05)

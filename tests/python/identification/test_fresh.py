@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stopping on rows that were kept back, rungs earned on them, and outliers."""
+"""Stopping on held-out rows, model classes accepted on them, and outliers."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ import pytest
 
 from palpate import identify
 from palpate._core.model import wavelet_columns
-from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
 from palpate.identification.data.held_out import BLOCKS, HeldOutRows, gain, held_out_rows, inside
 from palpate.identification.search.criteria import choice, enough, standard_error
 from palpate.identification.search.evidence import Samples
@@ -118,7 +118,7 @@ def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
     assert sum(note.startswith("position refused: bic falls by") for note in network.notes) >= 1
 
 
-def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:
+def test_what_each_model_class_gains_on_held_out_rows_stands_in_the_notes() -> None:
     notes = identify(sample_recording(1, duration_s=20.0)).notes["identification"]
     assert any(
         note.startswith("linear accepted: bic falls by ") and "held-out rows falls by" in note
@@ -131,7 +131,9 @@ def test_what_each_rung_gains_on_fresh_rows_stands_in_the_notes() -> None:
 @pytest.mark.parametrize("refine", [True, False], ids=["refined", "frame-only"])
 def test_every_selection_finds_a_wall(selection: str, refine: bool) -> None:
     x, _, y = wall(3000, 1)
-    network = fit_environment(x[:, None], y, None, IdentifyOptions(selection=selection, refine=refine))
+    network = fit_environment(
+        x[:, None], y, None, IdentifyOptions(search=SearchOptions(selection=selection, refine=refine))
+    )
     assert network.rmse == pytest.approx(0.02, rel=0.1)
     assert len(network.weight) <= (12 if refine else 30)
 

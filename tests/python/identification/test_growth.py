@@ -25,7 +25,9 @@ def kinked(noise: float, seed: int = 0) -> SeparableProblem:
     x = np.linspace(0.0, 1.0, 200)
     y = 2.0 * np.abs(x - 0.25) - 3.0 * np.maximum(x - 0.75, 0.0)
     y = y + np.random.default_rng(seed).normal(0.0, noise, len(x))
-    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+    return problem_of(
+        Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.search.resolved_by
+    )
 
 
 def grown(problem: SeparableProblem) -> Grown:
@@ -45,7 +47,7 @@ def test_without_noise_wavelets_become_as_fine_as_a_kink_needs() -> None:
 def test_noise_is_not_taken_for_structure(noise: float) -> None:
     problem = kinked(noise)
     found = grown(problem)
-    assert found.problem.resolved_by == OPTIONS.resolved_by
+    assert found.problem.resolved_by == OPTIONS.search.resolved_by
     assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
 
 
@@ -56,7 +58,7 @@ def over_two_inputs(
     random = np.random.default_rng(1)
     x = random.uniform(size=(n, 2))
     y = law(x[:, 0], x[:, 1]) + random.normal(0.0, noise, n)
-    return problem_of(Compressor(x, y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+    return problem_of(Compressor(x, y, max_positions=2000).rows(), resolved_by=OPTIONS.search.resolved_by)
 
 
 def smooth(x: Float1D, y: Float1D) -> Float1D:
@@ -79,7 +81,7 @@ def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: py
     problem = over_two_inputs(smooth, 200)
     found = grown(problem)
     assert problem.rmse(found.solution) <= WORTH_FINER * RESOLVED * problem.force_range
-    assert found.problem.resolved_by == OPTIONS.resolved_by
+    assert found.problem.resolved_by == OPTIONS.search.resolved_by
     problem = replace(problem, resolved_by=int(SMOOTH * 200))
     widest = problem.finest(found.solution.basis.beta)
     assert np.all(found.solution.basis.alpha <= np.maximum(widest, COARSEST) * (1.0 + 1e-9))
@@ -115,7 +117,9 @@ def detents(noise: float, seed: int = 0) -> SeparableProblem:
     alpha, beta = np.full((20, 1), 2.0 * CORE / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
     y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)
     y = y + random.normal(0.0, noise, len(x))
-    return problem_of(Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.resolved_by)
+    return problem_of(
+        Compressor(x[:, None], y, max_positions=2000).rows(), resolved_by=OPTIONS.search.resolved_by
+    )
 
 
 def test_where_neighbours_agree_about_what_is_left_wavelets_become_finer() -> None:

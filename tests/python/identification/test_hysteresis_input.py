@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from palpate import InputError, identify, verify
+from palpate import InputError, SearchOptions, identify, verify
 from palpate.identification.data.strokes import HysteresisInput
 from palpate.recording import Recording
 from palpate.verification import compare
@@ -42,7 +42,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
     noise = np.random.default_rng(2).normal(0.0, 0.005, len(x))
     force = np.tanh(6 * (x - 0.5)) + side * (0.2 + 0.1 * x) + noise
     recording = Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x)))
-    model = identify(recording, play_radius=(0.005, 0.01 / np.ptp(x), 0.02))
+    model = identify(recording, search=SearchOptions(play_radius=(0.005, 0.01 / np.ptp(x), 0.02)))
     assert model.play_radius == pytest.approx(0.01, rel=0.005)
     assert verify(model, recording).rmse < 1.05 * 0.005
 
@@ -56,7 +56,7 @@ def test_a_play_between_those_tried_is_found_and_costs_no_wavelets(radius: float
     force = 1.5 * np.tanh(12 * (x - 0.2)) + side * (0.1 + 0.1 * x)
     force += np.random.default_rng(2).normal(0.0, noise, len(x)) if noise else 0.0
     model = identify(Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x))))
-    assert (model.fit.rung, model.damping, model.mass) == ("hysteresis", None, None)
+    assert (model.fit.model_class, model.damping, model.mass) == ("hysteresis", None, None)
     assert model.play_radius == pytest.approx(radius, rel=0.005)
     assert model.n_wavelets <= 8
     assert model.fit.nrmse * np.std(force) < 1.02 * noise + 1e-4 * np.ptp(force)
@@ -78,7 +78,7 @@ def test_one_play_radius_is_taken_as_given() -> None:
     x = wandering(4000, 1)
     side = HysteresisInput.of_play([x], 0.01).side
     recording = Recording.from_arrays(x, x + 0.2 * side, time=1e-3 * np.arange(len(x)))
-    model = identify(recording, play_radius=(0.02,))
+    model = identify(recording, search=SearchOptions(play_radius=(0.02,)))
     assert model.play_radius == pytest.approx(0.02 * np.ptp(x))
 
 

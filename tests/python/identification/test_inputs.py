@@ -10,7 +10,7 @@ import pytest
 import palpate
 from palpate import InputError, Recording, identify, verify
 from palpate.cli.main import main
-from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
 
 
 def hunt_crossley(x: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def contact(seed: int, n: int = 4000) -> Recording:
 
 def test_a_force_of_position_and_velocity_is_identified_and_verified_on_fresh_data() -> None:
     model = identify(contact(0))
-    assert (model.kind, model.inputs, model.fit.rung) == (
+    assert (model.kind, model.inputs, model.fit.model_class) == (
         "position_velocity",
         ("position", "velocity"),
         "velocity",
@@ -65,7 +65,10 @@ def test_six_inputs_and_many_rows_need_no_grid() -> None:
     X = random.uniform(-1.0, 1.0, (30_000, 6))
     truth = np.exp(-2.0 * (X[:, 0] ** 2 + X[:, 3] ** 2)) + 0.5 * X[:, 1]
     network = fit_environment(
-        X, truth + random.normal(0.0, 0.02, len(X)), None, IdentifyOptions(max_wavelets=6, max_positions=64)
+        X,
+        truth + random.normal(0.0, 0.02, len(X)),
+        None,
+        IdentifyOptions(max_wavelets=6, search=SearchOptions(max_positions=64)),
     )
     assert network.nrmse < 0.5
     assert any("evenly spread, stand for all of them" in note for note in network.notes)

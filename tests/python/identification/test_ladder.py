@@ -6,9 +6,10 @@ import os
 import numpy as np
 import pytest
 
+import palpate
 from palpate import InputError
 from palpate._core.model import wavelet_columns
-from palpate.identification import IdentifyOptions, fit_environment
+from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
 from palpate.identification.network.fitted import FittedNetwork
 from palpate.identification.search.evidence import Samples
 
@@ -132,7 +133,7 @@ def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -
     assert any(note.startswith("hysteresis: h >= 0 imposed") for note in network.notes)
 
 
-def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> None:
+def test_noise_in_rows_that_one_model_class_does_not_see_is_no_evidence_for_it() -> None:
     """Where a motion begins its hysteresis input is unknown: luck with the noise there is no gain."""
     for draw in range(20 if not LONG else 200):
         time = np.arange(3000) / (2000.0 + 30.0 * draw)
@@ -143,16 +144,16 @@ def test_noise_in_rows_that_one_rung_does_not_see_is_no_evidence_for_it() -> Non
         assert told.startswith("hysteresis refused: bic rises by ")
 
 
-@pytest.mark.parametrize(("gain", "rung"), [(0.01, "constant"), (0.03, "position")])
+@pytest.mark.parametrize(("gain", "model_class"), [(0.01, "constant"), (0.03, "position")])
 def test_a_gain_on_fresh_rows_below_its_standard_error_earns_nothing(
-    gain: float, rung: str, monkeypatch: pytest.MonkeyPatch
+    gain: float, model_class: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Samples, "held_out_gain", lambda *rungs: (gain, 0.02))
+    monkeypatch.setattr(Samples, "held_out_gain", lambda *candidates: (gain, 0.02))
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    assert network.model_class == rung
-    verdict = "taken" if rung == "position" else "refused"
+    assert network.model_class == model_class
+    verdict = "accepted" if model_class == "position" else "refused"
     assert all(note.split()[1] == f"{verdict}:" for note in network.notes)
     assert all(note.endswith(f"falls by {100 * gain:g} +- 2 %") for note in network.notes)
 
@@ -190,8 +191,8 @@ def test_every_network_on_the_way_stands_in_the_path() -> None:
     x = np.linspace(0.0, 1.0, 400)
     y = np.maximum(x - 0.5, 0.0) * 10.0 + np.random.default_rng(8).normal(0.0, 0.01, 400)
     network = fit_environment(x[:, None], y)
-    rungs = [point.model_class for point in network.path]
-    assert rungs[:2] == ["constant", "linear"]
+    classes = [point.model_class for point in network.path]
+    assert classes[:2] == ["constant", "linear"]
     sizes = [point.n_wavelets for point in network.path if point.model_class == "position"]
     assert sizes[:-1] == list(range(len(sizes) - 1))
     assert sizes[-1] == len(network.weight)
@@ -244,7 +245,7 @@ def test_a_named_hysteresis_needs_directions_or_time() -> None:
         fit_environment(x[:, None], x, None, IdentifyOptions(inputs="position,hysteresis"))
 
 
-def test_named_inputs_decide_the_rung() -> None:
+def test_named_inputs_decide_the_model_class() -> None:
     random = np.random.default_rng(4)
     x = np.concatenate([np.linspace(0.0, 1.0, 100), np.linspace(1.0, 0.0, 100)])
     side = np.repeat([1.0, -1.0], 100)
@@ -262,11 +263,10 @@ def test_named_inputs_decide_the_rung() -> None:
         ({"criterion": "aic"}, "criterion is 'aic'; it must be one of bic"),
         ({"max_wavelets": -1}, "max_wavelets is -1"),
         ({"max_wavelets": 2.5}, "max_wavelets is 2.5"),
-        ({"frame_scale": 1.0}, "frame_scale is 1.0"),
+        ({"search": {"frame_scale": 1.0}}, "search is"),
         ({"coupling_stiffness": -5.0}, "coupling_stiffness is -5.0"),
         ({"slope_bounds": (3.0, 1.0)}, r"slope_bounds is \(3.0, 1.0\)"),
         ({"slope_bounds": (95.0, 200.0), "coupling_stiffness": 100.0}, "allow no more than 90"),
-        ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
         ({"period": float("nan")}, "period is nan"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
@@ -276,6 +276,26 @@ def test_a_bad_option_is_refused_by_name_and_value(options: dict[str, object], t
         IdentifyOptions(**options)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"frame_scale": 1.0}, "frame_scale is 1.0"),
+        ({"play_radius": (0.01, 0.0)}, "play_radius is 0.0"),
+        ({"selection": "luck"}, "selection is 'luck'; it must be one of orthogonal"),
+        ({"patience": 0}, "patience is 0; it must be a whole number of 1 or more"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_a_bad_search_setting_is_refused_by_name_and_value(setting: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        SearchOptions(**setting)  # type: ignore[arg-type]
+
+
+def test_a_search_setting_given_as_an_option_names_the_cure() -> None:
+    with pytest.raises(InputError, match=r"no option 'patience'; give search=SearchOptions\(patience="):
+        palpate.identify(np.arange(20.0), np.arange(20.0), patience=5)
+
+
 def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() -> None:
     """As a recording whose time has a gap every few rows."""
     x = np.linspace(0.0, 1.0, 600)
@@ -283,7 +303,7 @@ def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() ->
     starts = [0, *range(70, len(x), 3)]
     network = fit_environment(x[:, None], force, starts=starts)
     assert network.model_class == "linear"
-    assert any(note.startswith("hysteresis was not tried: the motions") for note in network.notes)
+    assert any(note.startswith("hysteresis was not tested: the motions") for note in network.notes)
     with pytest.raises(InputError, match="inputs names hysteresis, but the motions"):
         fit_environment(
             x[:, None], force, starts=starts, options=IdentifyOptions(inputs=("position", "hysteresis"))

@@ -182,7 +182,7 @@ def test_hysteresis_is_tried_without_a_direction(tmp_path: Path, suffix: str) ->
     stated = written(rows(4000), tmp_path / f"stated.{suffix}")
     silent = written(rows(4000).drop(columns="direction"), tmp_path / f"silent.{suffix}")
     expected, model = palpate.identify_files(stated), palpate.identify_files(silent)
-    assert model.fit.rung == expected.fit.rung == "hysteresis"
+    assert model.fit.model_class == expected.fit.model_class == "hysteresis"
     assert model.fit.nrmse < 0.02
     assert "direction is taken from the order of rows, block by block" in model.notes["identification"]
     x = np.linspace(0.05, 0.55, 100)

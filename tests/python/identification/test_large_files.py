@@ -99,7 +99,7 @@ def test_the_model_is_that_of_all_rows_at_once(tmp_path: Path, suffix: str, step
     frame.to_csv(file, index=False) if suffix == "csv" else frame.to_parquet(file, row_group_size=4_000)
     model = palpate.identify_files(file, part_rows=7_000)
     at_once = palpate.identify(palpate.read_recording(file))
-    assert model.fit.rung == at_once.fit.rung == "hysteresis"
+    assert model.fit.model_class == at_once.fit.model_class == "hysteresis"
     assert model.data.rows == 30_000
     assert model.data.sha256 == at_once.data.sha256
     assert model.fit.nrmse == pytest.approx(at_once.fit.nrmse, rel=2e-2)
@@ -131,7 +131,7 @@ def test_units_signs_and_several_files(tmp_path: Path) -> None:
     model = palpate.identify_files([tmp_path / "a.csv", tmp_path / "b.csv"], negate=["position"])
     assert model.force(0.002) == pytest.approx(1.0, rel=1e-6)
     assert model.units == {"position": "m", "force": "N"}
-    assert (model.fit.rung, model.data.rows, len(model.data.files)) == ("linear", 800, 2)
+    assert (model.fit.model_class, model.data.rows, len(model.data.files)) == ("linear", 800, 2)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])

@@ -38,7 +38,7 @@ def test_outliers_do_not_hide_hysteresis(share: float) -> None:
     y = wall(x) + side + noise(N)
     recording = palpate.Recording.from_arrays(x, with_outliers(y, share), direction=side)
     model = palpate.identify(recording, loss="huber")
-    assert model.fit.rung == "hysteresis"
+    assert model.fit.model_class == "hysteresis"
     truth = wall(x) + side
     error = model.force(x, direction=side.astype(float)) - truth
     assert np.sqrt(np.mean(error**2)) < 0.003 * np.std(truth)

@@ -105,7 +105,7 @@ PLAN = {
 
 
 def test_everything_that_a_model_carries_comes_back(tmp_path: Path) -> None:
-    step = {"n_wavelets": 0, "rmse": 0.25, "criterion": None, "rung": "linear"}
+    step = {"n_wavelets": 0, "rmse": 0.25, "criterion": None, "model_class": "linear"}
     model = Model(
         **content(
             hysteresis=True,
@@ -144,7 +144,7 @@ def test_numpy_numbers_are_saved_like_any_other(tmp_path: Path) -> None:
         "n_wavelets": np.int64(N),
         "rmse": np.float64(0.1),
         "criterion": np.float64(2.0),
-        "rung": "network",
+        "model_class": "network",
     }
     fit = Fit("network", "bic", np.float64(0.1), np.int64(N), np.int64(17), [step])  # type: ignore[arg-type,list-item]
     model = Model(**content(fit=fit))
@@ -239,7 +239,7 @@ def test_the_file_has_a_line_for_each_field(tmp_path: Path) -> None:
 
 def test_a_model_can_be_read_by_a_person() -> None:
     text = str(Model(**content(hysteresis=True, play_radius=1e-4, wavelets=2)))
-    assert "hysteresis model: 2 wavelets, 8 parameters (rung network, stopped by bic)" in text
+    assert "hysteresis model: 2 wavelets, 8 parameters (model class network, stopped by bic)" in text
     assert "NRMSE 0.001 on 100 rows of a.csv" in text
     assert "position from 0 to 0.6 m" in text
     assert "play radius 0.0001 m" in text

@@ -192,10 +192,10 @@ def test_a_variant_is_read_as_the_clean_recording(tmp_path: Path, seed: int) -> 
 
 
 def same_model(model: palpate.Model, expected: palpate.Model, clean: Recording) -> None:
-    assert model.fit.rung == expected.fit.rung
+    assert model.fit.model_class == expected.fit.model_class
     assert model.fit.nrmse == pytest.approx(expected.fit.nrmse, rel=0.01)
     x = np.linspace(clean.position.min(), clean.position.max(), 50)
-    sides: tuple[float | None, ...] = (1.0, -1.0) if model.fit.rung == "hysteresis" else (None,)
+    sides: tuple[float | None, ...] = (1.0, -1.0) if model.fit.model_class == "hysteresis" else (None,)
     for side in sides:
         direction = None if side is None else np.full(len(x), side)
         difference = model.force(x, direction=direction) - expected.force(x, direction=direction)

@@ -179,7 +179,7 @@ def test_the_command_identifies_and_verifies_two_columns(
     assert main(["identify", files[0], "-o", model, "--json", *hold_out]) == 0
     captured = capsys.readouterr()
     result = json.loads(captured.out)
-    assert result["rung"] == "hysteresis"
+    assert result["model_class"] == "hysteresis"
     assert result["verdict"] == "good"
     # The average of the strokes has 0.16. Of the held-out rows one lies at the turn, where the force jumps.
     assert result["nrmse"] < 0.04

@@ -8,33 +8,26 @@ import numpy as np
 import pytest
 
 from palpate import InputError, Model, Recording, Scheme
-from palpate.model import Fit
-from palpate.recording import Source, sample_recording
+from palpate.recording import sample_recording
 from palpate.verification import force_driven, motion_driven
 from palpate.verification.closed_loop import even_motion
 
 RAD = {"position": "rad", "force": "N*m"}
-NOWHERE = Source((), "", 0, {})
 
 
 def spring(stiffness: float = 2.0, hysteresis: float = 0.0, **change: Any) -> Model:
     given: dict[str, Any] = {
-        "kind": "hysteresis" if hysteresis else "position",
-        "inputs": ["position"],
         "units": RAD,
         "alpha": np.empty((0, 1)),
         "beta": np.empty((0, 1)),
         "weight": [],
         "linear": [stiffness],
-        "bias": 0.0,
         "lower": [-1.0],
         "upper": [1.0],
-        "fit": Fit("linear", "bic", 0.0, 0, 2),
-        "data": NOWHERE,
     }
     if hysteresis:
         given |= {"weight_hysteresis": [], "linear_hysteresis": [0.0], "bias_hysteresis": hysteresis}
-    return Model(**given | change)
+    return Model.from_network(**given | change)
 
 
 def sweep(stiffness: float = 2.0, timed: bool = True, seconds: float = 4.0) -> Recording:

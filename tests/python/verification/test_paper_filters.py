@@ -6,7 +6,7 @@ import pytest
 
 from palpate import InputError, Recording, identify
 from palpate._core.dynamics import environment_filters
-from palpate.identification import IdentifyOptions
+from palpate.identification import IdentifyOptions, SearchOptions
 from palpate.identification.data.rows import paper_target
 from palpate.recording import sample_force, sample_recording
 
@@ -25,7 +25,7 @@ def spring(rate: float, *, mass: float = 0.0, damping: float = 0.0) -> Recording
 def test_a_slow_motion_leaves_the_static_force(filters: str, mass: float, damping: float) -> None:
     """G I is within 5 % of 1 well below 100 rad/s; what is left of m and B_o is small."""
     recording = spring(4.0, mass=mass, damping=damping)
-    options = IdentifyOptions(filters=filters, assumed_mass=0.02, assumed_damping=0.5)
+    options = IdentifyOptions(search=SearchOptions(filters=filters, assumed_mass=0.02, assumed_damping=0.5))
     target = paper_target(recording, options)[200:]
     wrong = np.abs(target - 3.0 * recording.position[200:]).max()
     assert wrong < 0.1 * np.abs(recording.force - 3.0 * recording.position).max() + 0.01
@@ -33,7 +33,9 @@ def test_a_slow_motion_leaves_the_static_force(filters: str, mass: float, dampin
 
 def test_the_target_is_the_force_less_the_filtered_motion() -> None:
     recording = spring(20.0)
-    options = IdentifyOptions(filters="paper-explicit", assumed_mass=0.01, assumed_damping=0.2)
+    options = IdentifyOptions(
+        search=SearchOptions(filters="paper-explicit", assumed_mass=0.01, assumed_damping=0.2)
+    )
     pair = environment_filters("explicit")
     velocity = pair.g2.filter(recording.position)
     expected = recording.force - 0.01 * pair.g1.filter(velocity) - 0.2 * velocity
@@ -42,9 +44,9 @@ def test_the_target_is_the_force_less_the_filtered_motion() -> None:
 
 def test_the_model_holds_the_assumed_mass_and_damping() -> None:
     recording = sample_recording(1, duration_s=5.0)
-    model = identify(recording, filters="paper-explicit")
+    model = identify(recording, search=SearchOptions(filters="paper-explicit"))
     assert (model.mass, model.damping) == (1e-3, 0.5)
-    assert identify(recording, filters="paper-implicit").damping is None
+    assert identify(recording, search=SearchOptions(filters="paper-implicit")).damping is None
 
 
 def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> None:
@@ -53,7 +55,11 @@ def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> N
     x = np.linspace(-0.2, 0.469, 2001)
     truth = sample_force(x)
     errors = {
-        filters: float(np.sqrt(np.mean((identify(recording, filters=filters).force(x) - truth) ** 2)))
+        filters: float(
+            np.sqrt(
+                np.mean((identify(recording, search=SearchOptions(filters=filters)).force(x) - truth) ** 2)
+            )
+        )
         for filters in ("matched", "paper-implicit", "paper-explicit")
     }
     assert errors["matched"] < 0.25 * errors["paper-implicit"] < 0.25 * errors["paper-explicit"]
@@ -62,6 +68,9 @@ def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> N
 def test_other_periods_than_the_papers_are_refused() -> None:
     x = np.linspace(0.0, 1.0, 100)
     with pytest.raises(InputError, match=r"filters need time"):
-        identify(Recording.from_arrays(x, x), filters="paper-implicit")
+        identify(Recording.from_arrays(x, x), search=SearchOptions(filters="paper-implicit"))
     with pytest.raises(InputError, match=r"made for steps of 0.001 s; the recording's are from 0.01 to 0.01"):
-        identify(Recording.from_arrays(x, x, time=0.01 * np.arange(100)), filters="paper-explicit")
+        identify(
+            Recording.from_arrays(x, x, time=0.01 * np.arange(100)),
+            search=SearchOptions(filters="paper-explicit"),
+        )

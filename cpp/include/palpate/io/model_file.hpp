@@ -47,17 +47,17 @@ namespace detail {
 }
 
 inline void check_fit(const JsonField& fit, std::size_t wavelets) {
-    fit.only({"rung", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
-    (void)fit["rung"].words();
+    fit.only({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
+    (void)fit["model_class"].words();
     (void)fit["stop_reason"].words();
     (void)fit["nrmse"].not_negative();
     (void)fit["n_parameters"].count(0);
     for (const JsonField& step : fit["path"].items()) {
-        step.only({"n_wavelets", "rmse", "criterion", "rung"});
+        step.only({"n_wavelets", "rmse", "criterion", "model_class"});
         (void)step["n_wavelets"].count(0);
         (void)step["rmse"].not_negative();
         (void)(step["criterion"].is_null() ? 0.0 : step["criterion"].number());
-        (void)step["rung"].words();
+        (void)step["model_class"].words();
     }
     fit["n_wavelets"].require(fit["n_wavelets"].count(0) == wavelets,
                               std::to_string(wavelets) + ", the wavelets of the network");

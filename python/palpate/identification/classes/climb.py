@@ -2,8 +2,8 @@
 """Model selection: every model class in turn, from constant to hysteresis, on the rows of one recording.
 
 A class is judged on the same samples by the same criterion as the one below it, with its constraints imposed.
-It is accepted only if the criterion falls by `rung_evidence` or more and if the error falls on held-out rows
-too. What a class gains, or would have gained, stands in the notes, its networks in the path.
+It is accepted only if the criterion falls by `evidence` (of :class:`SearchOptions`) or more and if the error
+falls on held-out rows too. What a class gains, or would have gained, stands in the notes.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ class Climb:
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > WORTH_REGROWING * candidate.rmse
-        if options.refine and worse and len(kept.basis) and not all(bound.seam for bound in bounds):
+        if options.search.refine and worse and len(kept.basis) and not all(bound.seam for bound in bounds):
             moved = moved_to_bounds(problem, candidate.rows, candidate.solution, bounds)
             compatible = self.samples.problem(moved, candidate.strokes)
             regrown = self.grown(compatible, candidate.solution.basis, candidate.model_class)

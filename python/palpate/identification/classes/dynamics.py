@@ -25,7 +25,7 @@ from ..options import IdentifyOptions
 from ..search.criteria import CRITERIA, ON_HELD_OUT_ROWS
 
 FOLDS = 10
-"""Stretches of the recording that are fresh in turn."""
+"""Stretches of the recording that are held out in turn."""
 
 NAMES = ("damping", "mass")
 """What multiplies the columns v and a."""
@@ -61,7 +61,7 @@ class FoldedRegression:
         columns = self._columns(two_sided, names)
         return [float(value) for value in self._solution(self._grams.sum(axis=0), columns)[: len(names)]]
 
-    def fresh_gain(
+    def held_out_gain(
         self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
     ) -> tuple[float, float]:
         """Fall of the squared error in folds that were left out of the fit, as a share, and its error."""
@@ -105,7 +105,7 @@ LEAST_SPREAD = 0.19
 """Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
 v is hardly more than its sign, and damping no other than friction."""
 
-TOO_SHORT = "velocity and mass were not tried: the motion between gaps of time is too short, or too noisy"
+TOO_SHORT = "velocity and mass were not tested: the motion between gaps of time is too short, or too noisy"
 
 SLOW = 0.1
 """Speed at which the smoothed sign of the velocity is tanh(1), as a share of the RMS speed."""
@@ -137,7 +137,7 @@ class Terms:
 
     @property
     def name(self) -> str:
-        """The rung that they are."""
+        """The model class that they make."""
         return "velocity" if self.mass is None else "mass and damping"
 
 
@@ -199,8 +199,8 @@ class Dynamics:
         notes = []
         if not settled and "damping" in allowed and (spread := self._spread_of_speeds()) < LEAST_SPREAD:
             notes.append(
-                f"velocity was not tried: along the way the speed differs by {100 * spread:.2g} %, and what "
-                "moves at one speed does not tell damping from hysteresis; move slowly and fast"
+                f"damping was not tested: the speed was nearly constant (varies by {100 * spread:.2g} %), so "
+                "that damping and hysteresis look alike; record slow and fast strokes"
             )
             allowed = tuple(name for name in allowed if name != "damping")
         choices = [
@@ -213,7 +213,8 @@ class Dynamics:
             choices = [(side is not None, tuple(allowed))]
         criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
         valued = {
-            (use, names): regression.value(use, names, criterion) + options.rung_evidence * (len(names) + use)
+            (use, names): regression.value(use, names, criterion)
+            + options.search.evidence * (len(names) + use)
             for use, names in choices
         }
         use, names = min(valued, key=lambda choice: valued[choice])
@@ -229,18 +230,17 @@ class Dynamics:
             if name not in names:
                 notes.append(f"{name} refused: {changes}")
                 continue
-            share, error = regression.fresh_gain(use, without, with_it)
+            share, error = regression.held_out_gain(use, without, with_it)
             found = dict(zip(with_it, regression.solved(use, with_it), strict=True))[name]
             way = "falls" if share > 0.0 else "rises"
-            fresh = (
-                f"the squared error on fresh stretches {way} by {100 * abs(share):.3g} +- {100 * error:.2g} %"
-            )
+            by = f"{100 * abs(share):.3g} +- {100 * error:.2g} %"
+            measured = f"the squared error on held-out stretches {way} by {by}"
             if share > error and found > 0.0:
-                notes.append(f"{name} taken: {changes}, {fresh}")
+                notes.append(f"{name} accepted: {changes}, {measured}")
                 continue
             names = tuple(other for other in names if other != name)
             notes.append(
-                f"{name} refused: {changes}, but {fresh if found > 0.0 else f'it would be {found:.4g}'}"
+                f"{name} refused: {changes}, but {measured if found > 0.0 else f'it would be {found:.4g}'}"
             )
         return Terms(*_values(regression.solved(use, names), names), use, tuple(notes))
 

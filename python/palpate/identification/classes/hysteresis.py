@@ -237,7 +237,7 @@ class PlaySearch:
         self, samples: Samples, path: Float1D, starts: Sequence[int], options: IdentifyOptions
     ) -> None:
         self._samples, self._path, self._starts = samples, path, list(starts)
-        self._radii, self._evidence = sorted(options.play_radius), options.rung_evidence
+        self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
     def best_tried(self, basis: Basis) -> HysteresisInput | None:
         """The hysteresis input of that radius of the options which helps most on given wavelets.

@@ -71,7 +71,7 @@ def model_classes(climb: Climb) -> list[ModelClass]:
 
 def select(rows: BoxRows, options: IdentifyOptions, *, on_held_out: bool = True) -> Selected:
     """Selects a model with cells that are fine enough, with outliers weighed down if the loss is Huber's."""
-    cells = options.max_positions * 2 ** (rows.box.shape[1] - 1)
+    cells = options.search.max_positions * 2 ** (rows.box.shape[1] - 1)
     given, robust = rows.weight, options.loss == "huber"
     if robust:
         suspect = suspects(rows.box, rows.force, rows.side, given)

@@ -135,8 +135,8 @@ class Compressor:
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
-            # All sides of a cell and of its neighbours share one slope, so that it costs all rungs the same
-            # few degrees of freedom.
+            # All sides of a cell and of its neighbours share one slope: it costs the same few degrees of freedom
+            # in all model classes.
             block = self._pooled()
             dy = _without_slopes(dy, dx, block, weight)
             ds = _without_slopes(ds, dx, block, weight) if ds.any() else ds

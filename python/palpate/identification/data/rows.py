@@ -13,16 +13,11 @@ from ..._core.dynamics import environment_filters, paper_sample_time_s
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
+from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, pieces, velocity
 from ...verdict import Finding, no, usable
 from ..options import IdentifyOptions
 from .strokes import strokes_of
-
-LEAST_ROWS = 10
-"""Rows below which nothing is identified."""
-
-LEAST_POSITIONS = 3
-"""Distinct positions below which nothing is identified."""
 
 LARGEST = 1e100
 """Largest absolute value, and the inverse of the smallest travel and force, that is identified."""
@@ -40,8 +35,8 @@ def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> 
         raise InputError(
             f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
         )
-    if len(force) < LEAST_ROWS:
-        raise InputError(f"the recording has {len(force)} rows; {LEAST_ROWS} or more are needed")
+    if len(force) < MIN_ROWS:
+        raise InputError(f"the recording has {len(force)} rows; {MIN_ROWS} or more are needed")
     for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
@@ -59,10 +54,10 @@ def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> 
             raise InputError(f"{name} spans {travel:.3g}; the least is {1.0 / LARGEST:g}. Use another unit")
         if column.min() == column.max():
             raise InputError(f"every {name} is {column[0]:g}; identifying needs one that moves")
-        if len(np.unique(column)) < LEAST_POSITIONS:
+        if len(np.unique(column)) < MIN_POSITIONS:
             raise InputError(
                 f"{name} takes only {len(np.unique(column))} distinct values; "
-                f"{LEAST_POSITIONS} or more are needed"
+                f"{MIN_POSITIONS} or more are needed"
             )
 
 
@@ -133,7 +128,7 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
         strokes = strokes_of(recordings, named=options.inputs != "auto")
         side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
-    if options.filters == "matched":
+    if options.search.filters == "matched":
         forces = [part.force for part in recordings]
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
@@ -216,11 +211,11 @@ def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
             f"the paper's filters are made for steps of {paper_sample_time_s:g} s; the recording's are from "
             f"{steps.min():g} to {steps.max():g} s"
         )
-    filters = environment_filters(options.filters.removeprefix("paper-"), "paper")
+    filters = environment_filters(options.search.filters.removeprefix("paper-"), "paper")
     velocity = filters.g2.filter(recording.position - recording.position[0])
-    target = recording.force - options.assumed_mass * filters.g1.filter(velocity)
-    if options.filters == "paper-explicit":
-        target = target - options.assumed_damping * velocity
+    target = recording.force - options.search.assumed_mass * filters.g1.filter(velocity)
+    if options.search.filters == "paper-explicit":
+        target = target - options.search.assumed_damping * velocity
     return np.asarray(target)
 
 

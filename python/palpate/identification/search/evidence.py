@@ -146,7 +146,7 @@ class Samples:
     ) -> None:
         self.box, self.force = box, force
         self._held_out, self._compressor = held_out, compressor
-        self._resolved_by, self._periodic = options.resolved_by, options.period is not None
+        self._resolved_by, self._periodic = options.search.resolved_by, options.period is not None
         self._for_criterion = options.criterion in ON_HELD_OUT_ROWS
 
     def rows(self, strokes: HysteresisInput | None = None) -> Compressed:
@@ -244,7 +244,7 @@ class Judge:
     def __init__(
         self, samples: Samples, options: IdentifyOptions, report: Report, *, on_held_out: bool = True
     ) -> None:
-        self.criterion, self.evidence = options.criterion, options.rung_evidence
+        self.criterion, self.evidence = options.criterion, options.search.evidence
         self._samples, self._report, self.on_held_out = samples, report, on_held_out
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:

@@ -82,8 +82,9 @@ class Growth:
     """
 
     def __init__(self, options: IdentifyOptions, *, single: bool = True) -> None:
-        self._options, self._single = options, single
-        self._refine = refine_all if options.refinement == "quasi-newton" else refine
+        self._search, self._criterion, self._most = options.search, options.criterion, options.max_wavelets
+        self._single = single
+        self._refine = refine_all if options.search.refinement == "quasi-newton" else refine
 
     def grow(
         self,
@@ -103,11 +104,11 @@ class Growth:
         the frame, nor where held-out rows judge. A smooth force over several inputs is left to wide wavelets.
         Correlated noise, and the steps of a force, look like structure and are not.
         """
-        options = self._options
-        most = options.max_wavelets if most is None else most
-        coarse = not options.refine or options.selection == "backward"
+        search = self._search
+        most = self._most if most is None else most
+        coarse = not search.refine or search.selection == "backward"
         free = self._single and not coarse and problem.n_channels == 1
-        free = free and options.criterion not in ON_HELD_OUT_ROWS
+        free = free and self._criterion not in ON_HELD_OUT_ROWS
         wide = free and problem.dimension > 1
         library = library or self.library(problem)
         found = self._grown(problem, library, start, model_class, most, wide=wide)
@@ -124,22 +125,22 @@ class Growth:
             return found
         fine = replace(problem, resolved_by=WITHOUT_NOISE)
         finer = self._grown(fine, self.library(fine), found.solution.basis, model_class, most)
-        earned = alike and finer.criterion + options.rung_evidence < found.criterion
+        earned = alike and finer.criterion + search.evidence < found.criterion
         if earned or problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
             return replace(finer, path=(*found.path[:-1], finer.path[-1]))
         return replace(found, problem=problem.with_prior(found.solution.rss))
 
     def library(self, problem: SeparableProblem) -> Library:
         """The truncated frame over the rows of a problem, down to what they resolve."""
-        options = self._options
+        search = self._search
         positions = np.concatenate([block.positions for block in problem.blocks])
         frame = truncated_frame(
             positions,
             coarsest=COARSEST_CANDIDATE,
             finest=float(problem.finest(positions).max()),
-            frame_scale=options.frame_scale,
-            frame_step=options.frame_step,
-            max_candidates=max(1, min(options.max_candidates, LIBRARY_ENTRIES // len(positions))),
+            frame_scale=search.frame_scale,
+            frame_step=search.frame_step,
+            max_candidates=max(1, min(search.max_candidates, LIBRARY_ENTRIES // len(positions))),
         )
         return Library(problem, frame)
 
@@ -157,7 +158,7 @@ class Growth:
                 rest = problem.solve(current.basis.without(int(index)))
                 if self._judged(problem, rest) > value + PRUNE_HOPE * self._price(problem, current):
                     break
-                problem, trial = self._improved(problem, rest, self._options.refine_steps)
+                problem, trial = self._improved(problem, rest, self._search.refine_steps)
                 if self._judged(problem, trial) < value:
                     current, value, removed = trial, self._judged(problem, trial), True
                     break
@@ -181,18 +182,17 @@ class Growth:
         they choose the size and nothing is pruned. With wide, wide wavelets alone have one try, once the
         error is half way, in digits, from the force's range to what a sensor resolves.
         """
-        options = self._options
-        criterion = options.criterion
+        search, criterion = self._search, self._criterion
         problem = problem.with_prior(problem.solve(start).rss)
-        if options.selection == "backward":
+        if search.selection == "backward":
             selected = select_backward(problem, library, max_wavelets=most, criterion=criterion)
             start = start.joined(library.members(selected.order[: selected.best]))
-        problem, current = self._improved(problem, problem.solve(start), options.refine_steps)
+        problem, current = self._improved(problem, problem.solve(start), search.refine_steps)
         path, grown = [self._point(problem, current, model_class)], [current]
         best, since, stop_reason = path[0].criterion, 0, "max_wavelets"
         while len(current.basis) < most:
             report(model_class, len(current.basis))
-            if enough(criterion, path[-1].criterion) or options.selection == "backward":
+            if enough(criterion, path[-1].criterion) or search.selection == "backward":
                 stop_reason = criterion
                 break
             if wide and problem.rmse(current) <= np.sqrt(RESOLVED) * problem.force_range:
@@ -203,12 +203,12 @@ class Growth:
             if added is None:
                 stop_reason = "data"
                 break
-            problem, current = self._improved(problem, added, options.refine_steps)
+            problem, current = self._improved(problem, added, search.refine_steps)
             path.append(self._point(problem, current, model_class))
             grown.append(current)
             since = 0 if path[-1].criterion < best else since + 1
             best = min(best, path[-1].criterion)
-            if since >= options.patience * problem.dimension:
+            if since >= search.patience * problem.dimension:
                 stop_reason = criterion
                 break
         if problem.held_out is not None and criterion in ON_HELD_OUT_ROWS:
@@ -216,7 +216,7 @@ class Growth:
             pruned = grown[choice(criterion, values, len(problem.held_out.force))]
         else:
             problem, pruned = self.prune(problem, current)
-        problem, final = self._improved(problem, pruned, options.final_steps, FINAL_TOLERANCE)
+        problem, final = self._improved(problem, pruned, search.final_steps, FINAL_TOLERANCE)
         path.append(self._point(problem, final, model_class))
         if len(final.basis) < most and stop_reason == "max_wavelets":
             stop_reason = criterion
@@ -240,7 +240,7 @@ class Growth:
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
         """What the criterion charges for one of the solution's wavelets."""
-        price, n = CRITERIA[self._options.criterion], len(solution.basis)
+        price, n = CRITERIA[self._criterion], len(solution.basis)
         return price(problem.independent, problem.n_parameters(n)) - price(
             problem.independent, problem.n_parameters(n - 1)
         )
@@ -254,12 +254,12 @@ class Growth:
         each of them as well, and a few that differ are refined a little before one is taken: what fits best
         unrefined often ends in a worse minimum.
         """
-        options = self._options
+        search = self._search
         if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.independent:
             return None
-        measured = residual_gains if options.selection == "residual" else orthogonal_gains
+        measured = residual_gains if search.selection == "residual" else orthogonal_gains
         gains = measured(library, current)
-        several = problem.dimension > 1 and options.refine
+        several = problem.dimension > 1 and search.refine
         if several:
             library = library.stretched(problem, _falling(gains)[:STRETCHED])
             gains = measured(library, current)
@@ -275,13 +275,13 @@ class Growth:
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
     ) -> tuple[SeparableProblem, Solution]:
         """Refines, then lets the prior on the weights follow the noise level that is left."""
-        if self._options.refine:
+        if self._search.refine:
             solution = self._refine(problem, solution, steps=steps, tolerance=tolerance)
         problem = problem.with_prior(solution.rss)
         return problem, problem.solve(solution.basis)
 
     def _judged(self, problem: SeparableProblem, solution: Solution) -> float:
-        return criterion_of(problem, solution, self._options.criterion)
+        return criterion_of(problem, solution, self._criterion)
 
     def _point(self, problem: SeparableProblem, solution: Solution, model_class: str) -> PathPoint:
         return PathPoint(

@@ -11,7 +11,6 @@ import pytest
 from models_by_hand import model_by_hand
 from palpate import DeviceProfile, Model, Scheme, plan
 from palpate._core.stability import balancing_shift, certify
-from palpate.model import Fit
 from palpate.planning import profile_file
 from palpate.planning.choices import renderable_slopes
 from palpate.planning.limited_network import limit_slopes
@@ -30,7 +29,6 @@ def wheel() -> Model:
         linear=[0.0],
         upper=[TURN],
         period=TURN,
-        fit=Fit("network", "bic", 0.01, 3, 9),
     )
     return model.with_network(bias=model.bias + balancing_shift(model, math.inf))
 
