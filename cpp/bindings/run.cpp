@@ -159,11 +159,12 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     options.rate_given = given.contains("rate_hz") && !given["rate_hz"].is_none();
     const PlannedModel planned{model_name, model, position_unit, force_unit, plan, limited, certificate};
     const auto device = open_device(options, planned);
-    const RenderJob job = settle(options, planned, *device);
+    RecordSinks sinks;
+    const RenderJob job = settle(options, planned, *device, sinks);
     Watcher watcher{progress, &LoopProgress::force};
     const auto summary = [&] {
         const py::gil_scoped_release unlocked;
-        return render(options, planned, job, *device, watcher.stop_requested, std::ref(watcher));
+        return render(options, planned, job, *device, sinks, watcher.stop_requested, std::ref(watcher));
     }();
     watcher.rethrow();
     py::dict result = python_of(fields(summary));

@@ -84,7 +84,8 @@ int exit_code_after_output(int code) {
 int run(const Options& options) {
     const PlannedModel model = read_model(options.model);
     const auto device = open_device(options.render, model);
-    const RenderJob job = settle(options.render, model, *device);
+    RecordSinks sinks;
+    const RenderJob job = settle(options.render, model, *device, sinks);
     const LoopSettings& loop = job.session.loop;
     std::cerr << model.name << ": " << job.model.parameters().weight.size() << " wavelets, "
               << describe(job.scheme) << "; " << device->title << " at " << readable(loop.rate_hz) << " Hz "
@@ -95,7 +96,7 @@ int run(const Options& options) {
     }
     handle_signals();
     LiveView view{loop, model.units()};
-    const Summary summary = render(options.render, model, job, *device, stop_requested,
+    const Summary summary = render(options.render, model, job, *device, sinks, stop_requested,
                                    [&](const SessionView& now) { view.show(now); });
     view.end();
     print_summary(summary, options.as_json);

@@ -234,10 +234,10 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
 
 }  // namespace detail
 
-/// Settles scheme, guards and rate of a rendering on an open device. A real device requires a certificate that holds for
+/// Settles scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a certificate that holds for
 /// it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a refusal.
 [[nodiscard]] inline RenderJob settle(const RenderOptions& options, const PlannedModel& model,
-                                      const LiveDevice& device) {
+                                      const LiveDevice& device, RecordSinks& sinks) {
     std::string reason = void_reason(options, model);
     if (!device.simulated && !options.uncertified) {
         reason = detail::certificate_mismatch(options, model, device.profile);
@@ -277,19 +277,20 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
                                                : "yes");
     job.metadata =
         flight_metadata(options.created_by, job.metadata, model.name, job.scheme, job.guards, loop.rate_hz);
+    if (std::error_code ignored;
+        !options.record.empty() && std::filesystem::equivalent(options.record, model.name, ignored)) {
+        refuse("--record " + options.record + " is the model; writing there would destroy it");
+    }
+    if (std::string note = detail::open_sinks(options, model.units(), job.metadata, sinks); !note.empty()) {
+        job.notes.push_back(std::move(note));
+    }
     return job;
 }
 
 /// Renders a model on an open device until the loop ends, then closes the device.
 [[nodiscard]] inline Summary render(const RenderOptions& options, const PlannedModel& model,
-                                    const RenderJob& job, LiveDevice& device,
+                                    const RenderJob& job, LiveDevice& device, RecordSinks& sinks,
                                     const std::atomic<bool>& stop_requested, const Watch& watch) {
-    if (std::error_code ignored;
-        !options.record.empty() && std::filesystem::equivalent(options.record, model.name, ignored)) {
-        refuse("--record " + options.record + " is the model; writing there would destroy it");
-    }
-    RecordSinks sinks;
-    const std::string note = detail::open_sinks(options, model.units(), job.metadata, sinks);
     const double period_s = 1.0 / job.session.loop.rate_hz;
     SessionReport report =
         with_structure(job.model, job.scheme, period_s, job.guards.force_limit, [&](auto structure) {
@@ -305,9 +306,6 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
                         .position_unit = model.position_unit},
                        device);
     summary.notes = job.notes;
-    if (!note.empty()) {
-        summary.notes.push_back(note);
-    }
     return summary;
 }
 
