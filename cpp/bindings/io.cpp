@@ -86,7 +86,8 @@ Json to_json(const py::handle& value, int depth = 0) {
         }
         return items;
     }
-    throw std::invalid_argument("the file cannot hold " + py::repr(value).cast<std::string>());
+    throw std::invalid_argument("the file cannot hold a value of type " +
+                                py::str(py::type::of(value).attr("__name__")).cast<std::string>());
 }
 
 }  // namespace

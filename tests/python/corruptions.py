@@ -28,7 +28,7 @@ import palpate
 from conftest import measured_data
 from palpate.recording.sample import sample_recording
 
-sys.path.append(str(Path(__file__).parents[2] / "bench"))
+sys.path.append(str(Path(__file__).parents[2] / "bench" / "identification"))
 problems = importlib.import_module("problems")
 
 Array = NDArray[np.float64]

@@ -143,7 +143,7 @@ def test_frames_of_every_kind_of_column_are_read_alike() -> None:
 def test_options_of_identify_stand_in_signature_and_help() -> None:
     shown = inspect.signature(identify).parameters
     for each in fields(IdentifyOptions):
-        assert shown[each.name].default == each.default
+        assert shown[each.name].default == getattr(IdentifyOptions(), each.name)
         assert f"\n{each.name} : " in (identify.__doc__ or "")
         assert f"\n{each.name} : " in (IdentifyOptions.__doc__ or "")
     assert "Largest network that is tried" in (identify.__doc__ or "")

@@ -9,7 +9,6 @@
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/simulation/closed_loop.hpp"
-#include "palpate/simulation/closed_loop.hpp"
 #include "scenes.hpp"
 #include "support.hpp"
 

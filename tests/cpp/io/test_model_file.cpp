@@ -25,8 +25,9 @@ std::string bytes(const std::string& text) {
     for (std::size_t k = 0; k < text.size(); ++k) {
         const auto lead = static_cast<unsigned char>(text[k]);
         const bool two = lead >= 0x80U;
-        result += two ? static_cast<char>(((lead & 3U) << 6U) | (static_cast<unsigned char>(text[k + 1]) & 63U))
-                      : text[k];
+        result +=
+            two ? static_cast<char>(((lead & 3U) << 6U) | (static_cast<unsigned char>(text[k + 1]) & 63U))
+                : text[k];
         k += two ? 1 : 0;
     }
     return result;
@@ -44,7 +45,8 @@ std::string text_of(const Json& entry) {
     }
     std::string by = bytes(entry["by"]);
     if (const std::size_t at = by.find('@'); entry.contains("times") && at != std::string::npos) {
-        by.replace(at, 1, std::string(entry["times"].get<std::size_t>(), entry["repeat"].get<std::string>()[0]));
+        by.replace(at, 1,
+                   std::string(entry["times"].get<std::size_t>(), entry["repeat"].get<std::string>()[0]));
     }
     const auto replaced = bytes(entry["replace"]);
     return text.replace(text.find(replaced), replaced.size(), by);

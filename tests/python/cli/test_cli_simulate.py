@@ -220,7 +220,7 @@ def test_a_signal_ends_a_long_closed_loop(view: str) -> None:
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
         with pytest.raises(_RangError):
-            getattr(_core, view)(model, scheme, np.zeros(20_000_000), 1e-3)
+            getattr(_core.simulation, view)(model, scheme, np.zeros(20_000_000), 1e-3)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

@@ -2,6 +2,7 @@
 """What a terminal gets: lines wrapped between words, no control characters from outside, progress, Ctrl-C."""
 
 import ast
+import json
 import os
 import pty
 import signal
@@ -130,8 +131,9 @@ def test_control_characters_of_names_do_not_reach_the_terminal(
 def test_control_characters_of_a_model_do_not_reach_the_terminal(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = Path("m.json").read_text(encoding="utf-8")
-    Path("m.json").write_text(text.replace("by-hand", "by-\\u001b[2J\\nverdict: good-hand"), encoding="utf-8")
+    content = json.loads(Path("m.json").read_text(encoding="utf-8"))
+    content["data"]["files"] = ["by-\x1b[2J\nverdict: good-hand.csv"]
+    Path("m.json").write_text(json.dumps(content), encoding="utf-8")
     assert load_model("m.json").data.files[0].startswith("by-\x1b")
     main(["show", "m.json"])
     main(["show", "m.json", "--json"])

@@ -121,7 +121,7 @@ def test_an_existing_recording_is_refused_before_anything_runs_and_replaced_with
     words = [MODEL, "--duration-s", 0.8, "--record", out, *PATIENT]
     answer = control(*words)
     assert answer.returncode == 2
-    assert answer.stderr.startswith(f"error: --record {out} exists already; choose another name, or ")
+    assert answer.stderr.startswith(f"error: {out} exists already; choose another name, or ")
     assert answer.stderr.count("\n") == 1
     assert out.read_text(encoding="utf-8") == "precious"
     assert os.listdir(tmp_path) == ["felt.csv"]

@@ -153,7 +153,7 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
         ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
         ([], ["--serial", "A", "--serial", "B"], "2 USB devices could be meant (A, B)"),
         (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; there is EMU-1"),
-        (["--device", "usb:"], [], "--device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
+        (["--device", "usb:"], [], "device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
         ([], ["--somebody-elses"], "is 1209:0001 but not of this protocol"),
         ([], ["--info-bytes", "31"], "the answer to GET_INFO has 31 bytes, must have 32"),
         ([], ["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),

@@ -103,9 +103,9 @@ struct Summary {
         {"position_range", std::vector<double>{summary.positions.lower, summary.positions.upper}},
         {"force_range", std::vector<double>{summary.forces.lower, summary.forces.upper}},
         {"energy", NamedValues{{"given_in_ramp_J", loop.given_in_ramp},
-                          {"given_J", loop.given},
-                          {"most_stored_J", loop.most_stored},
-                          {"sentence", energy_text(loop)}}},
+                               {"given_J", loop.given},
+                               {"most_stored_J", loop.most_stored},
+                               {"sentence", energy_text(loop)}}},
         {"without", summary.report.refused},
         {"notes", summary.all_notes()},
     };
