@@ -33,7 +33,7 @@ enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 /// A field that is reached by a path of members.
 template <auto... path>
 struct Field {
-    const char* name;
+    const char* name = "";
     const char* doc = "";  ///< meaning and unit
     Rule rule = Rule::Any;
     bool stored = true;  ///< false: not written to a file, because it can be computed

@@ -56,8 +56,8 @@ class JsonField {
         }
         return {*found, path};
     }
-    /// An object with no key but these.
-    const JsonField& only(const std::vector<std::string_view>& keys) const {
+    /// Refuses an object with another key.
+    void require_keys(const std::vector<std::string_view>& keys) const {
         require(value_.is_object(), "an object");
         for (const auto& item : value_.items()) {
             if (std::find(keys.begin(), keys.end(), item.key()) == keys.end()) {
@@ -67,11 +67,11 @@ class JsonField {
                                             " is not a key of this format (free keys go under notes)");
             }
         }
-        return *this;
     }
     [[nodiscard]] std::vector<JsonField> items() const {
         require(value_.is_array(), "a list");
         std::vector<JsonField> fields;
+        fields.reserve(value_.size());
         for (std::size_t k = 0; k < value_.size(); ++k) {
             fields.emplace_back(value_[k], path_ + "[" + std::to_string(k) + "]");
         }

@@ -47,13 +47,13 @@ namespace detail {
 }
 
 inline void check_fit(const JsonField& fit, std::size_t wavelets) {
-    fit.only({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
+    fit.require_keys({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
     (void)fit["model_class"].words();
     (void)fit["stop_reason"].words();
     (void)fit["nrmse"].not_negative();
     (void)fit["n_parameters"].count(0);
     for (const JsonField& step : fit["path"].items()) {
-        step.only({"n_wavelets", "rmse", "criterion", "model_class"});
+        step.require_keys({"n_wavelets", "rmse", "criterion", "model_class"});
         (void)step["n_wavelets"].count(0);
         (void)step["rmse"].not_negative();
         (void)(step["criterion"].is_null() ? 0.0 : step["criterion"].number());
@@ -64,7 +64,7 @@ inline void check_fit(const JsonField& fit, std::size_t wavelets) {
 }
 
 inline void check_data(const JsonField& data) {
-    data.only({"sha256", "files", "rows", "columns"});
+    data.require_keys({"sha256", "files", "rows", "columns"});
     (void)data["sha256"].words();
     (void)data["rows"].count(0);
     for (const JsonField& file : data["files"].items()) {
@@ -77,8 +77,10 @@ inline void check_data(const JsonField& data) {
 }
 
 inline Domain read_domain(const JsonField& file, std::size_t d) {
-    const JsonField domain = file["domain"].only({"lower", "upper"});
-    const JsonField beyond = file["continuation"].only({"below", "above", "period"});
+    const JsonField domain = file["domain"];
+    domain.require_keys({"lower", "upper"});
+    const JsonField beyond = file["continuation"];
+    beyond.require_keys({"below", "above", "period"});
     const auto continuation = [](const JsonField& side) {
         return side.one_of({"linear", "free"}) == "free" ? Continuation::Free : Continuation::Linear;
     };
@@ -102,8 +104,8 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
 
 /// The network at `network`, which is the file's own or that of its plan, with the domain and kind of the file.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
-    network.only({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
-                  "linear_hysteresis", "bias_hysteresis"});
+    network.require_keys({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
+                          "linear_hysteresis", "bias_hysteresis"});
     NetworkParameters read;
     read.dimension = network["dimension"].count(1);
     const std::size_t d = read.dimension;
@@ -168,12 +170,13 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
-    file.only({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
-               "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate",
-               "notes"});
+    file.require_keys({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius",
+                       "mass", "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan",
+                       "certificate", "notes"});
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].words();
-    const detail::JsonField units = file["units"].only({"position", "force"});
+    const detail::JsonField units = file["units"];
+    units.require_keys({"position", "force"});
     ModelFile read{detail::read_network(file["network"], file),
                    file["kind"].words(),
                    units["position"].one_of({"rad", "m", "count", ""}),
@@ -191,7 +194,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         (void)(file[name].is_null() ? 0.0 : file[name].not_negative());
     }
     if (const detail::JsonField bounds = file["slope_bounds"]; !bounds.is_null()) {
-        bounds.only({"min", "max"});
+        bounds.require_keys({"min", "max"});
         bounds["min"].require(bounds["min"].number() <= bounds["max"].number(), "at most slope_bounds.max");
         read.model.require_slopes_within({bounds["min"].number(), bounds["max"].number()});
     }

@@ -29,8 +29,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     if (plan.is_null()) {
         return std::nullopt;
     }
-    plan.only({"structure", "solver", "network", "coupling", "inertia", "compensated", "play_radius",
-               "predict", "refused", "accepted_force_error"});
+    plan.require_keys({"structure", "solver", "network", "coupling", "inertia", "compensated", "play_radius",
+                       "predict", "refused", "accepted_force_error"});
     Scheme scheme;
     scheme.structure = plan["structure"].as<StructureKind>();
     if (const JsonField solver = plan["solver"]; !solver.is_null()) {
@@ -71,8 +71,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     if (file.is_null()) {
         return std::nullopt;
     }
-    file.only({"fingerprint", "model", "structure", "device", "bounds", "inequalities", "verdict",
-               "longest_period_s"});
+    file.require_keys({"fingerprint", "model", "structure", "device", "bounds", "inequalities", "verdict",
+                       "longest_period_s"});
     file.require(plan.has_value(), "null, because plan is");
     Certificate read;
     read.scheme = *plan;

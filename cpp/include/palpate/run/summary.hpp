@@ -69,6 +69,7 @@ struct Summary {
 [[nodiscard]] inline NamedValues fields(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     std::vector<NamedValues> findings;
+    findings.reserve(summary.findings.size());
     for (const SessionFinding& finding : summary.findings) {
         findings.push_back({{"level", std::string(finding.level)}, {"sentence", finding.sentence}});
     }

@@ -23,12 +23,12 @@ namespace palpate {
 
 /// One tick in virtual time, and the simulated device before and after it.
 struct SimulatedTick {
-    std::size_t number;
+    std::size_t number = 0;
     Tick tick;
-    Motion start;         ///< the handle when the tick began
-    Motion end;           ///< the handle when it ended
-    double force_before;  ///< of the device when the tick began [N or N*m]
-    double force;         ///< of the device when it ended [N or N*m]
+    Motion start;               ///< the handle when the tick began
+    Motion end;                 ///< the handle when it ended
+    double force_before = 0.0;  ///< of the device when the tick began [N or N*m]
+    double force = 0.0;         ///< of the device when it ended [N or N*m]
 };
 
 /// Runs a controller on a simulated device in virtual time. `watch(SimulatedTick)` is called after every tick; the loop

@@ -42,6 +42,7 @@ namespace palpate {
     const double largest_speed =
         options.largest_speed.value_or(guards_for(rig.scale, rig.device).largest_speed);
     std::vector<Fault> faults;
+    faults.reserve(options.faults.size());
     for (const std::string& fault : options.faults) {
         faults.push_back(parse_fault(fault, period_s));
     }
