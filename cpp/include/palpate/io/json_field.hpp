@@ -152,7 +152,7 @@ class JsonField {
                     names.emplace_back(field.name);
                 }
             });
-            (void)only(names);
+            require_keys(names);
             T read;
             for_each_field<T>([&](const auto& field) {
                 if (field.stored) {
