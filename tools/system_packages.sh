@@ -19,16 +19,16 @@ missing_packages() {
     python_says 'import venv, ensurepip' || echo python3-venv
     python_says 'import os, sysconfig
 assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' || echo python3-dev
-    # The compiled module needs libusb when it is built: a later installation would leave a module without USB.
+    # The compiled module needs its libraries when it is built: model files, USB and the WebSocket of a Haply Inverse3.
+    # A later installation would leave a module without them.
     command -v pkg-config >/dev/null || echo pkg-config
+    compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
     compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
+    compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
     if [ "$purpose" = test ]; then
         compiles '#include <gtest/gtest.h>' || echo libgtest-dev
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
-        compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
-        # The WebSocket of a Haply Inverse3.
-        compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
         # The emulated USB device of the tests.
         [ -e /usr/include/umockdev-1.0/umockdev.h ] || echo libumockdev-dev
         command -v umockdev-run >/dev/null || echo umockdev
