@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "hands.hpp"
 #include "held_maps.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/faulty_device.hpp"
-#include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/plant.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "failure_map.hpp"
+#include "hands.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
 #include "palpate/rendering/direct.hpp"
-#include "palpate/simulation/hand.hpp"
 #include "palpate/stability/held_force.hpp"
 #include "palpate/stability/predicted_force.hpp"
 #include "trials.hpp"

@@ -8,12 +8,12 @@
 #include <limits>
 #include <utility>
 
+#include "hands.hpp"
 #include "palpate/model/continuation.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/simulation/closed_loop.hpp"
-#include "palpate/simulation/hand.hpp"
 
 namespace palpate::bench {
 

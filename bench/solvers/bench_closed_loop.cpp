@@ -7,6 +7,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "../limits/hands.hpp"
 #include "palpate/model/compiled_network.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/massless.hpp"

@@ -25,29 +25,19 @@ PYBIND11_MODULE(_core, module) {
     pybind11::register_local_exception_translator(&translate_invalid_argument);
 
     using namespace palpate::bindings;
-    bind_status(module);
-    const auto submodule = [&](const char* name, const char* doc) {
+    const auto submodule = [&](const char* name, const char* doc, auto... bind) {
         pybind11::module_ made = module.def_submodule(name, doc);
         // `from palpate._core.model import ...` looks here first
         pybind11::module_::import("sys").attr("modules")[made.attr("__name__")] = made;
-        return made;
+        (bind(made), ...);
     };
-    auto model = submodule("model", "Force laws: wavelets, networks, hysteresis and their proved bounds.");
-    bind_wavelet(model);
-    bind_model(model);
-    auto dynamics = submodule("dynamics", "Transfer functions and the filters of the paper.");
-    bind_dynamics(dynamics);
-    auto device = submodule("device", "Profiles of haptic devices, and the packets of USB devices.");
-    bind_device(device);
-    bind_wire(device);
-    auto rendering = submodule("rendering", "Structures between a model and a device.");
-    bind_rendering(rendering);
-    auto stability = submodule("stability", "Certificates and the inequalities they consist of.");
-    bind_stability(stability);
-    auto io = submodule("io", "Model files.");
-    bind_io(io);
-    auto simulation = submodule("simulation", "Rendering in virtual time on a simulated device.");
-    bind_simulation(simulation);
-    auto run = submodule("run", "Rendering and measuring in real time.");
-    bind_run(run);
+    submodule("status", "Why a step ended as it did.", bind_status);
+    submodule("model", "Force laws and their proved bounds.", bind_wavelet, bind_model);
+    submodule("dynamics", "Transfer functions and the filters of the paper.", bind_dynamics);
+    submodule("device", "Profiles of devices, and the packets of USB devices.", bind_device, bind_wire);
+    submodule("rendering", "Structures between a model and a device.", bind_rendering);
+    submodule("stability", "Certificates and the inequalities they consist of.", bind_stability);
+    submodule("io", "Model files.", bind_io);
+    submodule("simulation", "Rendering in virtual time on a simulated device.", bind_simulation);
+    submodule("run", "Rendering and measuring in real time.", bind_run);
 }

@@ -110,7 +110,7 @@ def test_the_two_commands_stand_on_the_first_screen() -> None:
 
 def test_the_table_of_statuses_is_that_of_the_source() -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", README, re.MULTILINE)
-    assert rows == list(_core.status_meanings.items())
+    assert rows == list(_core.status.status_meanings.items())
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 The C++ core of palpate, one submodule for each folder of its headers.
 """
 from __future__ import annotations
-import typing
+from . import status
 from . import model
 from . import dynamics
 from . import device
@@ -12,86 +12,5 @@ from . import stability
 from . import io
 from . import simulation
 from . import run
-__all__: list[str] = ['Status', 'device', 'dynamics', 'io', 'model', 'rendering', 'run', 'simulation', 'stability', 'status_meanings']
-class Status:
-    """
-    Why a step ended as it did; the same words in C++ and in records.
-    
-    Members:
-    
-      Ok : the step is exact to its tolerance
-    
-      MaxIterations : the solver used all its evaluations; the position is its best one
-    
-      NotUnique : the load line meets the environment where it falls faster than the line rises
-    
-      NonFinite : an input or the environment was not a finite number; the force sent is zero
-    
-      Timeout : the device did not answer in time
-    
-      Lost : a sample of the device was lost or came twice
-    
-      Fault : the device reported a fault or is gone; the force sent is zero
-    
-      Limited : the force was clipped to the limit of the host or of the device
-    
-      Jump : the position moved farther in one sample than the device can; the force sent is zero
-    
-      Frozen : the position stood still at once out of full motion; the force sent is zero
-    
-      Ramp : the force is still on its way up from zero after the start
-    
-      Drained : the rendering had given all the energy it may; a force that gives more was scaled down
-    
-      Softened : the handle buzzed; all forces are scaled down from then on
-    """
-    Drained: typing.ClassVar[Status]
-    Fault: typing.ClassVar[Status]
-    Frozen: typing.ClassVar[Status]
-    Jump: typing.ClassVar[Status]
-    Limited: typing.ClassVar[Status]
-    Lost: typing.ClassVar[Status]
-    MaxIterations: typing.ClassVar[Status]
-    NonFinite: typing.ClassVar[Status]
-    NotUnique: typing.ClassVar[Status]
-    Ok: typing.ClassVar[Status]
-    Ramp: typing.ClassVar[Status]
-    Softened: typing.ClassVar[Status]
-    Timeout: typing.ClassVar[Status]
-    __members__: typing.ClassVar[dict[str, Status]]
-    @typing.overload
-    def __eq__(self, other: Status) -> bool:
-        ...
-    @typing.overload
-    def __eq__(self, other: typing.Any) -> bool:
-        ...
-    def __getstate__(self) -> int:
-        ...
-    def __hash__(self) -> int:
-        ...
-    def __index__(self) -> int:
-        ...
-    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __int__(self) -> int:
-        ...
-    @typing.overload
-    def __ne__(self, other: Status) -> bool:
-        ...
-    @typing.overload
-    def __ne__(self, other: typing.Any) -> bool:
-        ...
-    def __repr__(self) -> str:
-        ...
-    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    def __str__(self) -> str:
-        ...
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def value(self) -> int:
-        ...
+__all__: list[str] = ['device', 'dynamics', 'io', 'model', 'rendering', 'run', 'simulation', 'stability', 'status']
 __version__: str = '0.1.0'
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}

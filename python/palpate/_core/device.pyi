@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Profiles of haptic devices, and the packets of USB devices.
+Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing

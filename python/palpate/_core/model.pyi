@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Force laws: wavelets, networks, hysteresis and their proved bounds.
+Force laws and their proved bounds.
 """
 from __future__ import annotations
 import numpy

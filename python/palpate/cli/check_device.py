@@ -16,9 +16,8 @@ from ..errors import InputError
 from ..model import load_model
 from ..planning import DeviceProfile
 from ..verdict import Verdict, no
-from .device_options import device_options
 from .exit_status import end_with
-from .live_line import live_line
+from .live import device_options, live_line
 from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
 from .verb import PATH, verb
 

@@ -12,11 +12,9 @@ from ..devices import record as record_object
 from ..errors import InputError
 from ..model import load_model
 from ..recording.files import require_absent
-from .device_options import device_options
 from .exit_status import end_with
-from .live_line import live_line
+from .live import device_options, live_line, session_verdict
 from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
-from .session_verdict import session_verdict
 from .verb import PATH, json_option, verb
 
 

@@ -14,10 +14,9 @@ from ..model import load_model
 from ..planning import Plan
 from ..recording.files import require_absent
 from .exit_status import end_with
-from .live_line import live_line
+from .live import live_line, session_verdict
 from .printing import print_json, print_numbers, print_verdict, require_writable, talk
 from .scheme_options import scheme_options
-from .session_verdict import session_verdict
 from .verb import PATH, json_option, verb
 
 _LOOP = LoopSettings()

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import _core
-from .._core import Status
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme
 from .._core.simulation import Hand, TestRig, motion_driven
+from .._core.status import Status
 from .._typing import Float1D
 from ..arguments import instance_of, real_of
 from ..errors import InputError

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .._core import Status
+from .._core.status import Status
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError, shortened
 from .table import Cells, Places

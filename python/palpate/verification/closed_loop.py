@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 
 from .. import _core
-from .._core import Status
 from .._core.dynamics import paper_sample_time_s
 from .._core.rendering import Scheme, explicit_slope_limit
+from .._core.status import Status
 from .._typing import Float1D
 from ..errors import InputError
 from ..model import Model

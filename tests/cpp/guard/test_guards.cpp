@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "limits/hands.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/simulation/closed_loop.hpp"

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "limits/hands.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/simulation/closed_loop.hpp"
 #include "support.hpp"

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "limits/hands.hpp"
 #include "scenes.hpp"
 
 namespace palpate {

@@ -16,7 +16,7 @@ import palpate
 from conftest import ROOT
 from control_program import PATIENT, PROGRAM, every_row, needs_program
 from palpate import InputError, Model, identify, load_model, read_recording
-from palpate.cli.live_line import LiveLine
+from palpate.cli.live import LiveLine
 from palpate.cli.main import main
 from palpate.devices import record
 from usb_emulation import emulated, frames, needs_emulation

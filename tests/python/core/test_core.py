@@ -180,7 +180,7 @@ def test_simulation_returns_one_row_a_tick() -> None:
     model = ForceModel(**network(np.random.default_rng(7), 0))
     trace = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
     assert {len(column) for column in trace.values()} == {250}
-    assert set(trace["status"]) <= {int(_core.Status.Ok), int(_core.Status.Limited)}
+    assert set(trace["status"]) <= {int(_core.status.Status.Ok), int(_core.status.Status.Limited)}
     again = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
     assert all(np.array_equal(trace[name], again[name]) for name in trace)
 
@@ -205,7 +205,9 @@ def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None
 
 
 def test_defaults_and_words_are_those_of_the_core() -> None:
-    assert [status.name for status in _core.Status.__members__.values()] == list(_core.status_meanings)
+    assert [status.name for status in _core.status.Status.__members__.values()] == list(
+        _core.status.status_meanings
+    )
     assert structure_names == (
         "direct",
         "massless",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measured boundaries against theory: nothing fails before its bound, and the bounds that are exact are met.
 #include "limits/failure_maps.hpp"
+#include "limits/hands.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,6 +12,7 @@ from palpate.identification.data.limits import (
     NO_LIMITS,
     RowLimits,
     correlation,
+    distinct_rows,
     force_step,
     independent_share,
     position_noise,
@@ -127,3 +128,15 @@ def test_correlation_is_named_in_the_notes() -> None:
     model = palpate.identify(correlated(0.9)(wall))
     assert any("the noise is correlated" in note for note in model.notes["identification"])
     assert model.fit.nrmse == pytest.approx(NOISE / np.std(wall(sweep(N))), rel=0.25)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 5])
+@pytest.mark.parametrize("rows", [1, 2, 400])
+def test_distinct_rows_are_those_of_numpy(rows: int, dimension: int) -> None:
+    rng = np.random.default_rng(rows + dimension)
+    for table in (rng.integers(-3, 3, (rows, dimension)), rng.normal(size=(rows, dimension))):
+        expected, inverse, times = np.unique(table, axis=0, return_inverse=True, return_counts=True)
+        chosen, group, count = distinct_rows(table)
+        assert np.array_equal(table[chosen], expected)
+        assert np.array_equal(group, inverse.reshape(-1))
+        assert np.array_equal(count, times)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from palpate import InputError, frame_bounds
-from palpate.identification.network.basis import truncated_frame
+from palpate.identification.network.basis import Resolution, truncated_frame
 
 # Unit-norm Mexican hat, a0 = 2: b0 -> (A, B) for 1, 2 and 4 voices; the frame table of section 2 of the
 # mathematics that the product follows (Daubechies 1990, table of the Mexican hat).
@@ -81,3 +81,17 @@ def test_the_truncated_frame_ends_within_the_level_that_would_not_fit() -> None:
     )
     assert len(frame) == 100
     assert frame.alpha.max() == 32.0
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2, 7, 40])
+def test_so_many_positions_are_within_reach_and_no_fewer(dimension: int, count: int) -> None:
+    random = np.random.default_rng(count)
+    positions = random.normal(size=(40, dimension)).round(6)
+    places = np.concatenate([random.normal(scale=2.0, size=(200, dimension)), positions[:5]])
+    resolution = Resolution(np.repeat(positions, 2, axis=0))
+    assert len(resolution) == 40
+    distance = np.linalg.norm(places[:, None] - positions, axis=2)
+    np.testing.assert_allclose(
+        resolution.reach(places, count), np.sort(distance, axis=1)[:, count - 1], atol=1e-12
+    )

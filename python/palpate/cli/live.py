@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts that the verbs with a live device share: its options, the live line, the verdict of the session."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, TypeVar, cast
+
+import click
+
+from ..devices import DeviceError
+from ..errors import InputError
+from ..verdict import Verdict
+from .exit_status import terminated_as_interrupted
+from .printing import OverwrittenLine, number, talk
+from .verb import PATH
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def device_options(command: F) -> F:
+    """Adds the options of the measured device and of the object on the simulated one."""
+    described: Any = command
+    for option in reversed(
+        (
+            click.option("--device", default="simulated", help="simulated, or usb[:SERIAL]."),
+            click.option(
+                "--object",
+                "object_file",
+                type=PATH,
+                metavar="MODEL.json",
+                help="The object mounted on the simulated device.",
+            ),
+            click.option(
+                "--wait-ms",
+                type=click.FloatRange(0.1, 10000),
+                show_default="5",
+                help="How long to wait for a packet of a USB device.",
+            ),
+            click.option(
+                "--transducer/--no-transducer",
+                default=True,
+                help="The simulated device has a force transducer.",
+            ),
+        )
+    ):
+        described = option(described)
+    return cast(F, described)
+
+
+@contextmanager
+def live_line(rate_hz: float, units: tuple[str, str]) -> Iterator[LiveLine]:
+    """Yields a `LiveLine` while a device runs. A termination signal ends it as Ctrl-C does.
+
+    A refusal of the device is raised as InputError.
+    """
+    line = LiveLine(rate_hz, units)
+    try:
+        with terminated_as_interrupted():
+            yield line
+    except DeviceError as error:
+        raise InputError(str(error)) from None
+    finally:
+        line.end()
+
+
+class LiveLine:
+    """One line on a terminal: rows, position and its range, force, lost samples.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Rows a second.
+    units : tuple of str
+        Of position and force.
+    """
+
+    def __init__(self, rate_hz: float, units: tuple[str, str]) -> None:
+        self._rate_hz = rate_hz
+        self._units = units
+        self._line = OverwrittenLine()
+        self._lower, self._upper = math.inf, -math.inf
+
+    def show(self, rows: int, position: float, force: float, lost: int) -> None:
+        """Shows the present values."""
+        self._lower, self._upper = min(self._lower, position), max(self._upper, position)
+        self._line.show(
+            f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "
+            f"position {number(position)} {self._units[0]} "
+            f"(so far {number(self._lower)} to {number(self._upper)})  "
+            f"force {number(force)} {self._units[1]}"
+        )
+
+    def end(self) -> None:
+        """Keeps the line as it is."""
+        self._line.end()
+
+
+def session_verdict(summary: Mapping[str, Any]) -> Verdict:
+    """Returns the verdict of a summary; prints on standard error why a run did not end normally."""
+    if not summary["orderly"]:
+        talk(f"error: {summary['ended']}; zero force sent, device closed")
+    return Verdict.from_record(summary["findings"])
