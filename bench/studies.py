@@ -26,6 +26,15 @@ def count(full: int) -> int:
     return max(1, round(full * min(SCALE, 1.0)))
 
 
+def measured_data() -> Path | None:
+    """Returns the folder of measured recordings; without one, prints that the study is skipped."""
+    folder = Path(os.environ.get("PALPATE_DATA", ""))
+    if "PALPATE_DATA" in os.environ and folder.is_dir():
+        return folder
+    print("skipped: needs measured data, set PALPATE_DATA")
+    return None
+
+
 def commit() -> str:
     """Returns the commit of this checkout, with "-dirty" if a file was changed."""
     answer = subprocess.run(
@@ -90,7 +99,7 @@ def fill_tables(page: Path, tables: Mapping[str, str]) -> None:
         _, found, after = marked.partition(end)
         if not found or mark in after:
             raise SystemExit(
-                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a line of its own"
+                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a separate line"
             )
         text = before + mark + table + end + after
     write_text(page, text)

@@ -11,7 +11,6 @@ figures are free runs; where our rows are not theirs, the line says "other rows"
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -26,7 +25,7 @@ from threadpoolctl import threadpool_limits
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.identification.lagged import SWEEPS, Lagged
-from bench.studies import SCALE, write_results
+from bench.studies import SCALE, measured_data, write_results
 
 from palpate import WaveletNetworkRegressor
 
@@ -251,9 +250,7 @@ def main() -> None:
     parser.add_argument("sets", nargs="*", default=list(chosen), metavar="SET ...")
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
-    place = os.environ.get("PALPATE_DATA")
-    if place is None or not Path(place).is_dir():
-        print("skipped: needs measured data, set PALPATE_DATA")
+    if (place := measured_data()) is None:
         return
     print(
         f"{'RMSE':20}{'test set':24}{'form':20}{'parameters':>10}{'one step':>11}{'free run':>11}  "
@@ -262,8 +259,8 @@ def main() -> None:
     rows: list[Row] = []
     with threadpool_limits(limits=1):
         for name in options.sets:
-            for row in SETS[name](Path(place)):
-                rows.append(with_published(Path(place), row))
+            for row in SETS[name](place):
+                rows.append(with_published(place, row))
                 print(line(rows[-1]), flush=True)
     write_results(options.json, [asdict(row) for row in rows])
 

@@ -9,7 +9,6 @@ PALPATE_DATA names the folder of recordings.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.identification.figures import LIMIT
-from bench.studies import SCALE, count, write_results
+from bench.studies import SCALE, count, measured_data, write_results
 
 import palpate
 from palpate.baselines import PASSIVE, Compared, comparable, compare
@@ -247,13 +246,11 @@ def main() -> None:
     parser.add_argument("--each", action="store_true", help="print a line for each file")
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
-    folder = os.environ.get("PALPATE_DATA")
-    if folder is None or not Path(folder).is_dir():
-        print("skipped: needs measured data, set PALPATE_DATA")
+    if (folder := measured_data()) is None:
         return
     results: dict[str, list[dict[str, Any]]] = {}
     for name in options.sets:
-        files = sorted((Path(folder) / (SETS[name].folder or name)).glob(SETS[name].pattern))
+        files = sorted((folder / (SETS[name].folder or name)).glob(SETS[name].pattern))
         files = files[:: max(1, -(-len(files) // options.files))]
         print(f"\n{name}", flush=True)
         results[name] = []

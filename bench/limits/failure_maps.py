@@ -44,7 +44,7 @@ LONGEST_OF_TWO_COLUMNS = 30
 """Longest name in a legend of two columns [characters]"""
 
 Map = Mapping[str, Any]
-"""A map as the program prints it; null stands for NaN."""
+"""A map as the program prints it; null means NaN."""
 
 
 def values(line: Map, key: str) -> NDArray[np.float64]:
@@ -55,7 +55,7 @@ def values(line: Map, key: str) -> NDArray[np.float64]:
 def draw_map(axes: Axes, drawn: Map) -> None:
     """Draws measured limits as markers and theory as lines, both axes logarithmic unless the map is linear.
 
-    A filled marker stands at the largest value that was tried if no value failed.
+    A filled marker shows the largest tried value if no value failed.
     """
     lines, searched = drawn["lines"], drawn["searched"]
     for line, marker, dash in zip(lines, MARKERS, DASHES, strict=False):

@@ -331,7 +331,7 @@ def sections(folder: Path, to: Path) -> Iterable[str]:
     yield (
         "## Models: error against size and time\n\n"
         "A spring and a wall, and a tactile switch, each from 10⁴ noisy rows; NRMSE against the truth. "
-        "The number of wavelets stands beside its network. Networks stop growing by themselves (BIC). An "
+        "Each label gives the number of wavelets. Networks stop growing by themselves (BIC). An "
         "evaluation is one of 10⁴ positions in a NumPy array.\n\n"
         "![Model error over fitted parameters](model-error-size.png)\n\n"
         "![Model error over the time of an evaluation](model-error-time.png)\n\n"

@@ -192,7 +192,7 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
     }();
     Options options;
     set_options(options, given, setters);
-    options.units = {position_unit, force_unit == "N*m" ? "Nm" : force_unit};
+    options.units = record_units(position_unit, force_unit);
     const auto device = device_to_measure(options, object);
     Watcher watcher{progress, &LoopProgress::object_force};
     const auto summary = [&] {

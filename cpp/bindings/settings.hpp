@@ -49,15 +49,11 @@ void set_fields(T& settings, const pybind11::kwargs& given, const Setters<T>& se
     }
 }
 
-/// Adds the fields of `SchemeChoices`, which stand in a struct at the end of a path.
+/// Adds the fields of `SchemeChoices`; `path` leads to the member of that type.
 template <class T, class... Path>
 void add_scheme_choices(Setters<T>& setters, Path... path) {
     setters["structure"] = [=](T& settings, const pybind11::handle& value) {
-        if constexpr (sizeof...(Path) == 0) {
-            settings.structure = named<StructureKind>(value.cast<std::string>(), "structure");
-        } else {
-            (settings.*....*path).structure = named<StructureKind>(value.cast<std::string>(), "structure");
-        }
+        (settings.*....*path).structure = named<StructureKind>(value.cast<std::string>(), "structure");
     };
     setters["compensated"] = setter<T>(path..., &SchemeChoices::compensated);
     setters["coupling_stiffness"] = setter<T>(path..., &SchemeChoices::coupling_stiffness);

@@ -117,8 +117,8 @@ def record(
         raise InputError("nothing is mounted on the simulated device; give it an object, a model file")
     if not probe and not transducer:
         raise InputError(
-            "this device has no force transducer, and its motor shows nothing of a force while somebody else "
-            "moves the handle: probe instead"
+            "this device has no force transducer, and its motor does not show a force while a hand moves the "
+            "handle: probe instead"
         )
     if not probe:
         lowest_rate_share = 0.0  # no force is made: a low rate is reported, and no reason to stop

@@ -123,7 +123,7 @@ def test_what_the_certificate_does_not_cover_is_rendered_uncertified(
         planned, *words, "--duration-s", 0.6, "--record", record, "--lowest-rate-share", 0, "--rate-hz", 500
     )
     assert answer.returncode == 0, answer.stderr
-    assert "uncertified: the command line asks for a rendering of its own" in answer.stderr
+    assert "uncertified: the options change the planned rendering" in answer.stderr
     assert "certified: no: the command line" in metadata(record)
 
 

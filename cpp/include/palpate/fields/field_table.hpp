@@ -97,7 +97,7 @@ template <HasWords Enum>
 }
 
 /// Checks the numbers and words of one object. Throws std::invalid_argument: the field, its value, what would be right.
-/// `prefix` stands in front of each name.
+/// The message puts `prefix` before each name.
 template <HasFields S>
 void check_fields(const S& object, const std::string& prefix = "") {
     for_each_field<S>([&](const auto& field) {

@@ -43,6 +43,11 @@ struct RecordUnits {
     std::string force = "Nm";
 };
 
+/// Returns the units of a recording from those of a model, which has torques in N*m.
+[[nodiscard]] inline RecordUnits record_units(const std::string& position, const std::string& force) {
+    return {position, force == "N*m" ? "Nm" : force};
+}
+
 namespace detail {
 
 /// The shortest text that reads back as the same number.

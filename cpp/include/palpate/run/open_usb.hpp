@@ -129,8 +129,8 @@ namespace detail {
     detail::require(
         transducer || options.probe || options.record.empty(),
         profile.id +
-            " has no force transducer, and its motor shows nothing of a force while somebody else "
-            "moves the handle: probe instead");
+            " has no force transducer, and its motor does not show a force while a hand moves the handle: "
+            "probe instead");
     detail::require(!options.probe || options.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     options.force_limit =

@@ -75,9 +75,7 @@ struct PlannedModel {
         const auto unit = [](const std::string& text) { return text.empty() ? "no unit" : text; };
         return name + " is in " + unit(position_unit) + " and " + unit(force_unit);
     }
-    [[nodiscard]] RecordUnits units() const {
-        return {position_unit, force_unit == "N*m" ? "Nm" : force_unit};
-    }
+    [[nodiscard]] RecordUnits units() const { return record_units(position_unit, force_unit); }
 };
 
 /// A rendering on an open device, settled before anything moves.
@@ -107,7 +105,7 @@ struct RenderJob {
     if (options.uncertified) {
         return "--uncertified was given";
     }
-    return differs_from_plan(options) ? "the command line asks for a rendering of its own" : "";
+    return differs_from_plan(options) ? "the options change the planned rendering" : "";
 }
 
 namespace detail {
@@ -234,8 +232,8 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
 
 }  // namespace detail
 
-/// Settles scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a certificate that holds for
-/// it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a refusal.
+/// Settles scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a
+/// certificate that holds for it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a refusal.
 [[nodiscard]] inline RenderJob settle(const RenderOptions& options, const PlannedModel& model,
                                       const LiveDevice& device, RecordSinks& sinks) {
     std::string reason = void_reason(options, model);

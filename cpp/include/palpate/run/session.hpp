@@ -22,7 +22,7 @@
 
 namespace palpate {
 
-/// A session: the loop in a thread of its own, the recorder in another one.
+/// Settings of a session, which runs the loop and the recorder in two threads.
 struct SessionSettings {
     LoopSettings loop{};
     RealTimeOptions real_time{};

@@ -103,7 +103,7 @@ namespace palpate {
         options.upper = options.upper.value_or(object->domain().upper[0]);
     }
     if (options.moves()) {
-        rig.hand.stiffness = rig.hand.damping = 0.0;  // nobody holds a handle that moves by itself
+        rig.hand.stiffness = rig.hand.damping = 0.0;  // the device moves the handle, so no hand holds it
     }
     rig.device.coulomb_friction = options.friction_share * rig.device.force_limit;
     validate(rig.device);

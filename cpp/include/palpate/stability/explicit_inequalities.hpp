@@ -37,7 +37,7 @@ namespace palpate {
 }
 
 /// The largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
-/// sample: a number of the linearised system, without a bound of its own error.
+/// sample. It belongs to the linearised system; its error is not bounded.
 [[nodiscard]] inline double explicit_need(Interval slopes, Inertia inertia, VirtualCoupling coupling,
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
