@@ -34,6 +34,7 @@ struct StructureTraits {
     bool coupling = false;    ///< the object stands behind a virtual coupling
     bool mass = false;        ///< the object has mass and damping
     bool solved = false;      ///< each step solves a load line
+    bool velocity = false;    ///< also renders a force of position and velocity
     bool predicts = false;    ///< the force can be taken at a predicted position
     bool keeps_loss = false;  ///< the step need not lose what the play of a hysteresis loses
 };
