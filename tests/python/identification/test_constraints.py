@@ -84,7 +84,7 @@ def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_cells_are_bounded_by_the_derivatives_of_the_core(order: int) -> None:
-    """Sampled derivatives stay below the bound of each cell, which is reached near the centre of a wavelet."""
+    """Sampled derivatives stay below the bound of each cell; near the centre of a wavelet they reach it."""
     alpha, beta, weight = np.array([[3.0], [20.0]]), np.array([[0.2], [0.6]]), np.array([1.0, -0.5])
     edges = np.linspace(0.0, 1.0, 33)
     cells = derivative_bounds(
