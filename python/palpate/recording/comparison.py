@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings that do not belong together: two objects in one file, repeated rows, other units or zeros.
 
-Rows are compared by position cell and stroke."""
+Rows are compared by position cell and stroke.
+"""
 
 from __future__ import annotations
 

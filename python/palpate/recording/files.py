@@ -3,7 +3,8 @@
 
 The CSV states the role of each column, so that it is read back without options. A record of what was rendered
 names one more role than the reader has options for: "status", the column that says of every row whether its
-force was the model's alone."""
+force was the model's alone.
+"""
 
 from __future__ import annotations
 

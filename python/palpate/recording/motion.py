@@ -2,7 +2,8 @@
 """Motion of a recording: strokes by the order of rows, even pieces of time, zero-phase derivatives.
 
 Velocity and acceleration come from central differences, which have no phase, followed by one low-pass L run
-forward and backward, which has none either. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2."""
+forward and backward, which has none either. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2.
+"""
 
 from __future__ import annotations
 
