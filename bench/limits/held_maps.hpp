@@ -25,8 +25,8 @@ namespace palpate::bench {
     return device;
 }
 
-/// Returns true if a directly rendered spring oscillates with growing amplitude with a heavy hand. The phase advances by
-/// 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails just above the bound.
+/// Returns true if a directly rendered spring oscillates with growing amplitude with a heavy hand. The phase advances
+/// by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails just above the bound.
 [[nodiscard]] inline bool spring_swings_up(const DeviceProfile& device, double stiffness) {
     constexpr double late_phase = 0.03;  // [rad]
     constexpr double radians = 1000.0;   // of the simulated oscillation

@@ -6,9 +6,9 @@
 The trial renders every structure in closed loop on three devices, with and without compensation, over a grid
 of couplings, masses and dampings. It uses the identified model and, if the plan limited its slopes, also the
 limited model. The objects are a spring with a wall, a switch that snaps through and, if PALPATE_DATA names
-the measured data, real keyboard switches. The error is the RMS of the commanded force minus the force of the identified model at
-the handle at the end of the tick, while a hand moves through the domain. Then hands without damping press on
-the steepest part of the object.
+the measured data, real keyboard switches. The error is the RMS of the commanded force minus the force of the
+identified model at the handle at the end of the tick, while a hand moves through the domain. Then hands
+without damping press on the steepest part of the object.
 
 Prints the tables of FOLDER/plan-against-trial.md, writes them there if that page exists, and writes all
 numbers to FOLDER/figures/plan-against-trial.json. Exits with 1 if a plan does not come to rest or is worse
