@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulates recordings of a moving object with known mass, damping and hysteresis, with the sensors of the sample."""
+"""Simulates recordings of a moving object with known mass, damping and hysteresis."""
 
 from __future__ import annotations
 
