@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the type stubs of palpate._core, or checks that those in the tree are the ones it would write.
+"""Writes the type stubs of palpate._core, or checks that the stubs in the tree are up to date.
 
 python tools/stubs.py [--check]
 """
@@ -18,7 +18,7 @@ LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
 
 def generated() -> dict[str, str]:
-    """The stub files as pybind11-stubgen writes them now: name below the package -> text."""
+    """Returns the stub files of pybind11-stubgen: name below the package -> text."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
         subprocess.run(command, check=True)
@@ -31,7 +31,7 @@ def generated() -> dict[str, str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="change nothing, fail where the tree differs")
+    parser.add_argument("--check", action="store_true", help="change no file, fail if the tree differs")
     check = parser.parse_args().check
 
     stubs = generated()
@@ -55,7 +55,7 @@ def main() -> int:
     if stale:
         print("The stubs do not describe the compiled module: run `make stubs`.", file=sys.stderr)
         return 1
-    # The stubs of NumPy, on which ours build, are complete from Python 3.11 on.
+    # The stubs of NumPy, which these stubs use, are complete from Python 3.11.
     if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOWED)]
         return subprocess.run(command, check=False).returncode
