@@ -23,7 +23,7 @@ LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
 
 def generated() -> dict[str, str]:
-    """The stub files and the schema as they must be now: name below the package -> text."""
+    """Returns stub files and schema of the compiled module: name below the package -> text."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
         subprocess.run(command, check=True)
@@ -39,7 +39,7 @@ def generated() -> dict[str, str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="change nothing, fail where the tree differs")
+    parser.add_argument("--check", action="store_true", help="change no file, fail if the tree differs")
     check = parser.parse_args().check
 
     files = generated()
@@ -63,7 +63,7 @@ def main() -> int:
     if stale:
         print("Stubs or schema do not describe the compiled module: run `make stubs`.", file=sys.stderr)
         return 1
-    # The stubs of NumPy, on which ours build, are complete from Python 3.11 on.
+    # The stubs of NumPy, which these stubs use, are complete from Python 3.11.
     if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOWED)]
         return subprocess.run(command, check=False).returncode

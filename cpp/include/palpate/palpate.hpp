@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// Everything that needs no third-party library.
+/// Includes all headers that need no third-party library.
 
 #include "palpate/device/device.hpp"
 #include "palpate/device/device_profile.hpp"

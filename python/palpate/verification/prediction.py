@@ -19,8 +19,7 @@ from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
-from ..recording.motion import GAP, acceleration, velocity
-from ..recording.strokes import ordered_strokes, turns_of
+from ..recording.motion import GAP, acceleration, ordered_strokes, turns_of, velocity
 
 PLAY_SHARE_OF_TRAVEL = 0.01
 """Play radius over travel where nothing states one: recorded strokes do not tell it."""
