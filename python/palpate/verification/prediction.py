@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core.rendering import default_play_radius
 from .._typing import Float1D
 from ..errors import InputError
 from ..identification.data.rows import input_columns
@@ -20,9 +21,6 @@ from ..recording import Recording
 from ..recording.conversion import Motion
 from ..recording.motion import GAP, acceleration, velocity
 from ..recording.strokes import ordered_strokes, turns_of
-
-PLAY_SHARE_OF_TRAVEL = 0.01
-"""Play radius over travel where nothing states one: recorded strokes do not tell it."""
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are left out"
 
@@ -188,8 +186,7 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
     ):
         if radius:
             return float(radius), origin
-    travel = float(model.upper[0] - model.lower[0])
-    return PLAY_SHARE_OF_TRAVEL * travel, "1 % of the travel: neither recording nor model states one"
+    return default_play_radius(model, 0.0), "1 % of the travel: neither recording nor model states one"
 
 
 def _gaps(time: Float1D | None) -> NDArray[np.intp]:

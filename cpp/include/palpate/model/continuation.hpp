@@ -2,9 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string_view>
+
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate {
 
@@ -22,6 +26,9 @@ enum class Continuation : std::uint8_t {
     Linear,  ///< a line of non-negative slope through the edge
     Free,    ///< the same line until the force is zero, then nothing: contact is lost
 };
+
+template <>
+inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"linear", "free"};
 
 /// A curve beyond one edge of its domain: a line through the edge, cut off `reach` away from it.
 /// The force is continuous at the edge and at the cut; the slope jumps.
