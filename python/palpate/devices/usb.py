@@ -1,19 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists USB devices over pyusb, reads their identity and sets them up before a run.
+"""Lists USB devices over pyusb, reads their identity, sets them up, and installs their udev rule.
 
 The stream of samples needs both directions at once, which pyusb cannot do: the core reads it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any
 
 from .._core import device as core
 from .._core.device import UsbRequest
 from ..errors import InputError
+from ..recording.files import replacing
 
 _TIMEOUT_MS = 500
 
@@ -224,3 +231,49 @@ def open_usb(serial: str = "") -> UsbSetup:
         raise DeviceError("; ".join(problems))
     wanted = f" with serial number {serial}" if serial else ""
     raise DeviceError(f"no haptic USB device{wanted} is plugged in; `palpate devices` lists what there is")
+
+
+RULE = "60-palpate.rules"
+FOLDER = Path("/etc/udev/rules.d")
+
+_RELOAD = (("udevadm", "control", "--reload-rules"), ("udevadm", "trigger", "--subsystem-match=usb"))
+
+
+def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
+    """Writes the rule and makes udev read it.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with a sentence for each step.
+    folder : Path
+        Folder of the rules of this machine.
+
+    Raises
+    ------
+    DeviceError
+        Without root, or if the system refuses; the message states the cure.
+    """
+    target = folder / RULE
+    if not folder.is_dir():
+        raise DeviceError(
+            f"this machine has no folder {folder}: udev, which gives users their rights, is not here"
+        )
+    if not os.access(folder, os.W_OK):
+        again = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
+        raise DeviceError(f"writing {target} needs root; run: {again}")
+    text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
+    with replacing(target) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    tell(f"wrote {target}:")
+    tell(text.splitlines()[-1])
+    for command in _RELOAD:
+        if shutil.which(command[0]) is None:
+            tell(f"there is no {command[0]} here: plug the device in again, or restart the machine")
+            return
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            tell(f"{' '.join(command)}: {done.stderr.strip() or 'failed'}; restart the machine instead")
+            return
+        tell(f"ran {' '.join(command)}")
+    tell("plug the device in again")
