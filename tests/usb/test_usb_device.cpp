@@ -11,6 +11,7 @@
 #include "../cpp/support.hpp"
 #include "emulated_machine.hpp"
 #include "palpate/device/usb.hpp"
+#include "palpate/guard/guard_settings.hpp"
 
 namespace palpate {
 namespace {
@@ -33,6 +34,7 @@ TEST(UsbDevice, SaysWhoItIsAndWhatItCan) {
     EXPECT_EQ(profile.id, "EMU-1");
     EXPECT_EQ(profile.period_s, 1e-3);
     EXPECT_EQ(profile.force_limit, 5.0);
+    EXPECT_EQ(guards_for({}, profile).device_damping, 0.0) << "nobody measured it";
     EXPECT_NO_THROW(validate(profile));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -50,6 +51,13 @@ struct Field {
 template <auto outer, auto... path>
 [[nodiscard]] constexpr Field<outer, path...> within(const Field<path...>& field, const char* name) noexcept {
     return {name, field.doc, field.rule, field.stored, field.words};
+}
+
+/// All fields of a table inside a struct that holds theirs as `outer`.
+template <auto outer, class... Fields>
+[[nodiscard]] constexpr auto all_within(const std::tuple<Fields...>& fields) noexcept {
+    return std::apply([](const auto&... field) { return std::tuple{within<outer>(field, field.name)...}; },
+                      fields);
 }
 
 /// A field that need not be given: a file may leave it out.
@@ -103,6 +111,13 @@ template <HasWords Enum>
                                 either(words_of<Enum>));
 }
 
+/// Throws std::invalid_argument unless `holds`: the field, its value, what would be right.
+inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
+    if (!holds) {
+        throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);
+    }
+}
+
 /// Checks a number or a word by the rule of its field; other values pass.
 template <class F, class V>
 void check_value(const F& field, const V& value, const std::string& prefix) {
@@ -111,18 +126,13 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
             check_value(field, *value, prefix);
         }
     } else if constexpr (std::is_arithmetic_v<V>) {
-        if (!obeys(static_cast<double>(value), field.rule)) {
-            throw std::invalid_argument(prefix + field.name + " is " + readable(static_cast<double>(value)) +
-                                        ", must be " + text(field.rule));
-        }
+        const auto number = static_cast<double>(value);
+        require_field(obeys(number, field.rule), prefix + field.name, number, text(field.rule));
     } else if constexpr (std::is_same_v<V, std::string>) {
-        bool known = field.words.empty();
-        for (const std::string_view word : field.words) {
-            known = known || value == word;
-        }
-        if (!known) {
+        const auto& words = field.words;
+        if (!words.empty() && std::find(words.begin(), words.end(), value) == words.end()) {
             throw std::invalid_argument(prefix + field.name + " is '" + value + "', must be " +
-                                        either(field.words));
+                                        either(words));
         }
     }
 }

@@ -200,10 +200,7 @@ class GrowingFile {
         if (!S_ISREG(there.st_mode) && !S_ISLNK(there.st_mode)) {
             return name_ + " cannot be written: it is not an ordinary file";
         }
-        return force_ ? ""
-                      : name_ +
-                            " exists already; choose another name, or replace it with --force (Python: "
-                            "force=True)";
+        return force_ ? "" : name_ + " exists already; choose another name, or set force to replace it";
     }
 
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {

@@ -18,12 +18,10 @@ namespace palpate {
 
 /// What a rendering needs of a model file.
 struct ModelFile {
-    ForceModel model;  ///< as it was identified
-    std::string kind;
+    ForceModel model;                        ///< as it was identified
     std::string position_unit;               ///< rad, m, count or "" (unstated)
     std::string force_unit;                  ///< N*m, N, A or ""
     std::vector<std::string> inputs;         ///< one name for each input
-    std::string data_sha256;                 ///< of the recordings it was identified on
     std::optional<Scheme> plan;              ///< how it is to be rendered
     std::optional<ForceModel> limited;       ///< plan.network: the plan renders it in place of `model`
     std::optional<Certificate> certificate;  ///< of the plan; recomputed, and found the same
@@ -81,11 +79,8 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     domain.require_keys({"lower", "upper"});
     const JsonField beyond = file["continuation"];
     beyond.require_keys({"below", "above", "period"});
-    const auto continuation = [](const JsonField& side) {
-        return side.one_of({"linear", "free"}) == "free" ? Continuation::Free : Continuation::Linear;
-    };
-    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), continuation(beyond["below"]),
-                continuation(beyond["above"]), std::nullopt};
+    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), beyond["below"].as<Continuation>(),
+                beyond["above"].as<Continuation>(), std::nullopt};
     domain["lower"].require_length(d, "one for each dimension");
     domain["upper"].require_length(d, "one for each dimension");
     for (std::size_t k = 0; k < d; ++k) {
@@ -179,11 +174,9 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField units = file["units"];
     units.require_keys({"position", "force"});
     ModelFile read{detail::read_network(file["network"], file),
-                   file["kind"].words(),
                    units["position"].one_of({"rad", "m", "count", ""}),
                    units["force"].one_of({"N*m", "N", "A", ""}),
                    {},
-                   "",
                    {},
                    {},
                    {}};
@@ -200,7 +193,6 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         read.model.require_slopes_within({bounds["min"].number(), bounds["max"].number()});
     }
     detail::check_data(file["data"]);
-    read.data_sha256 = file["data"]["sha256"].words();
     detail::check_fit(file["fit"], read.model.parameters().weight.size());
     read.plan = detail::read_plan(file["plan"]);
     read.limited = detail::read_limited(file);

@@ -47,8 +47,7 @@ namespace detail {
 
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
-        lines.push_back({"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower,
-                         0.0, Basis::Proved, "docs/certificate.md"});
+        lines.push_back(loss_inequality(bounds));
     }
 }
 
@@ -86,10 +85,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 }  // namespace detail
 
+/// Share of the device's damping that a coupling uses where nothing else sets its stiffness.
+inline constexpr double usual_coupling_share = 0.95;
+
 /// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
 /// object whose force falls with a slope of at most `falling`; 0 if there is none.
 [[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
-                                              double share) {
+                                              double share = usual_coupling_share) {
     constexpr double finer = 0.97;
     constexpr double softest = 1e-9;
     constexpr int halvings = 40;
@@ -116,9 +118,9 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 /// An object without mass behind a coupling, its force limited: slopes of the limited force are those of the force or
 /// 0. Without coupling damping a static one is a static force F(x) of slope K_c f' / (K_c + f').
-[[nodiscard]] inline std::vector<Inequality> massless_inequalities(const ForceBounds& bounds,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double p = coupling.load_line_slope(device.period_s);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -155,12 +157,12 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 }
 
 /// An object with mass behind a coupling, backward Euler. The mass does not help a force that falls.
-[[nodiscard]] inline std::vector<Inequality> implicit_inequalities(const ForceBounds& bounds, Inertia inertia,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
-    const double damped = 2.0 * inertia.damping / T;
-    const double alone = inertia.load_line_slope(T);
+    const double damped = 2.0 * scheme.inertia.damping / T;
+    const double alone = scheme.inertia.load_line_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -179,9 +181,9 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     lines.push_back(detail::coupling_inequality(coupling, std::max(0.0, bounds.falling() - damped), device));
     lines.push_back(detail::uniqueness(coupled + alone, bounds.falling(), "p > s_"));
     if (!bounds.hysteresis && bounds.slope.lower == bounds.slope.upper) {
-        lines.push_back(detail::friction_inequality(device,
-                                                    implicit_gain(bounds.slope.lower, inertia, coupling, T),
-                                                    bounds.mean_force, "||g||_1 Delta / 2"));
+        lines.push_back(detail::friction_inequality(
+            device, implicit_gain(bounds.slope.lower, scheme.inertia, coupling, T), bounds.mean_force,
+            "||g||_1 Delta / 2"));
     } else {
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     }
@@ -190,13 +192,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 /// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope, and at any
 /// solution of the step.
-[[nodiscard]] inline std::vector<Inequality> energy_consistent_inequalities(const ForceBounds& bounds,
-                                                                            Inertia inertia,
-                                                                            VirtualCoupling coupling,
-                                                                            const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
+                                                          const ForceBounds& bounds, const Scheme& scheme,
+                                                          const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const bool limited = detail::limit_acts(device);
-    const double alone = inertia.midpoint_slope(T);
+    const double alone = scheme.inertia.midpoint_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -207,22 +209,6 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                      "docs/certificate.md", true});
     detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     return lines;
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return massless_inequalities(bounds, scheme.coupling, device);
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
-                                                          const ForceBounds& bounds, const Scheme& scheme,
-                                                          const DeviceProfile& device) {
-    return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
 }
 
 }  // namespace palpate
