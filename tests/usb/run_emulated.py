@@ -5,8 +5,8 @@
     tests/usb/run_emulated.py [OPTIONS] -- COMMAND...
 
 CMake builds the emulator with the C++ tests (preset dev); otherwise this script builds it. By default the
-clock paces the frames; with `--lock-step` the transfers of the host pace them. `--help` lists all options. The
-exit code is that of the command, or 77 if a package is missing.
+clock paces the frames; with `--lock-step` the transfers of the host pace them. `--help` lists all options.
+The exit code is that of the command, or 77 if a package is missing.
 """
 
 from __future__ import annotations

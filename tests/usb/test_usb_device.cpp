@@ -83,8 +83,7 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     EXPECT_GE(health.stream.round_trip.count(), static_cast<std::uint64_t>(samples));
     // A busy machine sometimes misses a frame, so that a command is late or skipped.
     EXPECT_LE(health.skipped_commands - before.skipped_commands, static_cast<std::uint64_t>(samples / 2));
-    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6,
-                1e6 / 256);  // one sample, to the resolution of the histogram
+    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);  // one sample; histogram resolution
 }
 
 TEST(UsbDevice, APositiveForceMovesTheHandleBack) {

@@ -86,8 +86,7 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
     ASSERT_EQ(device.open().reason, "");
     int late = 0;
     int in_time_again = 0;
-    for (int round = 0; round < rounds;
-         ++round) {  // the first round includes the first command of the stream
+    for (int round = 0; round < rounds; ++round) {  // the first includes the first command of the stream
         tell("fault busy 1");
         int in_a_row = 0;
         for (int k = 0; k < commands; ++k) {

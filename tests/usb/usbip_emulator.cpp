@@ -62,7 +62,7 @@ class UsbIp {
     }
     [[nodiscard]] int file() const { return wire_; }
 
-    /// Handles one message of the kernel; sets `wrote` for an OUT packet. Returns false if the kernel closed the device.
+    /// Handles a message of the kernel; sets `wrote` for an OUT packet. Returns false if the kernel closed the device.
     [[nodiscard]] bool receive(bool& wrote) {
         std::array<std::uint8_t, 48> header{};
         if (!read_all(header.data(), header.size())) {
