@@ -18,19 +18,19 @@ namespace palpate {
 
 namespace detail {
 
-/// True if forces come late.
+/// Returns true if the device has a delay.
 [[nodiscard]] inline bool late(const DeviceProfile& device) noexcept {
     return device.late_samples() > 0;
 }
 
-/// A line beyond which nothing is known, and what to do there.
+/// Returns a line for an unknown bound, with the cure.
 [[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double known,
                                         double value, const char* cure) {
     return {id, name, formula, known, value, Basis::None, cure};
 }
 
-/// Damping for a coupling and an object behind it whose force falls with a slope of at most `falling`; for 0 with or
-/// without a force limit.
+/// Returns the damping needed for a coupling and an object behind it whose force falls with a slope of at most
+/// `falling`. For 0 it holds with and without a force limit.
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
                                                     const DeviceProfile& device) {
     return {"damping-coupling",
@@ -45,6 +45,7 @@ namespace detail {
             "Colgate, Stanley and Brown 1995; docs/certificate.md"};
 }
 
+/// Adds the line h >= 0, if the model has hysteresis.
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
         lines.push_back({"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower,
@@ -52,7 +53,7 @@ inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) 
     }
 }
 
-/// No bound is known for the effect of encoder steps on this object.
+/// Adds a line for encoder steps; a bound of their effect on this object is not known.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name,
@@ -72,13 +73,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                         "leave the mass out (mass 0, damping 0)");
 }
 
-/// p + min f' > 0: the load line has one solution.
+/// Returns p + min f' > 0: the load line has one solution.
 [[nodiscard]] inline Inequality uniqueness(double p, double falling, const char* formula) {
     return {"unique-solution", "one solution of the load line", formula, p, falling,
             Basis::Proved,     "docs/certificate.md",           true};
 }
 
-/// True if the force of a coupling to a mass can reach the limit. It has no bound, because a hand can move any
+/// Returns true if the force of a coupling to a mass can reach the limit. It is unbounded, because a hand can move any
 /// distance in a sample.
 [[nodiscard]] inline bool limit_acts(const DeviceProfile& device) noexcept {
     return std::isfinite(device.force_limit);
@@ -86,8 +87,9 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 }  // namespace detail
 
-/// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
-/// object whose force falls with a slope of at most `falling`; 0 if there is none.
+/// Returns the largest coupling stiffness for which `share` of the device's damping is sufficient. The coupling has
+/// damping, and the force of the object falls with a slope of at most `falling`. Returns 0 if no stiffness is
+/// certified.
 [[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
                                               double share) {
     constexpr double finer = 0.97;
@@ -114,8 +116,8 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     return low;
 }
 
-/// An object without mass behind a coupling, its force limited: slopes of the limited force are those of the force or
-/// 0. Without coupling damping a static one is a static force F(x) of slope K_c f' / (K_c + f').
+/// Returns the lines of a limited object without mass behind a coupling. Slopes of the limited force are those of the
+/// force or 0. Without coupling damping a static force acts as a static force F(x) of slope K_c f' / (K_c + f').
 [[nodiscard]] inline std::vector<Inequality> massless_inequalities(const ForceBounds& bounds,
                                                                    VirtualCoupling coupling,
                                                                    const DeviceProfile& device) {
@@ -154,7 +156,8 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     return lines;
 }
 
-/// An object with mass behind a coupling, backward Euler. The mass does not help a force that falls.
+/// Returns the lines of an object with mass behind a coupling, by backward Euler. The mass does not reduce the need of
+/// a falling force.
 [[nodiscard]] inline std::vector<Inequality> implicit_inequalities(const ForceBounds& bounds, Inertia inertia,
                                                                    VirtualCoupling coupling,
                                                                    const DeviceProfile& device) {
@@ -188,8 +191,8 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     return lines;
 }
 
-/// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope, and at any
-/// solution of the step.
+/// Returns the lines of an object with mass behind a coupling by the energy-consistent step, which stores exactly the
+/// work done on it. It is passive for any slope, and at any solution of the step.
 [[nodiscard]] inline std::vector<Inequality> energy_consistent_inequalities(const ForceBounds& bounds,
                                                                             Inertia inertia,
                                                                             VirtualCoupling coupling,
