@@ -16,6 +16,7 @@ using namespace py::literals;
 
 namespace {
 
+/// Converts JSON to a Python value.
 py::object to_python(const Json& value) {
     switch (value.type()) {
         case Json::value_t::object: {
@@ -47,7 +48,7 @@ py::object to_python(const Json& value) {
     }
 }
 
-/// An integer of more than 64 bits becomes a double, as it does in a file.
+/// Converts a Python value to JSON. An integer of more than 64 bits becomes a double, as in a file.
 Json to_json(const py::handle& value, int depth = 0) {
     if (depth > deepest_json) {
         throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +

@@ -13,7 +13,7 @@
 
 namespace palpate::bindings {
 
-/// Keyword -> function that sets a field of a settings struct.
+/// Map from a keyword to a function that sets a field of a settings struct.
 template <class T>
 using Setters = std::map<std::string, std::function<void(T&, const pybind11::handle&)>>;
 
@@ -26,8 +26,8 @@ template <class T, class... Path>
     };
 }
 
-/// Sets the fields of a settings struct by keyword; None leaves the default. TypeError for an unknown keyword, InputError
-/// for a value of a wrong type.
+/// Sets the fields of a settings struct by keyword; None keeps the default. Raises TypeError for an unknown keyword and
+/// InputError for a value of a wrong type.
 template <class T>
 void set_fields(T& settings, const pybind11::kwargs& given, const Setters<T>& setters) {
     namespace py = pybind11;

@@ -34,6 +34,7 @@ std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
     return numbers;
 }
 
+/// Simulates a rendering and returns its columns.
 py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
                             const Hand& hand, double duration_s, int substeps, double start_position,
                             const std::optional<py::function>& progress) {
@@ -58,6 +59,7 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
         "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
 
+/// Returns the columns of a driven rendering.
 py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
     std::vector<double> force;
     std::vector<double> position;
