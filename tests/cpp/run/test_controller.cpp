@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// A device whose readings the test writes down beforehand, to see what the controller makes of bad ones.
+/// A device with prescribed readings, for tests of the controller with invalid ones.
 class ScriptedDevice {
   public:
     Opened open() { return {}; }
