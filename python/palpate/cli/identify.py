@@ -17,7 +17,7 @@ from ..baselines import Compared, compare
 from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
 from ..identification.options import RESERVED_INPUTS
-from ..identification.search.criteria import reporting_to
+from ..identification.search.evidence import reporting_to
 from ..recording import Recording
 from ..verdict import Verdict
 from ..verification import Verification, verify
