@@ -32,9 +32,9 @@ from ..errors import InputError
 from ..model import Model
 from ..recording import Source
 from ..recording.conversion import mirrored
-from ..recording.long_recording import PART_ROWS, LongRecording, open_long_recording
+from ..recording.motion import strokes_from_order
+from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
-from ..recording.strokes import strokes_from_order
 from ..verdict import Finding, usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS

@@ -4,11 +4,12 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <string>
 
 namespace palpate {
 
-/// A number as a person reads it: four significant digits, and no exponent where whole digits say it better.
+/// Returns a number as text with four significant digits, and without an exponent if digits are shorter.
 [[nodiscard]] inline std::string readable(double value) {
     std::array<char, 32> digits{};
     char* const first = digits.data();
@@ -17,6 +18,9 @@ namespace palpate {
     const bool whole = size >= 1e3 && size < 1e7;
     return {first, whole ? std::to_chars(first, last, value, std::chars_format::fixed, 0).ptr
                          : std::to_chars(first, last, value, std::chars_format::general, 4).ptr};
+}
+[[nodiscard]] inline std::string readable(std::optional<double> value) {
+    return value ? readable(*value) : "not given";
 }
 
 }  // namespace palpate

@@ -21,15 +21,15 @@
 
 namespace palpate {
 
-/// Opens the simulated device for rendering: that of the certificate if one holds, else the default knob at the model's
+/// Opens the simulated device for rendering: that of a valid certificate, otherwise the default knob at the model's
 /// scale.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
                                                                 const PlannedModel& model) {
     const bool certified = void_reason(options, model).empty();
     const double rate_hz = certified ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
     if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
-        refuse("--rate-hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
-               readable(rate_hz) + " Hz: plan again for a device of that period, or give --uncertified");
+        refuse("rate_hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
+               readable(rate_hz) + " Hz: plan again for a device of that period, or set uncertified");
     }
     LoopSettings loop = options.loop;
     loop.rate_hz = rate_hz;
@@ -73,7 +73,7 @@ namespace palpate {
                "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
     if (kind != "simulated" && !options.faults.empty()) {
-        refuse("--fault is for the simulated device");
+        refuse("faults are for the simulated device");
     }
     if (model.force_unit == "A") {
         refuse(
@@ -84,8 +84,8 @@ namespace palpate {
                                 : open_simulated(options, model);
 }
 
-/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or simulated with the model `object`
-/// mounted. Options that follow the device are set.
+/// Returns a closed device for a measurement by its name: usb[:SERIAL], or simulated with the model `object` mounted.
+/// Sets the options that depend on the device.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
                                                                    const std::optional<ForceModel>& object) {
     if (options.device == "usb" || options.device.starts_with("usb:")) {
@@ -93,6 +93,8 @@ namespace palpate {
     }
     detail::require(options.device == "simulated",
                     "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    detail::require(object || options.record.empty(),
+                    "nothing is mounted on the simulated device; give it an object, a model file");
     validate(options.loop);
     const double period_s = 1.0 / options.loop.rate_hz;
     TestRig rig;
