@@ -23,7 +23,7 @@ LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
 
 def generated() -> dict[str, str]:
-    """Returns the stub files and the schema that belong to the compiled module: name below the package -> text."""
+    """Returns stub files and schema of the compiled module: name below the package -> text."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
         subprocess.run(command, check=True)

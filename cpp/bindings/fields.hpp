@@ -14,10 +14,11 @@
 
 namespace palpate::bindings {
 
-/// A field of an enumeration is a str in Python.
+/// Type of a field in Python: str for an enumeration.
 template <class V>
 using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
 
+/// Converts a field to its Python type.
 template <class V>
 PythonType<V> to_python(const V& value) {
     if constexpr (HasWords<V>) {
@@ -40,7 +41,7 @@ void set_field(T& object, PythonType<FieldType<T, k>>&& value) {
     }
 }
 
-/// The first `required` fields have no default.
+/// Returns the keyword argument of a field. The first `required` fields are without a default.
 template <class T, std::size_t k, std::size_t required>
 auto argument_of(const T& standard) {
     const auto& field = std::get<k>(fields_of<T>);
@@ -60,8 +61,8 @@ pybind11::dict dict_of(const T& object) {
 }
 
 /// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, pickling, copying, comparison, hash
-/// and repr. `with_repr` is false for a class with a shorter repr; `check` throws if the fields do not fit together. A
-/// Python subclass with the same constructor is kept.
+/// and repr. `with_repr` is false for a class with a shorter repr; `check` throws if the fields contradict each other. An
+/// instance of a Python subclass with the same constructor keeps its type.
 template <class T, std::size_t required = 0>
 void bind_fields(
     pybind11::class_<T>& type, bool with_repr = true,

@@ -44,7 +44,7 @@ class Broadcast {
     py::ssize_t stride_ = 0;
 };
 
-/// Force, slope and energy at x, for a hysteresis model by direction or by the play state.
+/// Returns force, slope and energy at x; for a hysteresis model by direction or by the play state.
 EnvironmentSample sample(const ForceModel& model, double x, std::optional<double> direction,
                          std::optional<double> play) {
     if (const WaveletNetwork* network = model.network()) {
@@ -57,6 +57,7 @@ EnvironmentSample sample(const ForceModel& model, double x, std::optional<double
     return both.at(x, {*play});
 }
 
+/// Throws unless the arguments fit the inputs of the model.
 void require_inputs(const ForceModel& model, bool direction, bool play) {
     detail::require(model.parameters().dimension == 1,
                     "the model has " + std::to_string(model.parameters().dimension) +
@@ -80,6 +81,7 @@ constexpr HatQuantity quantity_of(Member member) {
                                                  : HatQuantity::Integral;
 }
 
+/// Returns one quantity at one position.
 template <Member member>
 double scalar(const ForceModel& model, double position, const py::object& /*velocity*/,
               const py::object& /*acceleration*/, std::optional<double> direction,
@@ -88,6 +90,7 @@ double scalar(const ForceModel& model, double position, const py::object& /*velo
     return sample(model, position, direction, play).*member;
 }
 
+/// Returns one quantity at many positions.
 template <Member member>
 py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, const py::object& /*velocity*/,
                           const py::object& /*acceleration*/, const std::optional<ArrayLike>& given_direction,
@@ -119,7 +122,7 @@ py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, c
     return result;
 }
 
-/// One quantity of the model under one name: a number in, a number out; an array in, an array out.
+/// Binds one quantity of the model. A number gives a number, an array gives an array.
 template <Member member>
 void bind_quantity(py::class_<ForceModel>& type, const char* name, const char* doc) {
     type.def(name, &scalar<member>, doc, py::arg("position").noconvert(), py::kw_only(),
@@ -130,6 +133,7 @@ void bind_quantity(py::class_<ForceModel>& type, const char* name, const char* d
              "direction"_a = py::none(), "play"_a = py::none());
 }
 
+/// Makes a model from the arguments of its Python constructor.
 ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight, const Array& linear,
                       double bias, const std::optional<Array>& weight_hysteresis,
                       const std::optional<Array>& linear_hysteresis, std::optional<double> bias_hysteresis,
@@ -171,7 +175,7 @@ Array row(const std::vector<double>& values) {
     return Array(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// Force at one row of X of a model of several inputs or with hysteresis.
+/// Returns the force for one row of X of a model of several inputs or with hysteresis.
 double row_force(const ForceModel& model, const double* row) {
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() != nullptr ? 1 : 0);
     if (!std::all_of(row, row + columns, [](double value) { return std::isfinite(value); })) {
@@ -182,6 +186,7 @@ double row_force(const ForceModel& model, const double* row) {
                              : model.hysteresis()->sliding(row[0], row[1]).force;
 }
 
+/// Returns the forces for the rows of X.
 py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     const Array x = numbers(rows, "X");
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() ? 1 : 0);
@@ -206,6 +211,7 @@ py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     return result;
 }
 
+/// Returns the states of a play operator along positions.
 py::array_t<double> play_states(const Array& position, double radius, std::optional<double> start) {
     require_vector(position, "position");
     detail::require(radius > 0.0, "radius is " + std::to_string(radius) + ", must be > 0");
@@ -229,6 +235,7 @@ std::pair<double, double> pair_of(Interval interval) {
     return {interval.lower, interval.upper};
 }
 
+/// Returns true at positions outside the data.
 py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
     const Array position = numbers(positions, "position");
     require_inputs(model, true, true);

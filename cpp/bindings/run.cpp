@@ -27,8 +27,8 @@ using namespace py::literals;
 namespace {
 
 /// Calls Python while a session runs without the interpreter's lock: its signal handlers, and ten times a second
-/// `progress(ticks, position, force, lost)`. What they raise ends the session and is raised again afterwards; Ctrl-C
-/// only ends the session.
+/// `progress(ticks, position, force, lost)`. An exception ends the session and is raised after it; Ctrl-C only ends the
+/// session.
 class Watcher {
   public:
     Watcher(const std::optional<py::function>& progress, std::atomic<double> LoopProgress::* force)
@@ -107,6 +107,7 @@ py::object python_of(const NamedValues& fields) {
     return dict;
 }
 
+/// Returns one field of all ticks as an array.
 template <class Value>
 py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord::* field) {
     py::array_t<Value> values(static_cast<py::ssize_t>(ticks.size()));
@@ -126,6 +127,7 @@ void set_options(T& options, const py::kwargs& given) {
                     "wait_s is " + readable(options.wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
 }
 
+/// Renders a model and returns the fields of the summary.
 py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& plan,
                           const std::optional<ForceModel>& limited,
                           const std::optional<Certificate>& certificate, const std::string& position_unit,
@@ -149,6 +151,7 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     return result;
 }
 
+/// Measures an object and returns the fields of the summary.
 py::dict measure_in_python(const std::optional<ForceModel>& object, const std::string& position_unit,
                            const std::string& force_unit, const std::optional<py::function>& progress,
                            const py::kwargs& given) {

@@ -34,6 +34,7 @@ std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
     return numbers;
 }
 
+/// Simulates a rendering and returns its columns.
 py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
                             const Hand& hand, double duration_s, int substeps, double start_position,
                             const std::optional<py::function>& progress) {

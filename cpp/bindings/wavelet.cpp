@@ -22,11 +22,11 @@ using namespace py::literals;
 
 namespace {
 
-/// One radial hat at a block of samples, from the squares of u.
+/// One radial hat at a block of samples, computed from the squares of u.
 struct Hats {
     static constexpr std::size_t block = 64;
 
-    double inputs = 1.0;  ///< how many
+    double inputs = 1.0;  ///< number of inputs
     std::size_t first = 0, size = 0;
     std::array<double, block> square{}, gaussian{};
 
@@ -38,7 +38,7 @@ struct Hats {
 /// Samples and wavelets of one call: X (n, d), alpha and beta (N, d). One-dimensional arrays mean d = 1.
 struct Frame {
     std::size_t samples, wavelets, dimension;
-    std::vector<double> inputs;  ///< X input by input
+    std::vector<double> inputs;  ///< X, input by input
     const double *alpha, *beta;
 
     Frame(const Array& x_array, const Array& alpha_array, const Array& beta_array) {
@@ -68,23 +68,21 @@ struct Frame {
         beta = beta_array.data();
     }
 
-    /// u_j of wavelet i at sample k.
+    /// Returns u_j of wavelet i at sample k.
     [[nodiscard]] double scaled(std::size_t i, std::size_t k, std::size_t j) const noexcept {
         return alpha[i * dimension + j] * (inputs[j * samples + k] - beta[i * dimension + j]);
     }
 
-    /// The same for what a hat is multiplied by: far away it is zero whatever u is, even if it is infinite.
+    /// Returns u_j for products with a hat, limited to the reach of a hat. A distant hat is zero even if u is infinite.
     [[nodiscard]] double clamped(std::size_t i, std::size_t k, std::size_t j) const noexcept {
         return std::clamp(scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
     }
 
-    /// Calls visit(hats) for every block of samples with the radial hats of wavelet i there. Each line of the
-    /// work is a loop over a block that the compiler vectorises, and no exponential is taken where the wavelet
-    /// reaches no sample of it.
+    /// Calls visit(hats) with the radial hats of wavelet i for every block of samples. Each step is a loop over a block
+    /// that the compiler vectorises. A block beyond the reach of the wavelet needs no exponentials.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
-        // algebra takes ten times as long.
+        // exp(-80) is 2e-35. Products of smaller numbers are denormal, which makes linear algebra ten times as slow.
         constexpr double nothing_is_left = 160.0;
         constexpr double most = detail::hat_reach * detail::hat_reach;
         Hats hats;
@@ -119,7 +117,7 @@ struct Frame {
     }
 };
 
-/// An (n, N) array stored column by column, as linear algebra wants it.
+/// An (n, N) array stored column by column, the order that linear algebra requires.
 using Columns = py::array_t<double, py::array::f_style>;
 
 [[nodiscard]] Columns columns(std::size_t samples, std::size_t wavelets) {

@@ -16,7 +16,7 @@ from ..planning import DeviceProfile, Plan, example_profiles, profile_file
 from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
-from .figures import figure_file, require_figure_name, source_name
+from .figures import figure_file, source_name
 from .printing import (
     Verb,
     number,
@@ -25,11 +25,9 @@ from .printing import (
     print_numbers,
     print_paragraph,
     print_verdict,
-    require_distinct,
-    require_writable,
     talk,
 )
-from .verb import PATH, json_option, plot_option, verb
+from .verb import PATH, json_option, plot_option, require_writable, verb
 
 
 class Samples(click.ParamType[int | str]):
@@ -71,7 +69,6 @@ accepted. Nothing is written then.
 
 def _list_examples(*, as_json: bool) -> None:
     """Print every example profile with its file and its sources."""
-
     examples = example_profiles()
     if as_json:
         print_json(
@@ -127,12 +124,8 @@ def plan(
 ) -> None:
     """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
-    if plot is not None:
-        require_figure_name(plot)
-        require_writable(plot, inputs=(model_file, profile_path))
-    if output is not None:  # the model's own file may be written anew
-        require_writable(output, inputs=(profile_path,))
-    require_distinct(output, plot)
+    require_writable(plot, inputs=(model_file, profile_path))
+    require_writable(output, plot, inputs=(profile_path,))  # the model's own file may be written anew
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")

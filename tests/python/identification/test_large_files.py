@@ -237,7 +237,10 @@ def test_no_scheduler_is_told_in_one_sentence(tmp_path: Path, capsys: pytest.Cap
     assert not (tmp_path / "m.json").exists()
 
 
-def test_the_command_shows_how_far_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_shows_how_far_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("palpate.cli.printing._EVERY_S", 0.0)
     rows(5_000).to_csv(tmp_path / "press.csv", index=False)
     command = ["identify", str(tmp_path / "press.csv"), "-o", str(tmp_path / "m.json"), "--out-of-core"]
     assert main(command) == 0

@@ -15,31 +15,33 @@
 
 #include "palpate/fields/readable.hpp"
 
-// One table for each struct: the name, place, meaning and rule of every field. It drives the checks, the files, the
-// fingerprints, the comparisons and the Python classes.
+// One table for each struct with name, member, meaning and rule of every field. Checks, files, fingerprints,
+// comparisons and Python classes use it.
 namespace palpate {
 
-/// What a number may be.
+/// Rule for a number.
 enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 
+/// Returns the rule in words.
 [[nodiscard]] constexpr const char* text(Rule rule) noexcept {
     constexpr const char* texts[]{"a number", "a finite number", ">= 0", "> 0"};
     return texts[static_cast<std::size_t>(rule)];
 }
 
+/// Returns true if a value satisfies a rule.
 [[nodiscard]] inline bool obeys(double value, Rule rule) noexcept {
     return rule == Rule::Any || (std::isfinite(value) && (rule == Rule::Finite || value > 0.0 ||
                                                           (rule == Rule::NotNegative && value == 0.0)));
 }
 
-/// A field that is reached by a path of members.
+/// A field at the end of a path of members.
 template <auto... path>
 struct Field {
     const char* name = "";
     const char* doc = "";  ///< meaning and unit
     Rule rule = Rule::Any;
-    bool stored = true;  ///< false: not written to a file, because it can be computed
-    std::span<const std::string_view> words = {};  ///< the values of a text; empty = any
+    bool stored = true;  ///< false: not written to files, because it can be computed
+    std::span<const std::string_view> words = {};  ///< allowed texts; empty = any
 
     template <class S>
     [[nodiscard]] static constexpr auto& of(S& object) noexcept {
@@ -47,7 +49,7 @@ struct Field {
     }
 };
 
-/// The same field inside a struct that holds it as `outer`.
+/// Returns the same field of a struct that contains it as `outer`.
 template <auto outer, auto... path>
 [[nodiscard]] constexpr Field<outer, path...> within(const Field<path...>& field, const char* name) noexcept {
     return {name, field.doc, field.rule, field.stored, field.words};
@@ -70,27 +72,31 @@ inline constexpr bool is_optional<std::optional<V>> = true;
 template <class S>
 inline constexpr auto fields_of = nullptr;
 
+/// True for a struct with a table of fields.
 template <class S>
 concept HasFields = !std::is_null_pointer_v<std::remove_cv_t<decltype(fields_of<S>)>>;
 
+/// Calls `visit` with every field of a struct.
 template <HasFields S, class Visit>
 constexpr void for_each_field(Visit visit) {
     std::apply([&](const auto&... field) { (visit(field), ...); }, fields_of<S>);
 }
 
-/// The words of an enumeration in the order of its values, to be specialised for each.
+/// Words of an enumeration in the order of its values; each enumeration specialises it.
 template <class Enum>
 inline constexpr auto words_of = nullptr;
 
+/// True for an enumeration with words.
 template <class Enum>
 concept HasWords = !std::is_null_pointer_v<std::remove_cv_t<decltype(words_of<Enum>)>>;
 
+/// Returns the word of a value.
 template <HasWords Enum>
 [[nodiscard]] constexpr std::string_view name_of(Enum value) noexcept {
     return words_of<Enum>[static_cast<std::size_t>(value)];
 }
 
-/// "direct, massless or implicit"
+/// Returns a text such as "direct, massless or implicit".
 [[nodiscard]] inline std::string either(std::span<const std::string_view> words) {
     std::string text;
     for (std::size_t k = 0; k < words.size(); ++k) {
@@ -99,7 +105,7 @@ template <HasWords Enum>
     return text;
 }
 
-/// The value of a word. Throws std::invalid_argument with the name of the field.
+/// Returns the value of a word. Throws std::invalid_argument with the name of the field.
 template <HasWords Enum>
 [[nodiscard]] Enum named(std::string_view word, const char* field) {
     for (std::size_t k = 0; k < words_of<Enum>.size(); ++k) {

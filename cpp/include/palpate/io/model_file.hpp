@@ -16,7 +16,7 @@
 
 namespace palpate {
 
-/// What a rendering needs of a model file.
+/// Content of a model file that a rendering uses.
 struct ModelFile {
     ForceModel model;                        ///< as it was identified
     std::string position_unit;               ///< rad, m, count or "" (unstated)
@@ -26,13 +26,13 @@ struct ModelFile {
     std::optional<ForceModel> limited;       ///< plan.network: the plan renders it in place of `model`
     std::optional<Certificate> certificate;  ///< of the plan; recomputed, and found the same
 
-    /// The model that the plan renders.
+    /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
 };
 
 namespace detail {
 
-/// N rows of d numbers, one after the other.
+/// Returns N rows of d numbers, one after the other.
 [[nodiscard]] inline std::vector<double> matrix(const JsonField& field, std::size_t d, bool positive) {
     std::vector<double> values;
     for (const JsonField& row : field.items()) {
@@ -44,6 +44,7 @@ namespace detail {
     return values;
 }
 
+/// Checks the member `fit`.
 inline void check_fit(const JsonField& fit, std::size_t wavelets) {
     fit.require_keys({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
     (void)fit["model_class"].words();
@@ -61,6 +62,7 @@ inline void check_fit(const JsonField& fit, std::size_t wavelets) {
                               std::to_string(wavelets) + ", the wavelets of the network");
 }
 
+/// Checks the member `data`.
 inline void check_data(const JsonField& data) {
     data.require_keys({"sha256", "files", "rows", "columns"});
     (void)data["sha256"].words();
@@ -74,6 +76,7 @@ inline void check_data(const JsonField& data) {
     }
 }
 
+/// Returns the domain of a file with its continuation.
 inline Domain read_domain(const JsonField& file, std::size_t d) {
     const JsonField domain = file["domain"];
     domain.require_keys({"lower", "upper"});
@@ -97,7 +100,7 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     return read;
 }
 
-/// The network at `network`, which is the file's own or that of its plan, with the domain and kind of the file.
+/// Returns the network at `network`, which is that of the file or of its plan, with the domain and kind of the file.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
     network.require_keys({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
                           "linear_hysteresis", "bias_hysteresis"});
@@ -139,7 +142,8 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     return {read, {loss.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
 }
 
-/// The network that a plan renders in place of the identified one: of the same inputs, with the same hysteresis.
+/// Returns the network that a plan renders instead of the identified one. It has the same inputs and the same
+/// hysteresis.
 inline std::optional<ForceModel> read_limited(const JsonField& file) {
     if (file["plan"].is_null() || file["plan"]["network"].is_null()) {
         return std::nullopt;
@@ -157,11 +161,12 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
 
 }  // namespace detail
 
-/// The model in the text of a model file. Throws std::invalid_argument: field path, value, what would be right.
+/// Returns the model in the text of a model file. Throws std::invalid_argument with the path of the field, its value
+/// and the rule.
 [[nodiscard]] inline ModelFile parse_model(const Json& content) {
     const detail::JsonField file{content, ""};
     file.require_object();
-    // A file of another version may differ in every other field.
+    // Checked first, because every other field of another version may differ.
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
@@ -205,7 +210,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     return read;
 }
 
-/// Reads a model file. Throws std::invalid_argument: one sentence that begins with the file's name.
+/// Reads a model file. Throws std::invalid_argument with one sentence that begins with the name of the file.
 [[nodiscard]] inline ModelFile load_model_file(const std::string& path) {
     const Json content = read_json(path);
     try {

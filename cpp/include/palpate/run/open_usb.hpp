@@ -27,6 +27,7 @@ namespace palpate {
 
 namespace detail {
 
+/// Returns the state of the connection for a summary.
 [[nodiscard]] inline DeviceReport usb_report(const UsbDevice& device) {
     const UsbHealth health = device.health();
     const StreamHealth& stream = health.stream;
@@ -62,7 +63,7 @@ namespace detail {
                       " late echoes; " + number(health.timeouts) + " timeouts, " + number(health.stalls) +
                       " stalls, " + number(health.bus_errors) + " bus errors, " +
                       number(stream.watchdog_trips) + " watchdog trips"}}};
-    if (stream.delay.count() > 0) {  // a disabled device may accept no command
+    if (stream.delay.count() > 0) {  // a disabled device may refuse all commands
         report.fields.push_back({"round_trip", fields(stream.round_trip)});
         report.fields.push_back({"delay", fields(stream.delay)});
         report.fields.push_back(
@@ -91,7 +92,7 @@ namespace detail {
                                                           const PlannedModel& model) {
     UsbOptions usb = detail::usb_options(options);
     if (!options.uncertified && model.certificate) {
-        usb.longest_delay_s = model.certificate->device.delay_s;  // a later command is not certified
+        usb.longest_delay_s = model.certificate->device.delay_s;  // later commands are not certified
     }
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);
     if (const Opened opened = live->open(); !opened) {
@@ -114,7 +115,7 @@ namespace detail {
     return live;
 }
 
-/// Returns a USB device for a measurement, not open yet. It makes force for a probe and for pushes only.
+/// Returns a closed USB device for a measurement. It makes force only for a probe and for pushes.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> usb_to_measure(MeasureOptions& options) {
     UsbOptions usb = detail::usb_options(options);
     usb.makes_force = false;
@@ -141,6 +142,7 @@ namespace detail {
 
 #else
 
+/// Throws, because this build does not include libusb.
 [[noreturn]] inline void refuse_usb(const RunOptions& options) {
     refuse("device " + options.device +
            ": palpate was built without libusb; install libusb-1.0-0-dev and build it again");

@@ -23,7 +23,7 @@
 
 namespace palpate {
 
-/// Result of a session: everything that palpate-control and Python report.
+/// Result of a session: all values that palpate-control and Python report.
 struct Summary {
     SessionReport report;
     LoopSettings loop;
@@ -35,15 +35,17 @@ struct Summary {
     std::uint64_t telemetry_dropped = 0;
     Range positions;
     Range forces;
-    std::vector<TickRecord> kept;       ///< every tick, if they were kept
-    std::vector<std::string> notes;     ///< from before the session
+    std::vector<TickRecord> kept;       ///< every tick, if ticks are kept
+    std::vector<std::string> notes;     ///< from the time before the session
     std::vector<std::string> warnings;  ///< from the end of the recording
-    std::string last_ticks;             ///< where the last ticks before a fault are; empty without a fault
+    std::string last_ticks;             ///< recording of the last ticks before a fault; empty without one
     std::vector<SessionFinding> findings;
     std::string device;
     DeviceReport device_report;
 
+    /// Returns true if the session ended as planned.
     [[nodiscard]] bool orderly() const noexcept { return is_orderly(report.loop.exit_reason); }
+    /// Returns the exit reason as a sentence.
     [[nodiscard]] std::string ended() const { return exit_text(report.loop, loop); }
     /// Returns a sentence for each difference from the request.
     [[nodiscard]] std::vector<std::string> all_notes() const {
@@ -58,7 +60,7 @@ struct Summary {
     }
 };
 
-/// Percentiles of durations [us].
+/// Returns percentiles of durations [us].
 [[nodiscard]] inline NamedValues fields(const DurationHistogram& histogram) {
     return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
             {"p99_us", 1e-3 * histogram.quantile(0.99)},
@@ -122,7 +124,7 @@ struct Summary {
     return all;
 }
 
-/// The lines of a summary, for a person.
+/// Returns the lines of a summary, for the terminal.
 [[nodiscard]] inline Lines lines(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     const bool slow = loop.timing.rate_hz() < held_rate_share * summary.loop.rate_hz;

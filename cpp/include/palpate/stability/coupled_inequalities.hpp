@@ -18,19 +18,19 @@ namespace palpate {
 
 namespace detail {
 
-/// True if forces come late.
+/// Returns true if the device has a delay.
 [[nodiscard]] inline bool late(const DeviceProfile& device) noexcept {
     return device.late_samples() > 0;
 }
 
-/// A line beyond which nothing is known, and what to do there.
+/// Returns a line for an unknown bound, with the cure.
 [[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double known,
                                         double value, const char* cure) {
     return {id, name, formula, known, value, Basis::None, cure};
 }
 
-/// Damping for a coupling and an object behind it whose force falls with a slope of at most `falling`; for 0 with or
-/// without a force limit.
+/// Returns the damping needed for a coupling and an object behind it whose force falls with a slope of at most
+/// `falling`. For 0 it holds with and without a force limit.
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
                                                     const DeviceProfile& device) {
     return {"damping-coupling",
@@ -45,13 +45,14 @@ namespace detail {
             "Colgate, Stanley and Brown 1995; docs/certificate.md"};
 }
 
+/// Adds the line h >= 0, if the model has hysteresis.
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
         lines.push_back(loss_inequality(bounds));
     }
 }
 
-/// No bound is known for the effect of encoder steps on this object.
+/// Adds a line for encoder steps; a bound of their effect on this object is not known.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name,
@@ -71,13 +72,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                         "leave the mass out (mass 0, damping 0)");
 }
 
-/// p + min f' > 0: the load line has one solution.
+/// Returns p + min f' > 0: the load line has one solution.
 [[nodiscard]] inline Inequality uniqueness(double p, double falling, const char* formula) {
     return {"unique-solution", "one solution of the load line", formula, p, falling,
             Basis::Proved,     "docs/certificate.md",           true};
 }
 
-/// True if the force of a coupling to a mass can reach the limit. It has no bound, because a hand can move any
+/// Returns true if the force of a coupling to a mass can reach the limit. It is unbounded, because a hand can move any
 /// distance in a sample.
 [[nodiscard]] inline bool limit_acts(const DeviceProfile& device) noexcept {
     return std::isfinite(device.force_limit);

@@ -17,10 +17,12 @@
 
 namespace palpate {
 
-/// The device damping that the explicit structure needs for a passive port, linearised where the slope is K:
+/// Returns the device damping that the explicit structure needs for a passive port, linearised at the slope K:
 ///
-///     T / (2 (1 - cos theta)) Re{(1 - e^{-j theta}) z^{-n_d} H},   z = e^{j theta},   H = C E / (C + E),
-///     E = (m/T^2) (z^2 - (2 - T B_o/m) z + 1 - T B_o/m) / z + K,   C = K_c + B_c (1 - z^{-1}) / T.
+///     T / (2 (1 - cos theta)) Re{(1 - e^{-j theta}) z^{-n_d} H},   z = e^{j theta},   H = C E / (C + E).
+///
+/// E is the object, E = (m/T^2) (z^2 - (2 - T B_o/m) z + 1 - T B_o/m) / z + K, and C the coupling,
+/// C = K_c + B_c (1 - z^{-1}) / T.
 [[nodiscard]] inline double explicit_need_at(double theta, double slope, Inertia inertia,
                                              VirtualCoupling coupling, double period_s,
                                              int delay_samples) noexcept {
@@ -36,13 +38,13 @@ namespace palpate {
            ((1.0 - back) * std::polar(1.0, -delay_samples * theta) * felt).real();
 }
 
-/// The largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
-/// sample. It belongs to the linearised system; its error is not bounded.
+/// Returns the largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
+/// sample. It holds for the linearised system; its error is not bounded.
 [[nodiscard]] inline double explicit_need(Interval slopes, Inertia inertia, VirtualCoupling coupling,
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    constexpr int halvings = 20;     // of the grid's step, in the end
+    constexpr int halvings = 20;     // of the step of the grid
     constexpr double lowest = 1e-4;  // [rad a sample]
     const double octaves = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {

@@ -23,7 +23,8 @@ namespace palpate {
 
 namespace detail {
 
-/// The largest value in [0, most] for which a condition holds that holds for every smaller value.
+/// Returns the largest value in [0, most] for which a condition holds; the condition also holds for every smaller
+/// value.
 template <class Holds>
 [[nodiscard]] double largest_that_holds(double most, Holds holds) {
     if (holds(most)) {
@@ -44,7 +45,7 @@ template <class Holds>
     return low;
 }
 
-/// True if direct rendering of a force with these slopes is certified; with hysteresis, h / r = stick.
+/// Returns true if direct rendering of a force with these slopes is certified; with hysteresis, h / r = stick.
 [[nodiscard]] inline bool holds_directly(const DeviceProfile& device, SlopeRange sliding, double stick) {
     ForceBounds bounds;
     bounds.slope = {-sliding.falling, sliding.rising + stick};
@@ -55,18 +56,18 @@ template <class Holds>
                                 : direct_inequalities(bounds, device));
 }
 
-/// Above every slope that matters, far below where numbers end.
+/// Returns a slope that is larger than any realistic one and far below the largest number.
 [[nodiscard]] inline double beyond_every_slope(const DeviceProfile& device) noexcept {
     return 1e9 * (1.0 + device.viscous_damping / device.period_s);
 }
 
 }  // namespace detail
 
-/// The slopes that direct rendering is certified for: the inverse of its inequalities.
+/// Returns the slopes for which direct rendering is certified: the inverse of its inequalities.
 ///
-/// First the steepest k for which slopes of -k and k hold together, neither counted steeper than `wanted`. Then
-/// slopes may fall, and after that rise, as steeply as is still certified: falling slopes cost less. With hysteresis
-/// these are slopes while sliding; a stick adds h / r = `stick`. An end that nothing limits is infinite.
+/// First finds the largest k for which slopes of -k and k are certified together, both limited to `wanted`. Then finds
+/// the largest falling slope, and after that the largest rising one, because falling slopes need less damping. With
+/// hysteresis these are slopes while sliding; sticking adds h / r = `stick`. A side without a limit is infinite.
 [[nodiscard]] inline Interval renderable_slopes(const DeviceProfile& device, double stick = 0.0,
                                                 SlopeRange wanted = {
                                                     std::numeric_limits<double>::infinity(),
@@ -78,7 +79,7 @@ template <class Holds>
     };
     const double both = detail::largest_that_holds(
         most, [&](double k) { return holds(std::min(k, wanted.rising), std::min(k, wanted.falling)); });
-    // Not at the very edge, where rounding would hide what is left for the other side.
+    // Slightly inside the edge, because there rounding would hide the remaining margin for the other side.
     double rising = inside * std::min(both, wanted.rising);
     double falling = inside * std::min(both, wanted.falling);
     falling = std::max(falling, inside * detail::largest_that_holds(most, [&](double k) {
@@ -92,15 +93,15 @@ template <class Holds>
     return {-end(falling), end(rising)};
 }
 
-/// The slope h / r that leaves half of what the device holds to sliding.
+/// Returns the slope h / r that leaves half of the device's largest slope for sliding.
 [[nodiscard]] inline double steepest_stick(const DeviceProfile& device) {
     return detail::largest_that_holds(detail::beyond_every_slope(device), [&](double stick) {
         return detail::holds_directly(device, {stick, stick}, stick);
     });
 }
 
-/// The narrowest play radius for which hysteresis is certified, at least `least`; infinite if none is. `sliding`:
-/// bounds of the model with a play so wide that sticking adds no slope.
+/// Returns the narrowest play radius for which hysteresis is certified, at least `least`; infinity without one.
+/// `sliding` are bounds of the model with a play so wide that sticking adds no slope.
 [[nodiscard]] inline double narrowest_play(const ForceBounds& sliding, const DeviceProfile& device,
                                            double least, double most) {
     const auto holds = [&](double radius) {
