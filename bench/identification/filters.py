@@ -3,7 +3,8 @@
 
 python bench/identification/filters.py [--json FILE]
 
-The mode of the paper gets the true mass and damping, which it has to assume. The matched one identifies them.
+The mode of the paper receives the true mass and damping, because it must assume them. The matched mode
+identifies them.
 """
 
 from __future__ import annotations

@@ -263,6 +263,24 @@ Interval bounds_of(Interval (*bounds)(const NetworkParameters&, double, double, 
     return bounds(network, lower, upper, relative);
 }
 
+py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta, const Array& weight,
+                                           double linear, double bias, const Array& lower, const Array& upper,
+                                           std::size_t order) {
+    const NetworkParameters network{1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+    validate(network, {{0.0}, {1.0}, {}, {}, std::nullopt});
+    require_vector(lower, "lower");
+    detail::require_size(copied(upper), view(lower).size(), "upper");
+    detail::require(order <= highest_derivative, "order is " + std::to_string(order) + ", must be at most " +
+                                                     std::to_string(highest_derivative));
+    py::array_t<double> result(lower.size());
+    double* out = result.mutable_data();
+    const py::gil_scoped_release unlocked;
+    for (std::size_t k = 0; k < view(lower).size(); ++k) {
+        out[k] = derivative_bounds(network, view(lower)[k], view(upper)[k])[order];
+    }
+    return result;
+}
+
 }  // namespace
 
 void bind_model(py::module_& module) {
@@ -379,6 +397,11 @@ void bind_model(py::module_& module) {
         "slope_bounds", &slope_bounds,
         "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
         "times max|f'| wider than the true range.");
+    module.def(
+        "derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
+        "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
+        "Proved bounds (k,) of |f^(order)| of a network of one input, up to the ninth, over the cells\n"
+        "[lower, upper], each (k,).");
     module.def("fingerprint", &fingerprint, "model"_a,
                "16 hexadecimal digits that change with every number of which the model's force is made.");
 }

@@ -251,10 +251,6 @@ Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& b
 }  // namespace
 
 void bind_wavelet(py::module_& module) {
-    module.attr("wavelet_slope_bound") = wavelet_slope_bound;
-    module.attr("wavelet_curvature_bound") = wavelet_curvature_bound;
-    module.attr("wavelet_jerk_bound") = wavelet_jerk_bound;
-
     module.def("mexican_hat", py::vectorize([](double u) { return mexican_hat(u).value; }), "u"_a,
                "The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.");
     module.def("mexican_hat_slope", py::vectorize([](double u) { return mexican_hat(u).slope; }), "u"_a,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the README shows is what happens."""
+"""The commands, snippets and tables of the README and of docs/rendering.md are correct."""
 
 import re
 import shlex
@@ -17,10 +17,11 @@ from palpate.cli.main import palpate
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+RENDERING = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+def blocks(language: str, page: str = README) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
 
 
 def shell_commands() -> list[list[str]]:
@@ -29,31 +30,31 @@ def shell_commands() -> list[list[str]]:
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One empty folder for all of the README, whose commands build on each other."""
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty folder for all commands of the README, which use the files of each other."""
     return tmp_path_factory.mktemp("readme")
 
 
 @pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.splitlines()[0])
-def test_snippet_runs(snippet: str, bench: Path) -> None:
-    subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=bench, check=True, timeout=300)
+def test_snippet_runs(snippet: str, folder: Path) -> None:
+    subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=folder, check=True, timeout=300)
 
 
 PROGRAMS = {
     "palpate": Path(sysconfig.get_path("scripts")) / "palpate",
     "build/control/palpate-control": PROGRAM,
 }
-"""Where the commands of the README are, seen from the folder of the test."""
+"""Paths of the programs that the README names."""
 
 
 @needs_program
-def test_all_commands_but_make_run_in_their_order(bench: Path) -> None:
+def test_all_commands_but_make_run_in_their_order(folder: Path) -> None:
     commands = [words for words in shell_commands() if words[0] != "make"]
     assert {words[0] for words in commands} == set(PROGRAMS)
     for words in commands:
         answer = subprocess.run(
             [PROGRAMS[words[0]], *words[1:]],
-            cwd=bench,
+            cwd=folder,
             capture_output=True,
             text=True,
             check=False,
@@ -78,10 +79,10 @@ def test_every_target_of_make_exists() -> None:
 
 
 def shown_commands() -> list[str]:
-    """Commands that need hardware, and those inside a sentence."""
-    blocks_of_text = [line for block in blocks("text") for line in block.splitlines()]
-    return [line for line in blocks_of_text if line.startswith("palpate")] + re.findall(
-        r"`(palpate [a-z-]+ [^`]+)`", README
+    """Returns the commands that need hardware, and those inside a sentence."""
+    lines = [line for block in blocks("text", RENDERING) for line in block.splitlines()]
+    return [line for line in lines if line.startswith("palpate")] + re.findall(
+        r"`(palpate [a-z-]+ [^`]+)`", README + RENDERING
     )
 
 
@@ -97,26 +98,27 @@ def test_every_option_of_a_command_that_needs_hardware_exists(line: str) -> None
 @needs_program
 @pytest.mark.parametrize("line", [line for line in shown_commands() if line.startswith("palpate-control ")])
 def test_every_option_of_palpate_control_exists(line: str) -> None:
-    told = control("--help").stdout
+    help_text = control("--help").stdout
     for word in shlex.split(line, comments=True):
-        assert not word.startswith("--") or word in told
+        assert not word.startswith("--") or word in help_text
 
 
-def test_the_two_commands_stand_on_the_first_screen() -> None:
+def test_the_first_screen_shows_both_commands() -> None:
     first_screen = "\n".join(README.splitlines()[:40])
     assert "make demo" in first_screen
     assert "make test" in first_screen
 
 
 def test_the_table_of_statuses_is_that_of_the_source() -> None:
-    rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", README, re.MULTILINE)
+    rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", RENDERING, re.MULTILINE)
     assert rows == list(_core.status.status_meanings.items())
 
 
 @pytest.mark.parametrize(
-    "name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"]
+    "name",
+    ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "docs/rendering.md"],
 )
 def test_links_lead_to_files_that_exist(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     targets = re.findall(r"\]\((?!https?://|#)([^)#]+)", text)
-    assert [target for target in targets if not (ROOT / target).exists()] == []
+    assert [target for target in targets if not ((ROOT / name).parent / target).exists()] == []

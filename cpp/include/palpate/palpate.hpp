@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// Everything that needs no third-party library.
+/// Includes all headers that need no third-party library.
 
 #include "palpate/device/device.hpp"
 #include "palpate/device/device_profile.hpp"
@@ -45,12 +45,6 @@
 #include "palpate/realtime/ring_buffer.hpp"
 #include "palpate/realtime/timing.hpp"
 #include "palpate/realtime/wake_up.hpp"
-#include "palpate/rendering/compensated.hpp"
-#include "palpate/rendering/direct.hpp"
-#include "palpate/rendering/energy_consistent.hpp"
-#include "palpate/rendering/explicit.hpp"
-#include "palpate/rendering/implicit.hpp"
-#include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/measuring.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"

@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// Why a step ended as it did. One list for solvers, devices, guards and records; the same words in
-/// Python, in CSV files and in the documentation.
+/// Result of a step. Solvers, devices, guards and records use one list; Python, CSV files and the documentation use the
+/// same words.
 enum class Status : std::uint8_t {
     Ok,
     MaxIterations,
@@ -47,18 +47,19 @@ inline constexpr std::array<StatusText, 13> status_texts{{
     {"Softened", "the handle buzzed; all forces are scaled down from then on"},
 }};
 
+/// Returns word and meaning of a status.
 [[nodiscard]] constexpr const StatusText& text(Status status) noexcept {
     return status_texts[static_cast<std::size_t>(status)];
 }
 
-/// Whether a tick of this status sends a force. The others send zero.
+/// Returns true if a tick of this status sends a force. The others send zero.
 [[nodiscard]] constexpr bool sends_force(Status status) noexcept {
     return status == Status::Ok || status == Status::MaxIterations || status == Status::NotUnique ||
            status == Status::Limited || status == Status::Ramp || status == Status::Drained ||
            status == Status::Softened;
 }
 
-/// Whether nothing can follow a tick of this status: the device, or what it says, is not to be trusted again.
+/// Returns true if no tick can follow: the device or its readings are not reliable any more.
 [[nodiscard]] constexpr bool is_final(Status status) noexcept {
     return status == Status::Fault || status == Status::Jump || status == Status::Frozen;
 }

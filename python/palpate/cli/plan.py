@@ -13,6 +13,7 @@ from .._core.stability import Certificate
 from ..model import load_model
 from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, profile_file
+from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
 from .figures import figure_file, source_name
@@ -53,6 +54,19 @@ class _PlanVerb(Verb):
         return super().parse_args(ctx, args)
 
 
+_HELP = """Choose the structure that renders a model on a device, and certify it.
+
+The first of these structures that is certified is taken:
+
+\b
+{}
+
+Every refusal names the inequality that failed and by how much. The identified network stays in the file; a
+limited network stands under plan. Exit code 1: no structure holds, or the force error is larger than
+accepted. Nothing is written then.
+""".format("\n".join(f"  {name}: {candidate.use}" for name, candidate in CANDIDATES.items()))
+
+
 def _list_examples(*, as_json: bool) -> None:
     """Print every example profile with its file and its sources."""
     examples = example_profiles()
@@ -67,7 +81,7 @@ def _list_examples(*, as_json: bool) -> None:
             print_paragraph(paragraph, indent="  ")
 
 
-@verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb)
+@verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb, help=_HELP)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
@@ -108,14 +122,7 @@ def _list_examples(*, as_json: bool) -> None:
 def plan(
     model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
 ) -> None:
-    """Choose the structure that renders a model on a device, and certify it.
-
-    The simplest certified structure is taken: direct; direct with its slope limited to the device's limit;
-    massless behind a coupling; implicit; energy-consistent; explicit, which is stable at best. Every refusal
-    names the inequality that failed and by how much. The identified network stays in the file; a limited
-    network stands under plan. Exit code 1: no structure holds, or the force error is larger than accepted.
-    Nothing is written then.
-    """
+    """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
     require_writable(output, plot, inputs=(profile_path,))  # the model's own file may be written anew

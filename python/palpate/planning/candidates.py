@@ -265,13 +265,31 @@ def _of_position(propose: Propose) -> Propose:
     return guarded
 
 
-CANDIDATES: Mapping[str, Propose] = {
-    "direct": _direct,
-    "direct, slope limited": _of_position(_direct_limited),
-    "massless": _of_position(_massless),
-    "implicit": _of_position(lambda task: _with_mass("implicit", task)),
-    "energy-consistent": _of_position(lambda task: _with_mass("energy-consistent", task)),
-    "explicit": _of_position(_explicit),
+@dataclass(frozen=True)
+class CandidateStructure:
+    """A structure that a plan can choose."""
+
+    use: str
+    """Its rendering or its purpose, in a few words"""
+    propose: Propose
+
+
+CANDIDATES: Mapping[str, CandidateStructure] = {
+    "direct": CandidateStructure("the model as it was identified", _direct),
+    "direct, slope limited": CandidateStructure(
+        "the nearest force that the device can render", _of_position(_direct_limited)
+    ),
+    "massless": CandidateStructure(
+        "behind a virtual coupling, if a coupling is required", _of_position(_massless)
+    ),
+    "implicit": CandidateStructure(
+        "if the object has mass or damping", _of_position(lambda task: _with_mass("implicit", task))
+    ),
+    "energy-consistent": CandidateStructure(
+        "if the force falls too steeply for implicit",
+        _of_position(lambda task: _with_mass("energy-consistent", task)),
+    ),
+    "explicit": CandidateStructure("stable at best", _of_position(_explicit)),
 }
 """Candidate structures in the order in which they are tried"""
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core.rendering import Scheme, structure_names
 from .._typing import Float1D
 from ..errors import InputError
 from ..identification.data.rows import input_columns
@@ -226,7 +227,8 @@ def flight_of(recording: Recording) -> FlightRecord:
     found = re.search(r"\br = ([0-9.eE+-]+)", structure)
     radius = float(found.group(1)) if found else None
     predicted = ", predict " in structure
-    directly = structure.startswith("direct") and not predicted
+    name = structure.partition(",")[0]
+    directly = name in structure_names and not Scheme(structure=name).has_coupling and not predicted
     if not structure or directly or "compensated" in structure:
         return FlightRecord(radius)
     for name, cells in recording.columns.items():

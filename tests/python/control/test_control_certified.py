@@ -124,7 +124,7 @@ def test_what_the_certificate_does_not_cover_is_rendered_uncertified(
     )
     assert answer.returncode == 0, answer.stderr
     assert "uncertified: the options change the planned rendering" in answer.stderr
-    assert "certified: no: the command line" in metadata(record)
+    assert "certified: no: the options" in metadata(record)
 
 
 def test_one_unsound_sample_ends_a_certified_run(planned: Path) -> None:

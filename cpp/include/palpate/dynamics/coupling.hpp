@@ -7,20 +7,21 @@
 
 namespace palpate {
 
-/// The spring and damper between the device and the virtual object (paper figure 7),
+/// The virtual coupling: spring and damper between the device and the virtual object (paper figure 7),
 ///
-///     F = K_c (x_device - x_environment) + B_c (v_device - v_environment),
+///     F = K_c (x_device - x_environment) + B_c (v_device - v_environment).
 ///
-/// F > 0 pushes the device back and drives the environment on.
+/// F > 0 pushes the device back and moves the virtual object forward.
 struct VirtualCoupling {
-    double stiffness = 100.0;
-    double damping = 0.02;
+    double stiffness = 100.0;  ///< K_c [N/m]
+    double damping = 0.02;     ///< B_c [N*s/m]
 
+    /// Returns F for differences of position and velocity [N].
     [[nodiscard]] constexpr double force(double position_error, double velocity_error) const noexcept {
         return stiffness * position_error + damping * velocity_error;
     }
 
-    /// K_c + B_c / T: its part of the slope of a load line.
+    /// Returns K_c + B_c / T, the coupling's part of the slope of a load line.
     [[nodiscard]] constexpr double load_line_slope(double period_s) const noexcept {
         return stiffness + damping / period_s;
     }
@@ -33,18 +34,18 @@ inline constexpr auto fields_of<VirtualCoupling> =
                Field<&VirtualCoupling::damping>{
                    "damping", "B_c, damping of the coupling [N*s/m or N*m*s/rad].", Rule::NotNegative}};
 
-/// Mass and damping of the virtual object. The paper needs a mass to give the environment a position as output, and
-/// chose these two values for its spring and wall.
+/// Mass and damping of the virtual object. The paper needs a mass so that the environment has a position as its output;
+/// it uses these two values for its spring and wall.
 struct Inertia {
-    double mass = 0.001;
-    double damping = 0.5;
+    double mass = 0.001;   ///< m [kg]
+    double damping = 0.5;  ///< B_o [N*s/m]
 
-    /// m / T^2 + B_o / T: their part of the slope of a load line, by backward Euler.
+    /// Returns m / T^2 + B_o / T, their part of the slope of a load line by backward Euler.
     [[nodiscard]] constexpr double load_line_slope(double period_s) const noexcept {
         return mass / (period_s * period_s) + damping / period_s;
     }
 
-    /// The same by the midpoint rule: 2 m / T^2 + B_o / T.
+    /// Returns 2 m / T^2 + B_o / T, the same part by the midpoint rule.
     [[nodiscard]] constexpr double midpoint_slope(double period_s) const noexcept {
         return 2.0 * mass / (period_s * period_s) + damping / period_s;
     }

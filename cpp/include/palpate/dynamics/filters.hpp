@@ -7,20 +7,20 @@
 
 namespace palpate {
 
-/// The sample time that the paper's differentiators are designed for [s].
+/// Sample time for which the paper's differentiators are designed [s].
 inline constexpr double paper_sample_time = 1e-3;
 
-/// Which of the paper's two choices of integrators and differentiators (its section 4.3).
+/// The paper's two choices of integrators and differentiators (its section 4.3).
 enum class FilterPair : std::uint8_t { Implicit, Explicit };
 
-/// Whose gain the differentiators have.
+/// Gain of the differentiators.
 enum class FilterDesign : std::uint8_t {
     Paper,    ///< as published: G I is 1.0032 (14.8379) and 1.048 (31) at low frequency
     Matched,  ///< G I is exactly 1 at low frequency
 };
 
-/// The integrators I1 (force to velocity), I2 (velocity to position) of the environment and the
-/// differentiators G1, G2 that stand for their inverses in identification (paper figures 10 to 14).
+/// The integrators I1 (force to velocity) and I2 (velocity to position) of the environment, and the differentiators G1
+/// and G2 that replace their inverses in identification (paper figures 10 to 14).
 struct EnvironmentFilters {
     TransferFunction i1;
     TransferFunction i2;
@@ -28,9 +28,9 @@ struct EnvironmentFilters {
     TransferFunction g2;
 };
 
-/// Both differentiators share the poles of z^2 - 1.6556 z + 0.68518 (0.836 and 0.819: 179 and 199 rad/s), so
-/// G I falls to about 0.8 at 100 rad/s. With c = 1 - 1.6556 + 0.68518 the gain that makes G I = 1 at z = 1 is
-/// c / (2T) for z^2 - 1 and c / T for z - 1.
+/// Returns the paper's filters. Both differentiators have the poles of z^2 - 1.6556 z + 0.68518 (0.836 and 0.819: 179
+/// and 199 rad/s), so G I is about 0.8 at 100 rad/s. With c = 1 - 1.6556 + 0.68518, the gain for which G I = 1 at z = 1
+/// is c / (2T) for z^2 - 1 and c / T for z - 1.
 [[nodiscard]] constexpr EnvironmentFilters environment_filters(FilterPair pair,
                                                                FilterDesign design = FilterDesign::Paper) {
     constexpr double period = paper_sample_time;

@@ -8,12 +8,12 @@
 
 namespace palpate {
 
-/// A discrete transfer function of order two or less with its state,
+/// A discrete transfer function of order at most two, with its state,
 ///
 ///     H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2),
 ///
-/// run as a transposed direct form II: y = b0 u + s1, s1 <- b1 u - a1 y + s2, s2 <- b2 u - a2 y.
-/// A first-order function is written with a factor z in both polynomials.
+/// computed in transposed direct form II: y = b0 u + s1, s1 <- b1 u - a1 y + s2, s2 <- b2 u - a2 y. A first-order
+/// function has a factor z in both polynomials.
 class TransferFunction {
   public:
     constexpr TransferFunction(std::array<double, 3> numerator, std::array<double, 3> denominator)
@@ -26,6 +26,7 @@ class TransferFunction {
     [[nodiscard]] constexpr const std::array<double, 3>& numerator() const noexcept { return numerator_; }
     [[nodiscard]] constexpr const std::array<double, 3>& denominator() const noexcept { return denominator_; }
 
+    /// Returns the output for the next input.
     [[nodiscard]] constexpr double step(double input) noexcept {
         const double output = numerator_[0] * input + state_[0];
         state_[0] = numerator_[1] * input - denominator_[1] * output + state_[1];
@@ -35,13 +36,13 @@ class TransferFunction {
 
     constexpr void reset() noexcept { state_ = {}; }
 
-    /// H(z) at any z, for instance e^{j omega T}.
+    /// Returns H(z) at any z, for instance e^{j omega T}.
     [[nodiscard]] std::complex<double> at(std::complex<double> z) const noexcept {
         return ((numerator_[0] * z + numerator_[1]) * z + numerator_[2]) /
                ((z + denominator_[1]) * z + denominator_[2]);
     }
 
-    /// The roots of the denominator.
+    /// Returns the roots of the denominator.
     [[nodiscard]] std::array<std::complex<double>, 2> poles() const noexcept {
         const double middle = -0.5 * denominator_[1];
         const std::complex<double> half = std::sqrt(std::complex<double>{middle * middle - denominator_[2]});

@@ -10,47 +10,51 @@
 
 namespace palpate {
 
-/// What an energy tank may count on.
+/// Energy and losses that an energy tank may use.
 struct TankSettings {
-    StoredEnergySettings stored;  ///< the most the object can give
-    double damping = 0.0;         ///< credited, of the device's b [N*s/m or N*m*s/rad]
-    double friction = 0.0;        ///< credited, of the device's f_c [N or N*m]
-    double unsure = 0.0;          ///< length of each motion for which nothing is credited [m or rad]
-    double period_s = 1e-3;
+    StoredEnergySettings stored;  ///< bounds of the object's energy
+    double damping = 0.0;         ///< credited b of the device [N*s/m or N*m*s/rad]
+    double friction = 0.0;        ///< credited f_c of the device [N or N*m]
+    double unsure = 0.0;          ///< part of each motion without credit [m or rad]
+    double period_s = 1e-3;       ///< sample time [s]
 };
 
-/// Store that every joule a rendering gives is paid from. What it has given since it was last full is
+/// Limits the energy that a rendering may give. The energy that it has given since the tank was last full is
 ///
 ///     G_k = max(0, G_{k-1} - F u - b d^2 / T - f_c d),   d = max(0, |u| - unsure),
 ///
-/// F the force that acted, u the motion that was read, b and f_c what is credited of the device's damping and friction.
-/// Above W, the bound of what is stored, all forces fade over a reserve of W / 4, those against the handle too: one that
-/// is held too long turns it round and gives after all. What is given beyond the credited losses ends with W and the
-/// reserve.
+/// where F is the force that acted, u the motion that was read, and b and f_c the credited damping and friction of the
+/// device. If G exceeds W, the bound of the stored energy, all forces decrease over a reserve of W / 4. This includes
+/// forces against the handle, because a force that is held too long reverses the handle and then gives energy. The
+/// energy given beyond the credited losses is at most W plus the reserve.
 ///
-/// In a certified run u is the motion that the readings prove (`ReadMotion`), and everything is credited. u is the motion
-/// of a handle that the encoder can have read like this. The certificate holds for every motion, so for this one: without
-/// delay no stretch of it gives more than was stored at its start, which is at most W. The tank never acts. With delay
-/// this holds if the forces on their way at the start of the stretch add less than W leaves.
+/// In a certified run u is the motion that the readings prove (`ReadMotion`), and everything is credited. u is the
+/// motion of a handle that the encoder can have read in this way. The certificate holds for every motion, so also for
+/// this one: without delay no interval of it gives more than was stored at its start, which is at most W. The tank then
+/// never acts. With delay this holds if the forces that are pending at the start of the interval add less than W
+/// leaves.
 ///
-/// Where nothing is certified u is the change of the reading, and nine tenths of what the device certainly took are
-/// credited: a steady limit cycle gives exactly what the device takes. A slow motion then earns nothing for its single
-/// counts, and a force that falls short of its friction for the encoder's errors is not mistaken for a passive one.
+/// In an uncertified run u is the change of the reading, and nine tenths of the energy that the device certainly
+/// dissipated are credited, because a steady limit cycle gives exactly the energy that the device dissipates. A slow
+/// motion then gets no credit for its single counts. A force that is below its friction because of the encoder's errors
+/// is not treated as passive.
 class EnergyTank {
   public:
     EnergyTank() = default;
     explicit EnergyTank(const TankSettings& settings) noexcept
         : settings_{settings}, stored_{settings.stored}, reserve_{0.25 * settings.stored.within} {}
 
-    /// Where handle and object are now, and how far the handle moved while `applied` acted.
+    /// Adds the work of `applied` over the motion `moved` of the handle.
     void book(double applied, double moved) noexcept {
         const double surely = std::max(0.0, std::abs(moved) - settings_.unsure);
         const double lost = surely * (settings_.damping * surely / settings_.period_s + settings_.friction);
         given_ = std::max(0.0, given_ - applied * moved - lost);
         most_given_ = std::max(most_given_, given_);
     }
+    /// Updates the stored energy with the positions of handle and object.
     void visit(double handle, double object) noexcept { stored_.visit(handle, object); }
 
+    /// Scales the force down if the energy is used up.
     [[nodiscard]] Status apply(double& force) const noexcept {
         const double beyond = given_ - stored_.most();
         if (!(beyond > 0.0) || force == 0.0) {
@@ -60,7 +64,7 @@ class EnergyTank {
         return Status::Drained;
     }
 
-    /// G now, and its largest [J]
+    /// Return G now, and its largest value so far [J].
     [[nodiscard]] double given() const noexcept { return given_; }
     [[nodiscard]] double most_given() const noexcept { return most_given_; }
     [[nodiscard]] const StoredEnergy& stored() const noexcept { return stored_; }

@@ -16,22 +16,23 @@
 
 namespace palpate {
 
-/// The guards of a live rendering, in units of time instead of ticks.
+/// Settings of the guards of a live rendering, with times in seconds instead of ticks.
 struct GuardSettings {
-    double force_limit = 5.0;      ///< [N or N*m]
-    double slew_s = 0.005;         ///< time from no force to the limit; 0 = no slew limit [s]
-    double ramp_s = 0.2;           ///< from no force to all of it, at the start [s]
-    double largest_speed = 100.0;  ///< of the handle: beyond, the encoder jumped [m/s or rad/s]
-    double frozen_speed = 0.3;     ///< a handle this fast cannot stand still at once [m/s or rad/s]
-    double frozen_s = 0.05;        ///< how long it may seem to; 0 = not looked at [s]
-    bool energy_tank = true;  ///< whether what the rendering gives is paid from a tank of the model's size
+    double force_limit = 5.0;      ///< largest force [N or N*m]
+    double slew_s = 0.005;         ///< from zero force to the limit; 0 = no limit [s]
+    double ramp_s = 0.2;           ///< from zero to the full force at the start [s]
+    double largest_speed = 100.0;  ///< of the handle; faster is a jump [m/s or rad/s]
+    double frozen_speed = 0.3;     ///< cannot stop at once [m/s or rad/s]
+    double frozen_s = 0.05;        ///< longest apparent rest; 0 = no check [s]
+    bool energy_tank = true;       ///< true: an energy tank limits the energy
     double buzz_force =
-        0.05;  ///< a handle that shakes fast with such a swing buzzes; 0 = not looked at [N or N*m]
-    double device_damping = 0.0;   ///< b that the device is known to have [N*s/m or N*m*s/rad]
-    double device_friction = 0.0;  ///< f_c likewise [N or N*m]
+        0.05;  ///< least force swing of a fast oscillation that counts as a limit cycle; 0 = no check [N or
+               ///< N*m]
+    double device_damping = 0.0;   ///< known b [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;  ///< known f_c [N or N*m]
     double encoder_step = 0.0;     ///< [m or rad]
-    /// A certificate holds for this run: the energy tank counts on the motion that readings prove, on all
-    /// of the device's damping and friction, and on what the object stores beyond its domain.
+    /// true: a certificate holds for this run. The energy tank then uses the motion that readings prove, all of the
+    /// device's damping and friction, and the energy that the object stores outside its domain.
     bool certified = false;
 };
 
@@ -51,15 +52,15 @@ struct GuardSettings {
 }
 
 inline constexpr double longest_guard_s =
-    3600.0;  ///< of ramp_s and frozen_s; whole samples must fit an integer
+    3600.0;  ///< largest ramp_s and frozen_s; whole samples must fit an integer [s]
 
-/// Share of the device's damping and friction that the energy tank counts on where nothing is certified.
+/// Share of the device's damping and friction that the energy tank credits without a certificate.
 inline constexpr double uncertified_credit = 0.9;
 
-/// Shaking faster than this is no hand's doing.
+/// Frequency above which an oscillation cannot come from a hand [Hz].
 inline constexpr double slowest_buzz_hz = 20.0;
 
-/// Throws std::invalid_argument: the field, its value, what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const GuardSettings& settings) {
     const auto require = [](bool holds, const char* field, double value, const char* right) {
         if (!holds) {
@@ -82,6 +83,7 @@ inline void validate(const GuardSettings& settings) {
     require(not_negative(settings.encoder_step), "encoder_step", settings.encoder_step, ">= 0");
 }
 
+/// Least number of equal samples that count as a frozen encoder.
 inline constexpr std::uint64_t fewest_frozen_samples = 5;
 
 [[nodiscard]] inline ForceLimit force_limit(const GuardSettings& settings) noexcept {

@@ -19,8 +19,8 @@
 
 namespace palpate {
 
-/// What a sample passes before it is believed, and a force before it is sent. Made of nothing but a force
-/// limit it is the guard of a simulation, where nothing else can go wrong.
+/// Checks of each sample before it is used, and limits of each force before it is sent. With the force limit alone
+/// these are the guards of a simulation, because other faults cannot occur there.
 struct Guards {
     ReadingGuard reading{};
     ForceLimit limit{};
@@ -29,18 +29,18 @@ struct Guards {
     SlewLimit slew{};
     EnergyTank tank{};
     ReadMotion motion{};
-    PassivityObserver at_start{};  ///< looks on during the ramp
-    PassivityObserver observer{};  ///< looks on after it
+    PassivityObserver at_start{};  ///< observes during the ramp
+    PassivityObserver observer{};  ///< observes after the ramp
 };
 
-/// Upper bound of the energy that a rendering stores within the domain of its model, at rest. Infinite for a motor, a
-/// model that gains energy with every turn.
+/// Returns an upper bound of the energy that a rendering stores within the domain of its model, at rest [J]. It is
+/// infinite for an active model, which gains energy with every turn.
 ///
-/// The device gets the clipped force c(f). Its object stores C = int c(f) dx, with hysteresis at most r max h / 2 more
-/// (`energy_range`). The coupling stores P = K_c e^2 / 2 at a stretch of e <= F / K_c, F the largest clipped force: its
-/// force is c(f), and from K_c e_k + (B_c/T) (e_k - e_{k-1}) = c(f) with e_0 = 0 follows |e_k| <= F / K_c for every k. A
-/// compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its least can be lower by
-/// F^2 / 2 K_c. What lies outside these positions and speeds is added by `StoredEnergy` when it is visited.
+/// The device receives the clipped force c(f). Its object stores C = int c(f) dx, with hysteresis at most r max h / 2
+/// more (`energy_range`). The coupling stores P = K_c e^2 / 2 at a stretch e <= F / K_c, where F is the largest clipped
+/// force. Its force is c(f), and K_c e_k + (B_c/T) (e_k - e_{k-1}) = c(f) with e_0 = 0 gives |e_k| <= F / K_c for every
+/// k. A compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its minimum can be lower by F^2
+/// / 2 K_c. `StoredEnergy` adds positions and speeds outside this range when they occur.
 [[nodiscard]] inline double most_energy(const ForceModel& given, const Scheme& scheme, double force_limit) {
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const double held = energy_range(model, force_limit).span();
@@ -56,7 +56,7 @@ struct Guards {
     return held + (scheme.compensated ? 2.0 : 1.0) * stretched;
 }
 
-/// What bounds the energy that a certified rendering of the model stores, wherever it goes.
+/// Returns the numbers that bound the energy of a certified rendering at all positions.
 [[nodiscard]] inline StoredEnergySettings stored_energy(const ForceModel& model, const Scheme& scheme,
                                                         double force_limit, double period_s) {
     StoredEnergySettings stored;
@@ -75,7 +75,7 @@ struct Guards {
     return stored;
 }
 
-/// All guards of a live rendering.
+/// Returns all guards of a live rendering.
 [[nodiscard]] inline Guards guards_of(const GuardSettings& settings, const ForceModel& model,
                                       const Scheme& scheme, double period_s) {
     const auto longest_swing = static_cast<std::uint64_t>(std::llround(0.5 / (slowest_buzz_hz * period_s)));

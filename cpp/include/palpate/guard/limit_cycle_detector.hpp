@@ -10,26 +10,29 @@
 
 namespace palpate {
 
-/// What counts as buzzing.
+/// Criteria of a limit cycle.
 struct LimitCycleSettings {
     double force_swing =
-        std::numeric_limits<double>::infinity();  ///< least force from turn to turn [N or N*m]
-    std::uint64_t longest_swing = 25;  ///< from turn to turn [ticks]; hands turn round more slowly than 20 Hz
-    double encoder_step = 0.0;         ///< a way back no longer than this is no turn [m or rad]
+        std::numeric_limits<double>::infinity();  ///< least change of force between two reversals [N or N*m]
+    std::uint64_t longest_swing = 25;  ///< longest time between two reversals [ticks]; hands reverse more
+                                       ///< slowly than 20 Hz
+    double encoder_step = 0.0;         ///< a motion back of at most this length is not a reversal [m or rad]
 };
 
-/// Finds a handle that buzzes and makes the object softer. A buzz is ten swings in a row, each from one turn of
-/// the handle to the next, each fast, each with a notable change of force, and not dying out: the five last
-/// reach at least 0.8 of the five first. A knob turned over its detents makes forces as fast, but does not turn
-/// round.
+/// Detects a limit cycle of the handle and makes the object softer. A limit cycle is ten consecutive swings between
+/// reversals of the handle. Each is fast and has a large change of force, and they do not decay: the longest of the
+/// last five is at least 0.8 of the longest of the first five. A knob turned over its detents makes forces of the same
+/// frequency, but does not reverse.
 ///
-/// All forces are then scaled by 0.7, which scales stiffness, coupling and damping of the object alike, and
-/// again with every further buzz. They are not scaled up again: that would give energy, and a new buzz.
+/// The detector then scales all forces by 0.7, which scales stiffness, coupling and damping of the object equally. It
+/// does so again at every further limit cycle. It never scales them up, because that would give energy and a new limit
+/// cycle.
 class LimitCycleDetector {
   public:
     LimitCycleDetector() = default;
     explicit LimitCycleDetector(const LimitCycleSettings& settings) noexcept : settings_{settings} {}
 
+    /// Takes the position and the force of a tick.
     void watch(double position, double force) noexcept {
         ++ticks_;
         least_force_ = std::min(least_force_, force);
@@ -44,16 +47,19 @@ class LimitCycleDetector {
         }
     }
 
+    /// Scales the force; returns `Softened` if the scale is below 1.
     [[nodiscard]] Status apply(double& force) const noexcept {
         force *= scale_;
         return scale_ < 1.0 ? Status::Softened : Status::Ok;
     }
 
+    /// Returns the factor of all forces.
     [[nodiscard]] double scale() const noexcept { return scale_; }
+    /// Returns the number of limit cycles detected.
     [[nodiscard]] std::uint64_t buzzes() const noexcept { return buzzes_; }
 
   private:
-    static constexpr std::uint64_t half = 5;  ///< swings
+    static constexpr std::uint64_t half = 5;  ///< swings of each half
     static constexpr double still_alive = 0.8;
     static constexpr double softer = 0.7;
 
@@ -87,14 +93,14 @@ class LimitCycleDetector {
     double scale_ = 1.0;
     std::uint64_t buzzes_ = 0;
     double direction_ = 1.0;
-    double extreme_ = std::numeric_limits<double>::quiet_NaN();  ///< of the swing under way
+    double extreme_ = std::numeric_limits<double>::quiet_NaN();  ///< of the current swing
     double last_turn_ = 0.0;
-    double least_force_ = std::numeric_limits<double>::infinity();  ///< of the swing under way
+    double least_force_ = std::numeric_limits<double>::infinity();  ///< of the current swing
     double largest_force_ = -std::numeric_limits<double>::infinity();
     double first_ = 0.0;  ///< longest of the first five swings
-    double last_ = 0.0;   ///< longest of the five after them
+    double last_ = 0.0;   ///< longest of the next five swings
     std::uint64_t swings_ = 0;
-    std::uint64_t ticks_ = 0;  ///< since the last turn
+    std::uint64_t ticks_ = 0;  ///< since the last reversal
 };
 
 }  // namespace palpate

@@ -10,11 +10,12 @@
 
 namespace palpate {
 
-/// The first thing after a computed force: one that is not a number becomes zero, a larger one than `largest` is
-/// clipped. The energy of an object is that of its clipped force, so everything that scales comes later.
+/// Replaces a force that is not finite by zero, and clips a larger one to `largest`. This limit comes first, because
+/// the energy of an object is that of its clipped force; all scaling comes later.
 struct ForceLimit {
     double largest = 5.0;  ///< [N or N*m], > 0
 
+    /// Limits the force.
     [[nodiscard]] Status apply(double& force) const noexcept {
         if (!std::isfinite(force)) {
             force = 0.0;
@@ -26,28 +27,32 @@ struct ForceLimit {
     }
 };
 
-/// How far a force may move from one tick to the next. Zero, the safe command, is always in reach.
+/// Limits the change of the force between two ticks. Zero, the safe command, is always possible.
 struct SlewLimit {
-    double largest_step = std::numeric_limits<double>::infinity();  ///< a tick [N or N*m], > 0
-    double last = 0.0;                                              ///< what was sent before
+    double largest_step = std::numeric_limits<double>::infinity();  ///< largest change in a tick [N or N*m],
+                                                                    ///< > 0
+    double last = 0.0;                                              ///< force sent before [N or N*m]
 
+    /// Limits the force.
     [[nodiscard]] Status apply(double& force) noexcept {
         const double wanted = force;
         force = std::clamp(force, last - largest_step, last + largest_step);
         return force == wanted ? Status::Ok : Status::Limited;
     }
 
-    /// To be told of every force, whoever had a say in it after this limit.
+    /// Sets the force that was sent, after all guards.
     void sent(double force) noexcept { last = force; }
 };
 
-/// The way from no force to all of it: the first `ticks` forces are scaled by 0, 1/ticks, 2/ticks, ...
+/// Increases the force from zero at the start: scales the first `ticks` forces by 0, 1/ticks, 2/ticks, ...
 struct ForceRamp {
     std::uint64_t ticks = 0;
     std::uint64_t done = 0;
 
+    /// Returns true after the last scaled force.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }
 
+    /// Scales the force.
     [[nodiscard]] Status apply(double& force) noexcept {
         if (is_over()) {
             return Status::Ok;

@@ -5,21 +5,23 @@
 
 namespace palpate {
 
-/// What a rendering took in at the motor since it began,
+/// Observes the energy that a rendering has absorbed at the motor since its start,
 ///
-///     E_k = E_{k-1} + F (x_k - x_{k-1}),   F the force that acted meanwhile,
+///     E_k = E_{k-1} + F (x_k - x_{k-1}),   F the force that acted meanwhile.
 ///
-/// exact for a held force up to the encoder's step. A monitor: it never touches a force.
+/// It is exact for a held force, up to the encoder step. It never changes a force.
 class PassivityObserver {
   public:
+    /// Adds the work of `applied` over the motion `moved` of the handle.
     void book(double applied, double moved) noexcept {
         energy_ += applied * moved;
         least_ = std::min(least_, energy_);
     }
 
+    /// Returns E_k [J].
     [[nodiscard]] double energy() const noexcept { return energy_; }
-    /// The least it ever was. Below minus what the object held at the start, energy was generated; the device's
-    /// own damping may have taken it away.
+    /// Returns the least E_k so far [J]. If it is below minus the energy that the object stored at the start, energy
+    /// was generated; the device's damping may have dissipated it.
     [[nodiscard]] double least() const noexcept { return least_; }
 
   private:

@@ -10,26 +10,28 @@
 
 namespace palpate {
 
-/// Whether a device's sample can be believed: its own status, its sequence number, its position.
+/// Checks a device's sample: its status, its sequence number, its position.
 ///
-/// The sequence number has to advance by one an exchange. A larger step means lost samples, none means that a
-/// sample came twice. An exchange that ended in a timeout counts as well: its sample may come late.
+/// The sequence number must increase by one with each exchange. A larger step means lost samples; an equal number means
+/// a repeated sample. An exchange that ended in a timeout also counts, because its sample may arrive late.
 ///
-/// A handle slows down before it stands. A position that moves by `frozen_step` or more in one sample and then
-/// repeats to the last bit for `frozen_samples` is an encoder that died. One that dies while the handle rests
-/// cannot be told from a resting handle.
+/// A handle slows down before it stops. If a position moves by `frozen_step` or more in one sample and then repeats
+/// exactly for `frozen_samples`, the encoder has failed. A failure while the handle rests cannot be detected.
 class ReadingGuard {
   public:
+    /// Limits of a reading.
     struct Limits {
         double largest_step =
-            std::numeric_limits<double>::infinity();  ///< of the position, a sample [m or rad]
-        double frozen_step = 0.0;                     ///< see above [m or rad]
-        std::uint64_t frozen_samples = 0;             ///< see above; 0 = not looked at
+            std::numeric_limits<double>::infinity();  ///< of the position in a sample [m or rad]
+        double frozen_step = 0.0;  ///< least motion in a sample before the encoder can count as frozen [m or
+                                   ///< rad]
+        std::uint64_t frozen_samples = 0;  ///< number of equal samples after it; 0 = no check
     };
 
     ReadingGuard() = default;
     explicit ReadingGuard(const Limits& limits) noexcept : limits_{limits} {}
 
+    /// Returns the status of a sample.
     [[nodiscard]] Status check(double position, std::uint64_t sequence, Status reported) noexcept {
         ++exchanges_;
         if (!sends_force(reported)) {
@@ -37,7 +39,7 @@ class ReadingGuard {
         }
         const std::uint64_t advanced = sequence - last_sequence_;
         const std::uint64_t expected = exchanges_;
-        if (started_ && static_cast<std::int64_t>(advanced) <= 0) {  // again, or one from before
+        if (started_ && static_cast<std::int64_t>(advanced) <= 0) {  // a repeated or an earlier sample
             ++repeated_;
             return Status::Lost;
         }
@@ -56,12 +58,12 @@ class ReadingGuard {
         return lost ? Status::Lost : reported;
     }
 
-    /// Samples that the device took and nobody saw, and samples that came again.
+    /// Return the number of samples that the host did not receive, and of repeated samples.
     [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
     [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
 
   private:
-    static constexpr std::uint64_t most_late = 2;  ///< samples that may come later than their exchange
+    static constexpr std::uint64_t most_late = 2;  ///< samples that may arrive later than their exchange
 
     [[nodiscard]] Status followed(double position, double samples) noexcept {
         const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);
@@ -83,7 +85,7 @@ class ReadingGuard {
     bool started_ = false;
     bool was_fast_ = false;
     std::uint64_t last_sequence_ = 0;
-    std::uint64_t exchanges_ = 0;  ///< whose sample has not come yet
+    std::uint64_t exchanges_ = 0;  ///< exchanges without a sample so far
     std::uint64_t still_ = 0;      ///< samples without motion
     std::uint64_t lost_ = 0;
     std::uint64_t repeated_ = 0;

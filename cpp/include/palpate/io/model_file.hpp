@@ -170,9 +170,10 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
-    file.require_keys({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius",
-                       "mass", "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan",
-                       "certificate", "notes"});
+    file.require_keys(
+        {"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
+         "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate", "notes"},
+        " (free keys go under notes)");
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].words();
     const detail::JsonField units = file["units"];

@@ -18,33 +18,32 @@
 
 namespace palpate {
 
-/// How exact a compiled curve must be, and how large it may become.
+/// Required accuracy and largest size of a compiled curve.
 struct CompileOptions {
-    double relative_error = 1e-12;     ///< of max|f| over the domain, rounding included
-    std::size_t largest_table = 8192;  ///< cells of 80 bytes
-    std::size_t fewest_wavelets = 2;   ///< below, eq. 4 itself is as fast
+    double relative_error = 1e-12;  ///< largest error, divided by max|f| over the domain; includes rounding
+    std::size_t largest_table = 8192;  ///< largest number of cells of 80 bytes
+    std::size_t fewest_wavelets = 2;   ///< below this number, eq. 4 itself is equally fast
 };
 
 namespace detail {
 
-/// Largest effect on a cell's polynomial, and on its slope by t, of a unit error in each derivative by t at
-/// both borders: suprema of the sums of absolute Hermite basis functions.
+/// Largest change of a cell's polynomial, and of its slope by t, for a unit error of each derivative by t at both
+/// borders. These are suprema of the sums of absolute Hermite basis functions.
 inline constexpr Jet hermite_value{1.0, 11.0 / 32.0, 3.0 / 64.0, 1.0 / 384.0};
 inline constexpr Jet hermite_slope{4.375, 1.1875, 0.1468, 0.008945};
 
 }  // namespace detail
 
-/// A network of one input with its continuations, compiled to polynomials of degree 7: the cost of one
-/// evaluation no longer depends on the number of wavelets.
+/// Compiles a network of one input, with its continuations, to polynomials of degree 7. The cost of an evaluation does
+/// not depend on the number of wavelets.
 ///
-/// The error is certified when the table is built. Between two borders of a cell of width h at which f and
-/// three derivatives agree,
+/// The error is certified when the table is built. If f and three derivatives agree at both borders of a cell of width
+/// h,
 ///
-///     |f - p| <= max|f^(8)| h^8 / (256 * 8!),   |f' - p'| <= max|f^(8)| h^7 / (64 * 6!),
+///     |f - p| <= max|f^(8)| h^8 / (256 * 8!),   |f' - p'| <= max|f^(8)| h^7 / (64 * 6!).
 ///
-/// max|f^(8)| from `derivative_bounds`, and what rounding can add is bounded term by term. Where the error
-/// asked for is out of reach, or the table would be too large, or there is next to nothing to sum up, the
-/// curve stays what it was: `compiled` says so.
+/// `derivative_bounds` gives max|f^(8)|; the error of rounding is bounded term by term and added. The curve stays
+/// uncompiled if this error exceeds the required one, the table is too large, or there are too few wavelets.
 class CompiledCurve {
   public:
     explicit CompiledCurve(NetworkCurve curve, const CompileOptions& options = {})
@@ -52,14 +51,17 @@ class CompiledCurve {
         build(options);
     }
 
+    /// Returns the curve that was compiled.
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
+    /// Returns true if the table is used.
     [[nodiscard]] bool compiled() const noexcept { return !table_.empty(); }
+    /// Returns the number of cells of the table.
     [[nodiscard]] std::size_t cells() const noexcept { return table_.size(); }
-    /// Proved bounds of |p - f| and |p' - f'| inside the domain; zero where nothing was compiled.
+    /// Return proved bounds of |p - f| and |p' - f'| inside the domain; 0 if the curve is not compiled.
     [[nodiscard]] double value_error() const noexcept { return value_error_; }
     [[nodiscard]] double slope_error() const noexcept { return slope_error_; }
 
-    /// Inlined, so that a caller pays for what it uses of the answer.
+    /// Returns the curve at x. Inlined, so that the compiler drops the parts that a caller does not use.
     [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         if (x >= table_from_ && x <= table_to_) {
             return table_.at(x);
@@ -67,19 +69,22 @@ class CompiledCurve {
         return elsewhere(x);
     }
 
+    /// Returns true if x lies outside the domain of a curve that does not repeat.
     [[nodiscard]] bool extrapolated(double x) const noexcept { return curve_.extrapolated(x); }
 
   private:
+    /// Evaluates positions outside the domain, and every position if the curve is not compiled.
     [[nodiscard, gnu::noinline]] Curve elsewhere(double x) const noexcept {
         if (!compiled() || !std::isfinite(x)) {
             return curve_.at(x);
         }
-        // A position that was wrapped from far away may end beside the domain.
+        // Rounding in the wrapping of a distant position can place it just outside the domain.
         return curve_.continued(x, [this](double within) noexcept {
             return table_.at(within > lower_ ? std::min(within, upper_) : lower_);
         });
     }
 
+    /// Builds the table, and keeps it only if its proved error is at most the required one.
     void build(const CompileOptions& options) {
         const NetworkParameters& network = curve_.parameters();
         if (network.weight.size() < options.fewest_wavelets) {
@@ -88,17 +93,17 @@ class CompiledCurve {
         const double reach = 2.0 * std::max(std::abs(lower_), std::abs(upper_));
         const double asked = options.relative_error * largest_force();
         const double eighth = largest_eighth_derivative();
-        // A tenth of the error asked for is left to the polynomials, the rest to rounding.
+        // The polynomials may use a tenth of the required error; the rest is for rounding.
         const double width = std::pow(0.1 * asked * 256.0 * 40320.0 / eighth, 0.125);
         const double widest = (upper_ - lower_) / 32.0;
         const int fineness = -static_cast<int>(std::floor(std::log2(std::min(width, widest))));
-        // Beyond 2^40 cells from zero the position itself says little about its place in the cell.
+        // With more than 2^40 cells from zero to x, rounding of x removes its place in the cell.
         const double h = std::ldexp(1.0, -fineness);
         if (!((upper_ - lower_) / h + 4.0 <= static_cast<double>(options.largest_table) &&
               reach / h < 0x1p40 && PiecewiseSeptic::is_sound(h))) {
             return;
         }
-        // One more cell on either side: rounding may take a position that was wrapped past an edge.
+        // One more cell on either side, because rounding can place a wrapped position just outside an edge.
         PiecewiseSeptic table{PiecewiseSeptic::cell(lower_, h) - 1, PiecewiseSeptic::cell(upper_, h) + 1, h,
                               [&](double x) noexcept { return jet(network, x); }};
         certify(table, eighth, jet_rounding(network, reach));
@@ -117,7 +122,7 @@ class CompiledCurve {
         }
     }
 
-    /// Largest |f| met at a few places: never more than the true one, so that no more error is allowed.
+    /// Returns the largest |f| at 65 positions. It is at most the true maximum, so the error is not underestimated.
     [[nodiscard]] double largest_force() const noexcept {
         constexpr int places = 64;
         double largest = 0.0;
@@ -128,8 +133,8 @@ class CompiledCurve {
         return largest;
     }
 
-    /// Over the domain and what the outermost cells cover beyond it. The domain is cut up because few
-    /// wavelets are large everywhere.
+    /// Bounds |f^(8)| over the domain and the parts of the outermost cells beyond it. The domain is cut into pieces,
+    /// because few wavelets are large everywhere.
     [[nodiscard]] double largest_eighth_derivative() const noexcept {
         constexpr int cuts = 256;
         const double beyond = (upper_ - lower_) / 16.0;
@@ -142,6 +147,7 @@ class CompiledCurve {
         return largest;
     }
 
+    /// Adds the errors of the polynomials, of their coefficients and of their evaluation.
     void certify(const PiecewiseSeptic& table, double eighth, const Jet& rounding) noexcept {
         const double h = table.width();
         value_error_ = eighth * std::pow(h, 8) / (256.0 * 40320.0);
@@ -165,14 +171,15 @@ class CompiledCurve {
     PiecewiseSeptic table_;
     double lower_;
     double upper_;
-    // Where the table answers alone: nowhere if there is none, or if every turn adds to the energy.
+    // Limits within which only the table is used. The range is empty without a table, and for a periodic curve, whose
+    // energy changes with each period.
     double table_from_ = std::numeric_limits<double>::infinity();
     double table_to_ = -std::numeric_limits<double>::infinity();
     double value_error_ = 0.0;
     double slope_error_ = 0.0;
 };
 
-/// A `WaveletNetwork` compiled, continuations included.
+/// A `WaveletNetwork` with its continuations, compiled.
 class CompiledNetwork {
   public:
     using State = Stateless;
@@ -180,8 +187,10 @@ class CompiledNetwork {
     explicit CompiledNetwork(const WaveletNetwork& network, const CompileOptions& options = {})
         : curve_{network.curve(), options} {}
 
+    /// Returns the compiled curve.
     [[nodiscard]] const CompiledCurve& curve() const noexcept { return curve_; }
 
+    /// Returns force, slope and energy at x.
     [[nodiscard, gnu::always_inline]] inline EnvironmentSample at(double x,
                                                                   const State& /*stateless*/) const noexcept {
         const Curve here = curve_.at(x);
@@ -196,7 +205,7 @@ class CompiledNetwork {
 
 static_assert(Environment<CompiledNetwork>);
 
-/// A `HysteresisNetwork` with both its curves compiled.
+/// A `HysteresisNetwork` with both curves compiled.
 class CompiledHysteresis : public HysteresisPair<CompiledCurve> {
   public:
     explicit CompiledHysteresis(const HysteresisNetwork& network, const CompileOptions& options = {})

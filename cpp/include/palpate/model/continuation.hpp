@@ -8,28 +8,30 @@
 
 namespace palpate {
 
-/// A force over one position with what energy accounts need of it.
+/// A function of position with its slope and the antiderivatives that energy accounts use.
 struct Curve {
     double value = 0.0;            ///< f(x)
     double slope = 0.0;            ///< f'(x)
     double integral = 0.0;         ///< an antiderivative of f
-    double double_integral = 0.0;  ///< an antiderivative of that
+    double double_integral = 0.0;  ///< an antiderivative of `integral`
 };
 
-/// How a force goes on outside the data. A fitted network turns over just past its last sample, so it is
+/// Continuation of a force outside the data. A fitted network changes direction just outside its last sample, so it is
 /// never evaluated there.
 enum class Continuation : std::uint8_t {
-    Linear,  ///< a line of non-negative slope through the edge
-    Free,    ///< the same line until the force is zero, then nothing: contact is lost
+    Linear,  ///< a straight line of non-negative slope through the edge
+    Free,    ///< the same line until the force is zero, then zero: contact is lost
 };
 
-/// A curve beyond one edge of its domain: a line through the edge, cut off `reach` away from it.
-/// The force is continuous at the edge and at the cut; the slope jumps.
+/// A curve beyond one edge of its domain: a straight line through the edge that ends `reach` away from it. The force is
+/// continuous at the edge and at the end; the slope is not.
 struct EdgeLine {
-    double edge = 0.0;                                       ///< position of the edge
-    Curve at_edge;                                           ///< the curve there; its slope is the line's
-    double reach = std::numeric_limits<double>::infinity();  ///< distance after which the force is zero
+    double edge = 0.0;                                       ///< position of the edge [m]
+    Curve at_edge;                                           ///< value at the edge, and slope of the line
+    double reach = std::numeric_limits<double>::infinity();  ///< distance from the edge after which the force
+                                                             ///< is zero [m]
 
+    /// Returns value, slope and antiderivatives at x, beyond the edge.
     [[nodiscard]] Curve at(double x) const noexcept {
         const double distance = x - edge;
         const double inside = std::clamp(distance, -reach, reach);
@@ -45,18 +47,18 @@ struct EdgeLine {
     }
 };
 
-/// What the choice of an edge line needs to know of the whole curve.
+/// Properties of a whole curve on which its edge lines depend.
 struct CurveExtent {
-    double travel = 0.0;         ///< hi - lo
-    double largest_force = 0.0;  ///< max |f| over the domain
-    double slope_cap = 0.0;      ///< max f' over the domain less its outer 2 %, at least 0
+    double travel = 0.0;         ///< upper - lower [m]
+    double largest_force = 0.0;  ///< max |f| over the domain [N]
+    double slope_cap = 0.0;      ///< max f' over the domain without its outer 2 %, at least 0 [N/m]
 };
 
-/// The line that continues a force beyond `edge`. `outward` is -1 below the domain and +1 above it.
+/// Returns the line that continues a force beyond `edge`. `outward` is -1 below the domain and +1 above it.
 ///
-/// The slope is clip(f'(edge), 0, slope_cap). Where the force at the edge drives the tool outward it is at
-/// least max|f| / travel, so that the stored energy stays bounded below. A free side that pulls at its edge
-/// lets the pull die out with that same gentle slope.
+/// The slope is clip(f'(edge), 0, slope_cap). If the force at the edge pushes the tool outward, the slope is at least
+/// max|f| / travel, so that the stored energy stays bounded below. With `Free`, a force that pulls the tool back at the
+/// edge decreases to zero with that same slope max|f| / travel.
 [[nodiscard]] inline EdgeLine continue_force(double edge, const Curve& at_edge, double outward,
                                              Continuation continuation, const CurveExtent& extent) noexcept {
     EdgeLine line{edge, at_edge};
@@ -75,8 +77,8 @@ struct CurveExtent {
     return line;
 }
 
-/// The line that continues a dissipated force h >= 0 beyond an edge: constant, or, where contact is lost,
-/// falling to zero over `reach`. It never becomes negative, so no loop beyond the edge generates energy.
+/// Returns the line that continues a dissipated force h >= 0 beyond an edge. It is constant, or with `Free` it falls to
+/// zero over `reach`. It never becomes negative, so no loop beyond the edge generates energy.
 [[nodiscard]] inline EdgeLine continue_loss(double edge, const Curve& at_edge, double outward,
                                             Continuation continuation, double reach) noexcept {
     EdgeLine line{edge, at_edge};

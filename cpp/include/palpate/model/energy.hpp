@@ -11,20 +11,20 @@
 
 namespace palpate {
 
-/// The energies that a virtual object can hold.
+/// Range of the energy that a virtual object can store.
 struct EnergyRange {
-    double least = 0.0;    ///< over all positions, continuation included; -infinity: it is a motor [J]
-    double largest = 0.0;  ///< over its domain, hysteresis included [J]
-    double missed = 0.0;   ///< upper bound of what the cells between samples can add to the span [J]
+    double least = 0.0;  ///< minimum over all positions, with continuation; -infinity for an active model [J]
+    double largest = 0.0;  ///< maximum over its domain, with hysteresis [J]
+    double missed = 0.0;   ///< upper bound of the energy between samples that the range misses [J]
 
-    /// Upper bound of what it can give from any position in its domain.
+    /// Returns an upper bound of the energy that the object can give from any position in its domain [J].
     [[nodiscard]] double span() const noexcept { return largest - least + missed; }
 };
 
 namespace detail {
 
-/// Integral of f - c(f) between two positions; c limits a force to +-`limit`. `at(x)` is the curve of f. Halves the
-/// way until both ends are within the limit, or both beyond it on one side.
+/// Returns the integral of f - c(f) between two positions, where c limits a force to +-`limit`. `at(x)` is the curve of
+/// f. Halves the interval until both ends are within the limit, or both beyond it on one side.
 template <class At>
 [[nodiscard]] double work_beyond(const At& at, double from, const Curve& at_from, double to,
                                  const Curve& at_to, double limit, int halvings = 40) noexcept {
@@ -39,7 +39,7 @@ template <class At>
            work_beyond(at, middle, at_middle, to, at_to, limit, halvings - 1);
 }
 
-/// Position where f passes from negative to positive between two positions, by bisection.
+/// Finds by bisection the position between two others at which f changes from negative to positive.
 template <class At>
 [[nodiscard]] double rest_between(const At& at, double below, double above) noexcept {
     constexpr int halvings = 60;
@@ -50,8 +50,8 @@ template <class At>
     return below;
 }
 
-/// How far the energy of c(f) falls beyond an edge: the work of a force that drives the tool outward until it has died
-/// out along the edge line.
+/// Returns the decrease of the energy of c(f) beyond an edge [J]. It is the work of a force that pushes the tool
+/// outward, until the force has become zero along the edge line.
 [[nodiscard]] inline double fall_beyond(const EdgeLine& line, double outward, double limit) noexcept {
     const double force = std::abs(line.at_edge.value);
     if (!(-outward * line.at_edge.value > 0.0)) {
@@ -61,17 +61,18 @@ template <class At>
     return (force - 0.5 * within) * within / std::abs(line.at_edge.slope);
 }
 
-/// Energy of c(f) at the ends of a domain, and its range there.
+/// Range of the energy of c(f) over a domain, and its values at the ends [J].
 struct LimitedEnergy {
     EnergyRange range;
     double at_lower = 0.0;
     double at_upper = 0.0;
 };
 
-/// The energy is that of f less the work beyond the limit. f is sampled at the borders of cells of width w; L is the
-/// largest |f'|. In a cell whose ends are both within the limit, or both beyond it on one side, f can pass the limit
-/// unseen only if one end is within L w / 2 of it; that changes the work by at most L w^2 / 4. Within a cell the energy
-/// leaves the range of its ends, and of the rest that is found, by less than that.
+/// Computes the energy of the limited force: the energy of f minus the work beyond the limit. f is sampled at the
+/// borders of cells of width w; L is the largest |f'|. In a cell whose ends are both within the limit, or both beyond
+/// it on one side, f can cross the limit between the samples only if one end is within L w / 2 of it. That changes the
+/// work by at most L w^2 / 4. Within a cell the energy leaves the range of its ends and of the rest position by less
+/// than that.
 template <class At>
 [[nodiscard]] LimitedEnergy limited_energy(const At& at, double lower, double upper, std::size_t cells,
                                            double steepest, double limit) noexcept {
@@ -105,7 +106,7 @@ template <class At>
     return energy;
 }
 
-/// Cells for a curve: 16 for its finest width, 1024 at least.
+/// Returns the number of cells for a curve: 16 for its finest width, at least 1024.
 [[nodiscard]] inline std::size_t energy_cells(double travel, double finest_width) noexcept {
     constexpr double fewest = 1024.0;
     constexpr double most = 1e6;
@@ -114,7 +115,8 @@ template <class At>
 
 }  // namespace detail
 
-/// The same of a force of position and velocity, at rest: by Simpson's rule, because it has no antiderivative.
+/// Returns the energy range of a force of position and velocity, at velocity zero. Uses Simpson's rule, because this
+/// force does not have a closed antiderivative.
 [[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
     const auto at = [&](double x) noexcept {
         return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};
@@ -146,7 +148,7 @@ template <class At>
     return range;
 }
 
-/// The energy range of a model of one position, or of position and velocity, whose force a device limits.
+/// Returns the energy range of a model of position, or of position and velocity, whose force a device limits.
 [[nodiscard]] inline EnergyRange energy_range(const ForceModel& model,
                                               double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);

@@ -13,7 +13,7 @@ namespace palpate {
 
 namespace detail {
 
-/// FNV-1a over the bits of numbers: another number anywhere gives another value.
+/// Computes FNV-1a over the bits of numbers. A changed number gives another value.
 class NumberHash {
   public:
     void add(std::uint64_t bits) noexcept {
@@ -34,7 +34,7 @@ class NumberHash {
             add(static_cast<std::uint64_t>(static_cast<unsigned char>(letter)));
         }
     }
-    /// 16 hexadecimal digits.
+    /// Returns 16 hexadecimal digits.
     [[nodiscard]] std::string text() const {
         constexpr std::string_view digits{"0123456789abcdef"};
         std::string text;
@@ -50,8 +50,8 @@ class NumberHash {
 
 }  // namespace detail
 
-/// 16 hexadecimal digits that change with every number of which a model's force is made: network, domain,
-/// continuation, play radius. It tells an edited model from the one that was certified; it is no signature.
+/// Returns 16 hexadecimal digits that change with every number of a model's force: network, domain, continuation, play
+/// radius. They distinguish an edited model from the certified one; they are not a signature.
 [[nodiscard]] inline std::string fingerprint(const ForceModel& model) {
     detail::NumberHash hash;
     const NetworkParameters& network = model.parameters();

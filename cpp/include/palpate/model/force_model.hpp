@@ -16,10 +16,10 @@
 
 namespace palpate {
 
-/// An identified environment of whichever kind a model file holds.
+/// An identified environment of any kind that a model file can hold.
 ///
-/// A hysteresis model identified from separate press and release strokes knows no play radius: that is then a
-/// choice of the rendering, made with `with_play_radius`.
+/// A hysteresis model identified from separate press and release strokes does not have a play radius. The rendering
+/// then chooses one with `with_play_radius`.
 class ForceModel {
   public:
     using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork, VelocityNetwork>;
@@ -31,25 +31,30 @@ class ForceModel {
                std::optional<double> play_radius)
         : kind_{make_hysteresis(network, loss, domain, play_radius)}, play_radius_{play_radius} {}
 
-    /// A force whose second input is the velocity of the first.
+    /// Makes a force whose second input is the velocity of the first.
     [[nodiscard]] static ForceModel of_velocity(NetworkParameters network, Domain domain) {
         return ForceModel{VelocityNetwork{std::move(network), std::move(domain)}};
     }
 
+    /// Returns the environment as a variant of all kinds.
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
+    /// Returns the wavelet network, or null for another kind.
     [[nodiscard]] const WaveletNetwork* network() const noexcept {
         return std::get_if<WaveletNetwork>(&kind_);
     }
+    /// Returns the hysteresis network, or null for another kind.
     [[nodiscard]] const HysteresisNetwork* hysteresis() const noexcept {
         return std::get_if<HysteresisNetwork>(&kind_);
     }
+    /// Returns the force of position and velocity, or null for another kind.
     [[nodiscard]] const VelocityNetwork* velocity() const noexcept {
         return std::get_if<VelocityNetwork>(&kind_);
     }
-    /// The network of several inputs, whatever they mean.
+    /// Returns the network of several inputs, with or without velocity, or null for another kind.
     [[nodiscard]] const RadialNetwork* radial() const noexcept {
         return velocity() != nullptr ? &velocity()->network() : std::get_if<RadialNetwork>(&kind_);
     }
+    /// Returns the play radius [m], if the model was identified with one.
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept {
@@ -65,8 +70,8 @@ class ForceModel {
         return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
-    /// Proved bounds of the slope inside the domain, at rest or sliding either way; with a play radius r also
-    /// while it sticks, where h / r adds to it.
+    /// Returns proved bounds of the slope inside the domain, at rest or while sliding in either direction. With a play
+    /// radius r they also hold while the play operator sticks, which adds h / r.
     [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
         if (const WaveletNetwork* single = network()) {
             return single->curve().slope_bounds();
@@ -81,7 +86,7 @@ class ForceModel {
     }
 
     /// Throws std::invalid_argument if stored bounds are narrower than the slopes of this model. Another release may
-    /// have bounded them less sharply, by at most 1 % of the steepest.
+    /// have used wider bounds, by at most 1 % of the steepest slope.
     void require_slopes_within(Interval stored) const {
         if (parameters().dimension != 1) {
             return;
@@ -98,13 +103,14 @@ class ForceModel {
                         sentence("max", stored.upper, "at least", slopes.upper));
     }
 
-    /// The narrowest width 1 / alpha of its wavelets; the travel when it has none (d = 1).
+    /// Returns the narrowest width 1 / alpha of the wavelets [m]; the travel if there are none (d = 1).
     [[nodiscard]] double finest_width() const noexcept {
         const auto& alpha = parameters().alpha;
         const double travel = domain().upper[0] - domain().lower[0];
         return alpha.empty() ? travel : std::min(travel, 1.0 / *std::max_element(alpha.begin(), alpha.end()));
     }
 
+    /// Returns the model with this play radius [m]; unchanged without hysteresis.
     [[nodiscard]] ForceModel with_play_radius(double radius) const {
         const HysteresisNetwork* both = hysteresis();
         if (both == nullptr) {
@@ -137,7 +143,8 @@ class ForceModel {
     std::optional<double> play_radius_;
 };
 
-/// Throws unless it is a force of the position, with or without hysteresis or velocity: what can be rendered.
+/// Throws unless the model is a force of the position, with or without hysteresis or velocity. Only these can be
+/// rendered.
 inline void require_renderable(const ForceModel& model) {
     if (model.velocity() == nullptr) {
         require_one_input(model.parameters());

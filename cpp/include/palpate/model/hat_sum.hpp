@@ -18,7 +18,7 @@ namespace palpate {
 
 namespace detail {
 
-/// e^r for |r| <= ln 2 / 2 as a polynomial, interpolated at the Chebyshev nodes: right to 2e-17.
+/// Coefficients of a polynomial for e^r, |r| <= ln 2 / 2, interpolated at the Chebyshev nodes; error 2e-17.
 inline constexpr std::array<double, 12> exponential{
     0x1.0000000000000p+0,  0x1.0000000000000p+0,  0x1.0000000000011p-1,  0x1.555555555555ap-3,
     0x1.555555554f0bap-5,  0x1.111111110f21ep-7,  0x1.6c16c1880029fp-10, 0x1.a01a01b1461c5p-13,
@@ -52,7 +52,7 @@ inline constexpr std::array<double, 12> exponential{
 
 #endif
 
-/// Every kernel that this machine can run, the widest last.
+/// Returns every kernel that this machine can run, the widest last.
 [[nodiscard]] inline std::vector<HatKernel> usable_hat_kernels() {
     std::vector<HatKernel> kernels{plain::kernel()};
 #if defined(__GNUC__) && defined(__x86_64__)
@@ -69,7 +69,7 @@ inline constexpr std::array<double, 12> exponential{
     return kernels;
 }
 
-/// The widest kernel of this machine, chosen once.
+/// Returns the widest kernel of this machine, chosen once.
 [[nodiscard]] inline const HatKernel& hat_kernel() {
     static const HatKernel kernel = usable_hat_kernels().back();
     return kernel;
@@ -78,8 +78,8 @@ inline constexpr std::array<double, 12> exponential{
 }  // namespace detail
 
 /// The sum of the wavelets of a network of one input, w_i psi(alpha_i (x - beta_i)), with its derivative and
-/// antiderivatives: one vectorised exponential a wavelet, by the widest instructions that the machine has.
-/// Any x is safe: far away a hat is below 1e-300, NaN gives NaN.
+/// antiderivatives. Computes one vectorised exponential for each wavelet, with the widest instructions of the machine.
+/// Any x is safe: a distant hat is below 1e-300, and NaN gives NaN.
 class HatSum {
   public:
     explicit HatSum(const NetworkParameters& network, const detail::HatKernel& kernel = detail::hat_kernel())
@@ -100,7 +100,7 @@ class HatSum {
     /// Adds the sums at x.
     void add(double x, Curve& sum) const noexcept { kernel_.at(columns(), x, sum); }
 
-    /// Adds one of the sums at every x; both spans have the same size.
+    /// Adds one quantity at every x; both spans have the same size.
     void add(HatQuantity quantity, std::span<const double> x, std::span<double> sum) const noexcept {
         kernel_.batch[static_cast<std::size_t>(quantity)](columns(), x.data(), x.size(), sum.data());
     }

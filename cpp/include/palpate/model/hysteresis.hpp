@@ -14,59 +14,62 @@
 
 namespace palpate {
 
-/// The second set of weights of a hysteresis network: h shares the wavelets of g.
+/// Second set of weights of a hysteresis network: h uses the wavelets of g.
 struct LossParameters {
-    std::vector<double> weight;  ///< N
-    double linear = 0.0;
-    double bias = 0.0;
+    std::vector<double> weight;  ///< weights [N]
+    double linear = 0.0;         ///< slope [N/m]
+    double bias = 0.0;           ///< constant [N]
 };
 
-/// The play operator of radius r: what a slot of width 2r does to a motion,
+/// Returns the play operator of radius r: the position of a slot of width 2r that the motion moves,
 ///
 ///     play_k = min(x_k + r, max(x_k - r, play_{k-1})).
 [[nodiscard]] inline double play(double position, double previous, double radius) noexcept {
     return std::min(position + radius, std::max(position - radius, previous));
 }
 
-/// Play radius of a model that does not give its own: 1 % of the travel, and wide enough that the hand switches it and
-/// not the noise of the encoder.
+/// Shares of the usual play radius: 1 % of the travel, and at least 4 encoder steps, so that the hand changes the
+/// direction state and encoder noise does not.
 inline constexpr double play_share_of_travel = 0.01;
 inline constexpr double fewest_encoder_steps_in_play = 4.0;
 
+/// Returns the play radius of a model that does not define one [m].
 [[nodiscard]] inline double usual_play_radius(double travel, double encoder_step = 0.0) noexcept {
     return std::max(fewest_encoder_steps_in_play * encoder_step, play_share_of_travel * travel);
 }
 
-/// A force that differs between the way in and the way out,
+/// A force that differs between press and release,
 ///
 ///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1].
 ///
-/// While h >= 0 no loop generates energy: with the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi
-/// sticking (|s| < 1) is lossless and sliding loses. `C` is how g and h are computed.
+/// While h >= 0 no loop generates energy. With the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi,
+/// sticking (|s| < 1) loses no energy and sliding dissipates. `C` is the type of the curves g and h.
 template <class C>
 class HysteresisPair {
   public:
     struct State {
-        double play = 0.0;  ///< the play operator's position
+        double play = 0.0;  ///< position of the play operator [m]
     };
 
     HysteresisPair(C force, C loss, double play_radius)
         : force_{std::move(force)}, loss_{std::move(loss)}, play_radius_{play_radius} {}
 
+    /// Returns the play radius [m].
     [[nodiscard]] double play_radius() const noexcept { return play_radius_; }
 
-    /// g, what press and release have in common.
+    /// Returns g, the mean of press and release force.
     [[nodiscard]] const C& force() const noexcept { return force_; }
-    /// h, half of what they differ by.
+    /// Returns h, half the difference between press and release force.
     [[nodiscard]] const C& loss() const noexcept { return loss_; }
 
-    /// Force, slope and energy at x for a given s: +1 pressing, -1 releasing.
+    /// Returns force, slope and energy at x for a given s: +1 press, -1 release.
     [[nodiscard]] EnvironmentSample sliding(double x, double s) const noexcept {
         const Curve g = force_.at(x);
         const Curve h = loss_.at(x);
         return {g.value + s * h.value, g.slope + s * h.slope, g.integral, force_.extrapolated(x)};
     }
 
+    /// Returns force, slope and energy at x after a motion from `state`.
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
         const double play = palpate::play(x, state.play, play_radius_);
         const double s = (x - play) / play_radius_;
@@ -79,11 +82,12 @@ class HysteresisPair {
                 g.integral + stored / play_radius_, force_.extrapolated(x)};
     }
 
+    /// Moves the play operator to x.
     void advance(double x, State& state) const noexcept {
         state.play = palpate::play(x, state.play, play_radius_);
     }
 
-    /// At rest the object pushes neither way: s = 0.
+    /// Returns the state of an object at rest: s = 0, without hysteresis force.
     [[nodiscard]] State start(double x) const noexcept { return {x}; }
 
   private:
@@ -92,7 +96,7 @@ class HysteresisPair {
     double play_radius_;
 };
 
-/// The hysteresis pair of two networks that share their wavelets, and their domain.
+/// The hysteresis pair of two networks that share their wavelets and their domain.
 class HysteresisNetwork : public HysteresisPair<NetworkCurve> {
   public:
     HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
@@ -129,7 +133,7 @@ class HysteresisNetwork : public HysteresisPair<NetworkCurve> {
         h.bias = loss.bias;
         NetworkCurve curve{h, domain};
         const double travel = domain.upper[0] - domain.lower[0];
-        // h dies out together with g, but never over less than 2 % of the travel: no jump, no steep flank.
+        // h decreases to zero together with g, but over at least 2 % of the travel, without a jump or a steep flank.
         const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
                               Continuation continuation) {
             return continue_loss(edge.edge, edge.at_edge, outward, continuation,

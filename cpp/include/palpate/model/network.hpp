@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// A single-valued force over one position: the network, its domain and its continuations.
+/// Returns a single-valued force of one position: the network with its domain and its continuations.
 [[nodiscard]] inline NetworkCurve continued_force(const NetworkParameters& network, const Domain& domain) {
     NetworkCurve curve{network, domain};
     const CurveExtent extent = curve.extent();
@@ -19,11 +19,11 @@ namespace palpate {
     return curve;
 }
 
-/// A wavelet network over one position with its domain (paper eq. 5),
+/// A wavelet network of one position with its domain (paper eq. 5),
 ///
 ///     f(x) = sum_i w_i psi(alpha_i (x - beta_i)) + c x + b,
 ///
-/// continued outside the domain as `Domain` says. (More inputs: `RadialNetwork`.)
+/// continued outside the domain as `Domain` defines. `RadialNetwork` has more inputs.
 class WaveletNetwork {
   public:
     using State = Stateless;
@@ -33,8 +33,10 @@ class WaveletNetwork {
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept { return curve_.parameters(); }
     [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
+    /// Returns the force as a curve with continuations.
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
 
+    /// Returns force, slope and energy at x.
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
         const Curve here = curve_.at(x);
         return {here.value, here.slope, here.integral, curve_.extrapolated(x)};

@@ -14,8 +14,8 @@
 
 namespace palpate {
 
-/// A wavelet network of one input as a curve over the whole line: eq. 4 inside the domain, an edge line on
-/// either side of it, or the same period again and again.
+/// A wavelet network of one input as a curve over all positions: eq. 4 inside the domain, and outside it an edge line
+/// on either side or the same period repeated.
 class NetworkCurve {
   public:
     NetworkCurve(const NetworkParameters& network, const Domain& domain)
@@ -30,6 +30,7 @@ class NetworkCurve {
         continue_with({lower_, inside(lower_)}, {upper_, inside(upper_)});
     }
 
+    /// Sets the lines below and above the domain.
     void continue_with(const EdgeLine& below, const EdgeLine& above) noexcept {
         below_ = below;
         above_ = above;
@@ -42,11 +43,12 @@ class NetworkCurve {
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 
+    /// Returns the curve at any x, continuation included.
     [[nodiscard]] Curve at(double x) const noexcept {
         return continued(x, [this](double within) noexcept { return inside(within); });
     }
 
-    /// The curve with `inside` in place of eq. 4 within the domain. A position that is not finite gives NaN.
+    /// Returns the curve with `inside` instead of eq. 4 within the domain. A position that is not finite gives NaN.
     template <class Inside>
     [[nodiscard]] Curve continued(double x, Inside inside) const noexcept {
         if (!periodic_ && x >= lower_ && x <= upper_) {
@@ -59,11 +61,12 @@ class NetworkCurve {
         return periodic_ ? wrapped(x, inside) : x < lower_ ? below_.at(x) : above_.at(x);
     }
 
+    /// Returns true if x lies outside the domain and the curve does not repeat.
     [[nodiscard]] bool extrapolated(double x) const noexcept {
         return periodic_ ? !std::isfinite(x) : !(x >= lower_ && x <= upper_);
     }
 
-    /// Eq. 4 and nothing else: value, slope and antiderivatives from one exponential a wavelet.
+    /// Returns eq. 4 without continuation: value, slope and antiderivatives from one exponential for each wavelet.
     [[nodiscard]] Curve inside(double x) const noexcept {
         const double c = network_.linear[0];
         const double b = network_.bias;
@@ -72,7 +75,7 @@ class NetworkCurve {
         return sum;
     }
 
-    /// One quantity at many positions, continuation included; both spans have the same size.
+    /// Computes one quantity at many positions, continuation included; both spans have the same size.
     void at(HatQuantity quantity, std::span<const double> x, std::span<double> result) const noexcept {
         const double c = network_.linear[0];
         const double b = network_.bias;
@@ -92,20 +95,21 @@ class NetworkCurve {
         }
     }
 
-    /// Proved bounds inside the domain, within 1 % of their largest.
+    /// Return proved bounds inside the domain, within 1 % of their largest.
     [[nodiscard]] Interval value_bounds() const { return palpate::value_bounds(network_, lower_, upper_); }
     [[nodiscard]] Interval slope_bounds() const { return palpate::slope_bounds(network_, lower_, upper_); }
 
+    /// Returns the properties of the curve on which its edge lines depend.
     [[nodiscard]] CurveExtent extent() const {
         const double travel = upper_ - lower_;
-        // The outer 2 % are left out: a fit is least sure of its slope at the ends of its data.
+        // Without the outer 2 %, because the slope of a fit is least certain at the ends of its data.
         const double margin = 0.02 * travel;
         const double steepest = palpate::slope_bounds(network_, lower_ + margin, upper_ - margin).upper;
         return {travel, value_bounds().largest(), std::max(0.0, steepest)};
     }
 
   private:
-    /// Value and slope repeat; the antiderivatives gain what each turn adds.
+    /// Returns the curve of a periodic force. Value and slope repeat; the antiderivatives grow with each period.
     template <class Inside>
     [[nodiscard]] Curve wrapped(double x, Inside inside) const noexcept {
         const double period = upper_ - lower_;
@@ -122,8 +126,8 @@ class NetworkCurve {
         return here;
     }
 
-    /// The jump between the two ends of a period is spread over it as a ramp: the force is continuous. A jump
-    /// of rounding size is none: a network that was closed once keeps its numbers.
+    /// Makes a periodic force continuous: spreads the jump between the two ends of a period over it as a ramp. A jump
+    /// of rounding size is ignored, so that a network that is already continuous keeps its numbers.
     void close_the_seam() noexcept {
         double size = std::abs(network_.bias) +
                       std::abs(network_.linear[0]) * std::max(std::abs(lower_), std::abs(upper_));

@@ -12,27 +12,28 @@
 
 namespace palpate {
 
-/// The numbers of a wavelet network of N wavelets over d inputs, matrices row by row.
+/// Parameters of a wavelet network of N wavelets over d inputs, matrices row by row.
 struct NetworkParameters {
-    std::size_t dimension = 1;      ///< d
-    std::vector<double> alpha;      ///< N x d dilations, > 0
-    std::vector<double> beta;       ///< N x d translations
-    std::vector<double> weight;     ///< N
-    std::vector<double> linear{0};  ///< d
-    double bias = 0.0;
+    std::size_t dimension = 1;      ///< number of inputs d
+    std::vector<double> alpha;      ///< N x d dilations, > 0 [1/m]
+    std::vector<double> beta;       ///< N x d translations [m]
+    std::vector<double> weight;     ///< N weights [N]
+    std::vector<double> linear{0};  ///< d slopes of the straight line [N/m]
+    double bias = 0.0;              ///< constant [N]
 };
 
-/// The box of data that a network was identified on, and how it goes on outside.
+/// The box of the data from which a network was identified, and its continuation outside.
 struct Domain {
-    std::vector<double> lower{0.0};
-    std::vector<double> upper{1.0};
-    Continuation below = Continuation::Linear;  ///< d = 1: below lower
-    Continuation above = Continuation::Linear;  ///< d = 1: above upper
-    std::optional<double> period;               ///< d = 1: a knob that repeats; equals upper - lower
+    std::vector<double> lower{0.0};             ///< smallest values of the d inputs
+    std::vector<double> upper{1.0};             ///< largest values of the d inputs
+    Continuation below = Continuation::Linear;  ///< d = 1: continuation below lower
+    Continuation above = Continuation::Linear;  ///< d = 1: continuation above upper
+    std::optional<double> period;  ///< d = 1: period of a knob that repeats; equals upper - lower
 };
 
 namespace detail {
 
+/// Throws std::invalid_argument with the sentence unless the condition holds.
 inline void require(bool holds, const std::string& sentence) {
     if (!holds) {
         throw std::invalid_argument(sentence);
@@ -53,7 +54,7 @@ inline void require_size(const std::vector<double>& values, std::size_t size, co
 
 }  // namespace detail
 
-/// Throws std::invalid_argument with the field, its value and what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule, if a parameter is invalid.
 inline void validate(const NetworkParameters& network, const Domain& domain) {
     using detail::require;
     const std::size_t d = network.dimension;
@@ -89,7 +90,7 @@ inline void validate(const NetworkParameters& network, const Domain& domain) {
     }
 }
 
-/// Throws unless the network is one over a single position.
+/// Throws unless the network has one input.
 inline void require_one_input(const NetworkParameters& network) {
     detail::require(network.dimension == 1,
                     "the network has " + std::to_string(network.dimension) + " inputs, must have 1");

@@ -15,17 +15,17 @@
 
 namespace palpate {
 
-/// A function as polynomials of degree 7 on cells of equal width h, a power of two: one look-up, one cache line
-/// and a few multiplications, however the function came about. Value and first three derivatives are continuous.
+/// A function as polynomials of degree 7 on cells of equal width h, a power of two. An evaluation costs one look-up,
+/// one cache line and a few multiplications. Value and first three derivatives are continuous.
 ///
-/// Cell k is centred at x = k h; its polynomial is one in u = x - k h, which is exact. Sums are written so that
-/// what depends on x longest enters last: a step waits for the depth of these trees.
+/// The centre of cell k is x = k h; its polynomial is in u = x - k h, which is exact. In the sums, the terms with the
+/// longest dependence on x come last, because the depth of these trees limits the speed of a step.
 class PiecewiseSeptic {
   public:
     PiecewiseSeptic() = default;
 
-    /// Cells `first` to `last`; `jet(x)` gives the derivatives at their borders x = (k +- 1/2) h, from the left
-    /// to the right.
+    /// Builds the cells `first` to `last`. `jet(x)` gives the derivatives at their borders x = (k +- 1/2) h, from the
+    /// left to the right.
     template <class Function>
     PiecewiseSeptic(std::int64_t first, std::int64_t last, double width, Function jet)
         : width_{width}, rounder_{rounder * width}, origin_{std::bit_cast<std::int64_t>(rounder_) + first} {
@@ -38,7 +38,7 @@ class PiecewiseSeptic {
         }
     }
 
-    /// The cell that holds x.
+    /// Returns the index of the cell that holds x.
     [[nodiscard]] static std::int64_t cell(double x, double width) noexcept {
         return std::bit_cast<std::int64_t>(x / width + rounder) - std::bit_cast<std::int64_t>(rounder);
     }
@@ -46,12 +46,13 @@ class PiecewiseSeptic {
     [[nodiscard]] bool empty() const noexcept { return pieces_.empty(); }
     [[nodiscard]] std::size_t size() const noexcept { return pieces_.size(); }
     [[nodiscard]] double width() const noexcept { return width_; }
+    /// Returns the centre of cell k.
     [[nodiscard]] double middle(std::size_t k) const noexcept {
         return static_cast<double>(origin_ + static_cast<std::int64_t>(k) -
                                    std::bit_cast<std::int64_t>(rounder_)) *
                width_;
     }
-    /// Coefficients of the powers of t = u / h, which runs from -1/2 to 1/2, in cell k.
+    /// Returns the coefficients of cell k for the powers of t = u / h, which is in [-1/2, 1/2].
     [[nodiscard]] std::array<double, 8> coefficients(std::size_t k) const noexcept {
         std::array<double, 8> c = pieces_[k].c;
         double power = 1.0;
@@ -61,16 +62,17 @@ class PiecewiseSeptic {
         }
         return c;
     }
-    /// Widths whose powers neither overflow nor lose digits.
+    /// Returns true if the powers of the width neither overflow nor lose digits.
     [[nodiscard]] static bool is_sound(double width) noexcept { return width > 0x1p-100 && width < 0x1p100; }
 
-    /// Leaves only `count` cells from the one with index `first` on.
+    /// Keeps only `count` cells, from index `first` on.
     void keep(std::size_t first, std::size_t count) {
         const auto begin = pieces_.begin() + static_cast<std::ptrdiff_t>(first);
         pieces_ = std::vector<Piece>(begin, begin + static_cast<std::ptrdiff_t>(count));
         origin_ += static_cast<std::int64_t>(first);
     }
 
+    /// Returns the value at x.
     [[nodiscard, gnu::always_inline]] inline double value(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
@@ -81,7 +83,7 @@ class PiecewiseSeptic {
                ((c[4] + c[5] * u) * u4 + (c[6] + c[7] * u) * (u2 * u4));
     }
 
-    /// Value, slope and both antiderivatives from one look-up, after `integrate`.
+    /// Returns value, slope and both antiderivatives from one look-up; call `integrate` first.
     [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
@@ -101,7 +103,7 @@ class PiecewiseSeptic {
         return {both[0], both[1], first + u * once, second + u * (first + u * twice)};
     }
 
-    /// Takes the antiderivatives at the middle of every cell from `antiderivatives(x)`.
+    /// Stores the antiderivatives at the middle of every cell, from `antiderivatives(x)`.
     template <class Function>
     void integrate(Function antiderivatives) {
         integrals_.reserve(size());
@@ -110,8 +112,8 @@ class PiecewiseSeptic {
         }
     }
 
-    /// What rounding may add to the value and to the slope in the making and the evaluation of cell k: sums of
-    /// the absolute terms of `piece`, its derivatives bounded by the coefficients.
+    /// Bounds the rounding error of value and slope of cell k, in its coefficients and its evaluation. It sums the
+    /// absolute terms of `piece`; the coefficients bound the derivatives.
     [[nodiscard]] std::array<double, 2> rounding(std::size_t k) const noexcept {
         const auto c = coefficients(k);
         Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};  // of the derivatives by t
@@ -132,7 +134,8 @@ class PiecewiseSeptic {
         std::array<double, 8> c;
     };
 
-    /// Adding this rounds a double to an integer, which then stands in its low bits; times h, to a multiple of h.
+    /// Constant that rounds a double to an integer when added; the low bits then hold the integer. Multiplied by h, it
+    /// rounds to a multiple of h.
     static constexpr double rounder = 0x1.8p52;
 
     struct Place {
@@ -140,17 +143,18 @@ class PiecewiseSeptic {
         double u;
     };
 
+    /// Returns the cell of x and the distance from its centre.
     [[nodiscard, gnu::always_inline]] inline Place place(double x) const noexcept {
         const double rounded = x + rounder_;
         return {static_cast<std::size_t>(std::bit_cast<std::int64_t>(rounded) - origin_),
                 x - (rounded - rounder_)};
     }
 
-    /// Two lanes of one register, on every processor and compiler that this library knows.
+    /// Two lanes of one register, on every processor and compiler that this library supports.
     using Pair = double __attribute__((vector_size(16)));
 
-    /// Value and slope: sums of the same form, with (j + 1) c[j + 1] in place of c[j], so that both cost what one
-    /// does. What goes with j goes into the powers of u, which are there before the coefficients.
+    /// Returns value and slope. Both sums have the same form, with (j + 1) c[j + 1] instead of c[j], so that both cost
+    /// as much as one. The factors of j are in the powers of u, which are known before the coefficients.
     [[nodiscard, gnu::always_inline]] static inline Pair value_and_slope(const std::array<double, 8>& c,
                                                                          double u) noexcept {
         const auto at = [&c](std::size_t j) {
@@ -167,7 +171,7 @@ class PiecewiseSeptic {
                 (at(6) + Pair{c[7], 0.0} * u1) * (u2 * Pair{1.0, 7.0} * u4));
     }
 
-    /// From powers of t to powers of u.
+    /// Converts powers of t to powers of u.
     [[nodiscard]] Piece by_x(const Piece& piece) const noexcept {
         Piece scaled = piece;
         double power = 1.0;
@@ -178,12 +182,13 @@ class PiecewiseSeptic {
         return scaled;
     }
 
-    /// Derivatives by t instead of x.
+    /// Converts derivatives by x to derivatives by t.
     [[nodiscard]] Jet by_t(const Jet& jet) const noexcept {
         return {jet[0], jet[1] * width_, jet[2] * (width_ * width_), jet[3] * (width_ * width_ * width_)};
     }
 
-    /// The polynomial of degree 7 with these derivatives at t = -1/2 and 1/2, even and odd powers apart.
+    /// Returns the polynomial of degree 7 with these derivatives at t = -1/2 and 1/2, from even and odd powers
+    /// separately.
     [[nodiscard]] static Piece piece(const Jet& left, const Jet& right) noexcept {
         Jet even;
         Jet odd;

@@ -14,14 +14,14 @@ namespace palpate {
 
 namespace detail {
 
-/// (|D^5 psi| max(r, 1) + 4 |D^4 psi|) e^{0.24 r^2} is at most this times `fourth_derivative_supremum`.
+/// Bound of (|D^5 psi| max(r, 1) + 4 |D^4 psi|) e^{0.24 r^2}, divided by `fourth_derivative_supremum`.
 inline constexpr double fourth_derivative_change = 16.8;
 
-/// What counts for |w_i| where fourth derivatives are bounded: wavelets that nearly coincide take each other away
-/// but for their distance delta, the largest relative difference of their dilations plus the sum of
-/// alpha |difference of their translations|. On the way from one to the other D^4 psi(t, t, t, t) changes by no
-/// more than (|D^5 psi| max(r, 1) + 4 |D^4 psi|) |t|^4 delta; that r, t and the dilations change as well makes it
-/// a tenth more for delta <= 0.02, with e^{-0.22 r^2} for its decay.
+/// Returns the numbers that replace |w_i| in bounds of fourth derivatives. Two wavelets of opposite sign that almost
+/// coincide cancel, except for their distance delta: the largest relative difference of their dilations plus the sum of
+/// alpha |difference of their translations|. From one wavelet to the other, D^4 psi(t, t, t, t) changes by at most
+/// (|D^5 psi| max(r, 1) + 4 |D^4 psi|) |t|^4 delta. The changes of r, t and the dilations add at most a tenth for delta
+/// <= 0.02, with the decay e^{-0.22 r^2}.
 [[nodiscard]] inline std::vector<double> uncancelled_weights(const NetworkParameters& network) {
     constexpr double near = 0.02;
     constexpr double change = 1.11 * fourth_derivative_change;
@@ -64,8 +64,8 @@ inline constexpr double fourth_derivative_change = 16.8;
 
 }  // namespace detail
 
-/// The sum of the wavelets of a network of any number of inputs, at projections onto a box: one vectorised
-/// exponential a wavelet, by the widest instructions that the machine has.
+/// The sum of the wavelets of a network of any number of inputs, at projections onto a box. Computes one vectorised
+/// exponential for each wavelet, with the widest instructions of the machine.
 class RadialSum {
   public:
     RadialSum(const NetworkParameters& network, std::span<const double> lower, std::span<const double> upper,
@@ -90,17 +90,17 @@ class RadialSum {
                   columns_.end() - static_cast<std::ptrdiff_t>(size_));
     }
 
-    /// Adds the sum at the projection of x to `value`, and its gradient, unless that is null, to `gradient`.
+    /// Adds the sum at the projection of x to `value`, and its gradient to `gradient` unless that is null.
     void add(const double* x, double& value, double* gradient) const noexcept {
         kernel_.radial(columns(), x, value, gradient);
     }
 
-    /// Taylor's formula about the middle of a box.
+    /// Computes Taylor's formula about the middle of a box.
     void expand(const double* middle, const double* radius, detail::RadialExpansion& sums) const noexcept {
         kernel_.expansion(columns(), middle, radius, sums);
     }
 
-    /// What `expand` fills.
+    /// Returns an expansion with memory for `expand`.
     [[nodiscard]] detail::RadialExpansion expansion() const { return {dimension_, size_}; }
 
   private:
@@ -120,7 +120,7 @@ class RadialSum {
     std::size_t dimension_;
     std::size_t size_;
     std::vector<double> columns_;
-    std::vector<double> box_;  ///< lower, upper
+    std::vector<double> box_;  ///< lower edges, then upper edges
 };
 
 }  // namespace palpate

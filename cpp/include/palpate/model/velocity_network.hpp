@@ -15,13 +15,13 @@
 
 namespace palpate {
 
-/// A force over position and velocity as it is rendered: the network N of eq. 4 within the box of its data,
+/// A force of position and velocity as it is rendered: the network N of eq. 4 within the box of its data,
 ///
 ///     f(x, v) = N(clip x, clip v) + s (x - clip x).
 ///
-/// Outside the box it is kept from growing: the velocity counts no further than the data reach, and beyond an
-/// edge of the positions the force goes on with the slope s of the object at rest there, whatever the velocity.
-/// (The continuation of `RadialNetwork` bends: far outside no bound of its slopes holds.)
+/// Outside the box the velocity is clipped to the data. Beyond an edge of the positions the force continues with the
+/// slope s of the object at rest there, at every velocity. (Outside its box the slope of `RadialNetwork` is not bounded
+/// like this.)
 class VelocityNetwork {
   public:
     VelocityNetwork(NetworkParameters network, Domain domain)
@@ -36,10 +36,11 @@ class VelocityNetwork {
     [[nodiscard]] double lower() const noexcept { return network_.domain().lower[0]; }
     [[nodiscard]] double upper() const noexcept { return network_.domain().upper[0]; }
     [[nodiscard]] double travel() const noexcept { return upper() - lower(); }
-    /// How the force at rest goes on; the antiderivative is not in them.
+    /// Return the continuation of the force at rest, without the antiderivative.
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 
+    /// Returns the force [N], continuation included.
     [[nodiscard]] double force(double position, double velocity) const noexcept {
         const double inside = std::clamp(position, lower(), upper());
         const double slope = (position < inside ? below_ : above_).at_edge.slope;
@@ -50,7 +51,7 @@ class VelocityNetwork {
         return network_.extrapolated(std::array{position, velocity});
     }
 
-    /// The narrowest width of a wavelet along the positions; the travel when there is none.
+    /// Returns the narrowest width of a wavelet along the positions [m]; the travel if there is none.
     [[nodiscard]] double finest_width() const noexcept {
         const std::vector<double>& alpha = network_.parameters().alpha;
         double finest = travel();
@@ -60,13 +61,13 @@ class VelocityNetwork {
         return finest;
     }
 
-    /// Proved bounds of N and its gradient over the box, within `relative` of their largest.
+    /// Returns proved bounds of N and its gradient over the box, within `relative` of their largest.
     [[nodiscard]] RadialBounds moving_bounds(double relative) const {
         return radial_bounds(network_.parameters(), network_.domain().lower, network_.domain().upper,
                              relative);
     }
 
-    /// The same along the line of positions at rest.
+    /// Returns proved bounds of N and its gradient over the positions at rest.
     [[nodiscard]] RadialBounds resting_bounds(double relative) const {
         const double rest = clipped(0.0);
         return radial_bounds(network_.parameters(), std::array{lower(), rest}, std::array{upper(), rest},
@@ -84,7 +85,7 @@ class VelocityNetwork {
         return std::clamp(velocity, network_.domain().lower[1], network_.domain().upper[1]);
     }
 
-    /// Value and slope at rest.
+    /// Returns value and slope at velocity zero.
     [[nodiscard]] Curve resting(double position) const noexcept {
         std::array<double, 2> gradient{};
         const double value = network_.at(std::array{position, clipped(0.0)}, gradient);

@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// Beyond this |u| every function of the Mexican hat is zero in double precision. Clamping to it keeps
-/// u^2 finite for any finite u; NaN passes through.
+/// |u| from which every function of the Mexican hat is zero in double precision. Clamping to it keeps u^2 finite for
+/// any finite u; NaN stays NaN.
 inline constexpr double wavelet_reach = 40.0;
 
 /// Suprema of |psi'|, |psi''| and |psi'''| over the real line, rounded up in the last digit.
@@ -15,8 +15,8 @@ inline constexpr double wavelet_slope_bound = 1.3801190462;  ///< at |u| = sqrt(
 inline constexpr double wavelet_curvature_bound = 3.0;       ///< at u = 0
 inline constexpr double wavelet_jerk_bound = 5.7831;
 
-/// The Mexican hat psi(u) = (u^2 - 1) e^{-u^2/2} (the second derivative of a Gaussian, paper eq. 5 with
-/// zeta = 1/2), its derivative and its first two antiderivatives, all from one exponential.
+/// The Mexican hat psi(u) = (u^2 - 1) e^{-u^2/2}, its derivative and its first two antiderivatives from one
+/// exponential. It is the second derivative of a Gaussian (paper eq. 5 with zeta = 1/2).
 struct MexicanHat {
     double value;            ///< (u^2 - 1) E
     double slope;            ///< (3u - u^3) E
@@ -24,6 +24,7 @@ struct MexicanHat {
     double double_integral;  ///< E
 };
 
+/// Returns the Mexican hat at u.
 [[nodiscard]] inline MexicanHat mexican_hat(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
@@ -31,14 +32,14 @@ struct MexicanHat {
     return {(square - 1.0) * gaussian, (3.0 - square) * u * gaussian, -u * gaussian, gaussian};
 }
 
-/// psi''(u) = (u^4 - 6u^2 + 3) E
+/// Returns psi''(u) = (u^4 - 6u^2 + 3) E.
 [[nodiscard]] inline double mexican_hat_curvature(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
     return ((square - 6.0) * square + 3.0) * std::exp(-0.5 * square);
 }
 
-/// psi'''(u) = (-u^5 + 10u^3 - 15u) E
+/// Returns psi'''(u) = (-u^5 + 10u^3 - 15u) E.
 [[nodiscard]] inline double mexican_hat_jerk(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
@@ -50,12 +51,13 @@ struct RadialMexicanHat {
     double value;            ///< (r^2 - d) E
     double gradient_over_u;  ///< (d + 2 - r^2) E; the gradient is this times u
 
-    /// d^2 psi / du_j^2 for a component u_j of u (2 E is the sum of the two above).
+    /// Returns d^2 psi / du_j^2 for a component u_j of u (2 E is the sum of the two members above).
     [[nodiscard]] double curvature(double u) const noexcept {
         return gradient_over_u - u * u * (2.0 * gradient_over_u + value);
     }
 };
 
+/// Returns the radial Mexican hat at r^2 = `square`.
 [[nodiscard]] inline RadialMexicanHat radial_mexican_hat(double square, double dimension) noexcept {
     square = std::min(square, wavelet_reach * wavelet_reach);
     const double gaussian = std::exp(-0.5 * square);

@@ -14,17 +14,18 @@
 
 namespace palpate {
 
-/// Where records end: a file, a network, a picture. It may take its time and must not throw.
+/// Consumer of records: a file, a network connection, a figure. It may be slow and must not throw.
 template <class C, class Record>
 concept RecordConsumer = requires(C& consumer, std::span<const Record> records) {
     { consumer.take(records) } noexcept;
 };
 
-/// Carries records out of a real-time loop: the loop pushes into a ring and goes on, a thread of its own hands
-/// them to the consumer every few milliseconds. What finds no room in the ring is lost, and counted.
+/// Moves records out of a real-time loop. The loop pushes into a ring buffer; a separate thread passes the records to
+/// the consumer every few milliseconds. Records that do not fit into the ring are lost and counted.
 template <class Record, RecordConsumer<Record> Consumer>
 class FlightRecorder {
   public:
+    /// Starts the thread, which passes records on `every` so many milliseconds.
     FlightRecorder(Consumer& consumer, std::size_t capacity, std::chrono::milliseconds every)
         : ring_{capacity}, consumer_{consumer}, every_{every}, batch_(4096) {
         writer_ = std::thread{[this] { write_until_stopped(); }};
@@ -33,14 +34,14 @@ class FlightRecorder {
     FlightRecorder(const FlightRecorder&) = delete;
     FlightRecorder& operator=(const FlightRecorder&) = delete;
 
-    /// From the loop.
+    /// Adds a record; called by the loop.
     void push(const Record& record) noexcept {
         if (!ring_.push(record)) {
             lost_.fetch_add(1, std::memory_order_relaxed);
         }
     }
 
-    /// Everything pushed before this has reached the consumer when it returns.
+    /// Stops the thread. All records pushed before have then reached the consumer.
     void stop() noexcept {
         if (writer_.joinable()) {
             stopping_.store(true, std::memory_order_release);
@@ -48,6 +49,7 @@ class FlightRecorder {
         }
     }
 
+    /// Returns the number of records lost because the ring was full.
     [[nodiscard]] std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_relaxed); }
 
   private:
@@ -74,15 +76,16 @@ class FlightRecorder {
     std::thread writer_;
 };
 
-/// The last records of a loop, kept by the loop itself: what is told when it ends in a fault.
+/// Stores the last records of a loop, without a thread, for the report of a fault.
 template <class Record>
 class LastRecords {
   public:
     explicit LastRecords(std::size_t capacity) : records_(capacity) {}
 
+    /// Adds a record in place of the oldest one.
     void push(const Record& record) noexcept { records_[count_++ % records_.size()] = record; }
 
-    /// Oldest first. Not from the loop.
+    /// Returns the records, oldest first. Allocates, so the loop must not call it.
     [[nodiscard]] std::vector<Record> in_order() const {
         const std::size_t size = records_.size();
         const std::size_t first = count_ > size ? count_ - size : 0;

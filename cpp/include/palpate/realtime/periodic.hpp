@@ -9,33 +9,35 @@
 
 namespace palpate {
 
+/// Time or duration [ns].
 using Nanoseconds = std::int64_t;
 
 inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
 
-/// The clock of every deadline: it never jumps.
+/// Returns the time of the clock of all deadlines, which never jumps.
 [[nodiscard]] inline Nanoseconds monotonic_now() noexcept {
     timespec now{};
     clock_gettime(CLOCK_MONOTONIC, &now);
     return now.tv_sec * nanoseconds_a_second + now.tv_nsec;
 }
 
-/// One return from sleep.
+/// One wake-up.
 struct Wake {
-    Nanoseconds deadline = 0;   ///< when it should have been
-    Nanoseconds now = 0;        ///< when it was
-    std::uint64_t skipped = 0;  ///< later deadlines that had passed as well: they get no tick
+    Nanoseconds deadline = 0;   ///< planned time
+    Nanoseconds now = 0;        ///< actual time
+    std::uint64_t skipped = 0;  ///< later deadlines that had also passed; they are without a tick
 };
 
-/// Wakes up at absolute deadlines t_0 + k T, so that a late tick delays no later one. Deadlines that passed
-/// meanwhile are skipped and counted: ticks are never made up for in a burst.
+/// Wakes up at absolute deadlines t_0 + k T, so that a late tick does not delay later ones. Deadlines that have passed
+/// are skipped and counted; missed ticks are not repeated.
 class Periodic {
   public:
     explicit Periodic(Nanoseconds period) noexcept : period_{period} {}
 
-    /// The first deadline is one period from now.
+    /// Sets the first deadline one period from now.
     void start() noexcept { next_ = monotonic_now() + period_; }
 
+    /// Sleeps until the next deadline.
     [[nodiscard]] Wake wait() noexcept {
         const timespec until{next_ / nanoseconds_a_second, next_ % nanoseconds_a_second};
         while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
@@ -52,14 +54,16 @@ class Periodic {
     Nanoseconds next_ = 0;
 };
 
-/// The clock of a loop whose device paces it: a tick is due one period after the last one and waits for its sample
-/// in the device. There is nothing to skip; what the device did not deliver is missing in its sequence.
+/// Clock of a loop that its device paces. A tick is due one period after the last one, and waits in the device for its
+/// sample. It does not skip deadlines; a sample that the device did not deliver is missing in its sequence.
 class PacedByDevice {
   public:
     explicit PacedByDevice(Nanoseconds period) noexcept : period_{period} {}
 
+    /// Sets the first tick to now.
     void start() noexcept { last_ = monotonic_now() - period_; }
 
+    /// Returns at once; the device exchange waits.
     [[nodiscard]] Wake wait() noexcept {
         const Nanoseconds deadline = last_ + period_;
         last_ = monotonic_now();

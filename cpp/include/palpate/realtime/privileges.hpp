@@ -18,14 +18,14 @@
 
 namespace palpate {
 
-/// What a thread asks of the operating system to be on time. What is refused costs punctuality, not
-/// correctness: it is said in a sentence, and the loop runs all the same.
+/// Requests of a thread to the operating system that make it punctual. A refused request affects punctuality, not
+/// correctness: it is reported, and the loop runs.
 struct RealTimeOptions {
-    int priority = 80;  ///< of SCHED_FIFO, 1 to 99; 0 = ordinary scheduling
-    int cpu = -1;       ///< the core to stay on; -1 = the last one allowed, -2 = none in particular
+    int priority = 80;  ///< priority of SCHED_FIFO, 1 to 99; 0 = ordinary scheduling
+    int cpu = -1;       ///< core of the thread; -1 = the last one allowed, -2 = any core
 };
 
-/// Memory that is never swapped out while this lives.
+/// Keeps the memory of the process from being swapped out during the lifetime of this object.
 class LockedMemory {
   public:
     LockedMemory() noexcept : error_{mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno} {}
@@ -37,16 +37,16 @@ class LockedMemory {
     LockedMemory(const LockedMemory&) = delete;
     LockedMemory& operator=(const LockedMemory&) = delete;
 
-    /// 0, or why the memory is not locked.
+    /// Returns 0, or the error number if the memory is not locked.
     [[nodiscard]] int error() const noexcept { return error_; }
 
   private:
     int error_;
 };
 
-/// Cores that do not sleep deeply while this lives: waking up from a deep sleep takes longer than the rest of a
-/// tick, and on a virtual machine even a shallow one is left to the host's scheduler. The kernel keeps to the
-/// latency that stands in its file (Documentation/power/pm_qos_interface.rst) for as long as that is open.
+/// Keeps the cores from sleeping deeply during the lifetime of this object. Waking up from a deep sleep takes longer
+/// than the rest of a tick, and on a virtual machine the host's scheduler controls even a shallow one. The kernel keeps
+/// the latency that is written in its file while the file is open (Documentation/power/pm_qos_interface.rst).
 class WakefulCores {
   public:
     WakefulCores() noexcept : file_{open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)} {
@@ -62,7 +62,7 @@ class WakefulCores {
     WakefulCores(const WakefulCores&) = delete;
     WakefulCores& operator=(const WakefulCores&) = delete;
 
-    /// 0, or why the cores may sleep.
+    /// Returns 0, or the error number if the cores may sleep.
     [[nodiscard]] int error() const noexcept { return error_; }
 
   private:
@@ -72,6 +72,7 @@ class WakefulCores {
 
 namespace detail {
 
+/// Returns the largest number of a core that this process may use.
 [[nodiscard]] inline int last_allowed_cpu() noexcept {
     cpu_set_t allowed;
     CPU_ZERO(&allowed);
@@ -83,7 +84,7 @@ namespace detail {
     return last;
 }
 
-/// Touches the stack that a loop may use, so that no page of it is missing later.
+/// Touches the stack that a loop may use, so that its pages are present.
 inline void touch_stack() noexcept {
     constexpr std::size_t bytes = 65'536;
     std::array<volatile char, bytes> page{};
@@ -94,8 +95,8 @@ inline void touch_stack() noexcept {
 
 }  // namespace detail
 
-/// Makes the calling thread a real-time one: no signals but its own mistakes, one core, first-in-first-out
-/// scheduling, a stack that is there. Returns a sentence for each thing that was refused.
+/// Makes the calling thread a real-time thread: only its own fault signals, one core, first-in-first-out scheduling, a
+/// stack in memory. Returns a sentence for each refused request.
 [[nodiscard]] inline std::vector<std::string> become_real_time(const RealTimeOptions& options,
                                                                const LockedMemory& memory,
                                                                const WakefulCores& cores) {

@@ -10,17 +10,17 @@
 
 namespace palpate {
 
-/// A queue between two threads, one that writes and one that reads. Neither ever waits for the other: both
-/// calls end after a fixed number of steps, whatever the other thread does. A full queue refuses.
+/// A queue between one writing and one reading thread. Neither waits for the other: both calls end after a fixed number
+/// of steps. A full queue refuses new elements.
 template <class T>
     requires std::is_trivially_copyable_v<T>
 // NOLINTNEXTLINE(clang-analyzer-optin.performance.Padding): the padding keeps two cores off one cache line
 class RingBuffer {
   public:
-    /// Room for at least `capacity` elements; all memory is taken here.
+    /// Allocates all memory, for at least `capacity` elements.
     explicit RingBuffer(std::size_t capacity) : slots_(std::bit_ceil(capacity)), mask_{slots_.size() - 1} {}
 
-    /// By the writing thread. False: full, and nothing was written.
+    /// Adds an element; called by the writing thread. Returns false if the queue is full.
     [[nodiscard]] bool push(const T& value) noexcept {
         const std::size_t head = head_.load(std::memory_order_relaxed);
         if (head - tail_.load(std::memory_order_acquire) == slots_.size()) {
@@ -31,7 +31,7 @@ class RingBuffer {
         return true;
     }
 
-    /// By the reading thread: takes as many elements as there are and `out` holds, oldest first.
+    /// Moves elements to `out`, oldest first, and returns their number; called by the reading thread.
     [[nodiscard]] std::size_t pop(std::span<T> out) noexcept {
         const std::size_t tail = tail_.load(std::memory_order_relaxed);
         const std::size_t there = head_.load(std::memory_order_acquire) - tail;
@@ -43,19 +43,20 @@ class RingBuffer {
         return count;
     }
 
-    /// Elements that wait, as the reading thread sees it.
+    /// Returns the number of elements in the queue; called by the reading thread.
     [[nodiscard]] std::size_t size() const noexcept {
         return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed);
     }
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:
-    static constexpr std::size_t cache_line = 64;  ///< what two cores must not write to at once
+    static constexpr std::size_t cache_line = 64;  ///< largest unit of memory that two cores must not write
+                                                   ///< at the same time [bytes]
 
     std::vector<T> slots_;
     std::size_t mask_;
-    alignas(cache_line) std::atomic<std::size_t> head_{0};  ///< elements ever written
-    alignas(cache_line) std::atomic<std::size_t> tail_{0};  ///< elements ever read
+    alignas(cache_line) std::atomic<std::size_t> head_{0};  ///< number of all elements written
+    alignas(cache_line) std::atomic<std::size_t> tail_{0};  ///< number of all elements read
 };
 
 }  // namespace palpate

@@ -13,10 +13,11 @@
 
 namespace palpate {
 
-/// A histogram of durations of fixed size: exact to 1/256 of the value from 0 ns to 18 minutes, no allocation.
-/// Each power of two is cut into 128 equal cells; below 256 ns each nanosecond has its own.
+/// A histogram of durations with fixed size and without allocation. It is exact to 1/256 of the value from 0 ns to 18
+/// minutes. Each power of two has 128 equal cells; below 256 ns each nanosecond has one cell.
 class DurationHistogram {
   public:
+    /// Counts a duration.
     void add(Nanoseconds duration) noexcept {
         const auto value = static_cast<std::uint64_t>(std::clamp<Nanoseconds>(duration, 0, longest));
         ++cells_[cell_of(value)];
@@ -24,7 +25,8 @@ class DurationHistogram {
         largest_ = std::max(largest_, static_cast<Nanoseconds>(value));
     }
 
-    /// The duration that a share of all do not exceed [ns]: the middle of its cell, the exact one at share 1.
+    /// Returns the duration that a share of all does not exceed [ns]: the middle of its cell, or the exact largest at
+    /// share 1.
     [[nodiscard]] double quantile(double share) const noexcept {
         const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
         if (wanted >= count_) {
@@ -67,14 +69,15 @@ class DurationHistogram {
     Nanoseconds largest_ = 0;
 };
 
-/// How punctual a loop was.
+/// Punctuality of a loop.
 struct LoopTiming {
     DurationHistogram period;    ///< from wake-up to wake-up
     DurationHistogram lateness;  ///< from deadline to wake-up
-    std::uint64_t missed = 0;    ///< deadlines that had no tick of their own
-    Nanoseconds first = 0;       ///< first and last wake-up
-    Nanoseconds last = 0;
+    std::uint64_t missed = 0;    ///< deadlines without a tick
+    Nanoseconds first = 0;       ///< first wake-up
+    Nanoseconds last = 0;        ///< last wake-up
 
+    /// Counts a wake-up.
     void add(const Wake& wake) noexcept {
         if (lateness.count() == 0) {
             first = wake.now;
@@ -87,19 +90,19 @@ struct LoopTiming {
     }
 
     [[nodiscard]] std::uint64_t ticks() const noexcept { return lateness.count(); }
-    /// Ticks a second over the whole run.
+    /// Returns the mean rate over the whole run [Hz].
     [[nodiscard]] double rate_hz() const noexcept {
         return last > first ? static_cast<double>(ticks() - 1) * 1e9 / static_cast<double>(last - first)
                             : 0.0;
     }
 };
 
-/// The rate over each half second, as it happens: whoever watches knows of a shortfall within a second.
+/// Measures the rate over each half second, so that a low rate is noticed within a second.
 class RateCheck {
   public:
     explicit RateCheck(Nanoseconds window = nanoseconds_a_second / 2) noexcept : window_{window} {}
 
-    /// True when a window has just ended; its rate is then in `rate_hz`.
+    /// Counts a tick. Returns true if a window has just ended; `rate_hz` then returns its rate.
     [[nodiscard]] bool add(Nanoseconds now) noexcept {
         if (start_ == 0) {
             start_ = now;
@@ -116,7 +119,7 @@ class RateCheck {
         return true;
     }
 
-    /// Of the last window [Hz]; 0 before the first has ended. From any thread.
+    /// Returns the rate of the last window [Hz]; 0 before the first has ended. Any thread may call it.
     [[nodiscard]] double rate_hz() const noexcept { return rate_hz_.load(std::memory_order_relaxed); }
 
   private:

@@ -13,11 +13,11 @@
 
 namespace palpate {
 
-/// Something happens in one thread, and one other waits for it, but not longer than until a deadline. Nothing is
-/// locked or allocated; it is the one wait of the standard's atomics that they lack, with a time.
+/// Lets one thread wait for an event in another thread, until a deadline. It neither locks nor allocates. It is the
+/// timed wait that the atomics of the standard library lack.
 class WakeUp {
   public:
-    /// Everything done before this is seen by whoever wakes.
+    /// Reports an event. The waiting thread sees all memory writes before it.
     void happened() noexcept {
         events_.fetch_add(1, std::memory_order_seq_cst);
         if (waits_.load(std::memory_order_seq_cst)) {
@@ -25,15 +25,15 @@ class WakeUp {
         }
     }
 
-    /// How often it happened; to be read before looking whether a wait is needed.
+    /// Returns the number of events; read it before checking the condition to wait for.
     [[nodiscard]] std::uint32_t events() const noexcept { return events_.load(std::memory_order_seq_cst); }
 
-    /// Waits until it has happened more than `seen` times. False: the deadline passed.
+    /// Waits until there were more than `seen` events. Returns false if the deadline passed.
     [[nodiscard]] bool wait(std::uint32_t seen, Nanoseconds deadline) noexcept {
         const timespec until{deadline / nanoseconds_a_second, deadline % nanoseconds_a_second};
         waits_.store(true, std::memory_order_seq_cst);
         while (events_.load(std::memory_order_seq_cst) == seen && monotonic_now() < deadline) {
-            // Returns at once where it has happened meanwhile: the kernel compares again.
+            // Returns at once if an event has happened meanwhile, because the kernel compares again.
             ::syscall(SYS_futex, word(), FUTEX_WAIT_BITSET_PRIVATE, seen, &until, nullptr,
                       FUTEX_BITSET_MATCH_ANY);
         }

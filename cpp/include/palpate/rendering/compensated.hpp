@@ -12,13 +12,15 @@
 
 namespace palpate {
 
-/// An environment with its force multiplied: what remains of f on a load line from which f itself is taken out.
+/// An environment with its force multiplied by a factor. It describes the part of f that stays on a load line after f
+/// is subtracted from it.
 template <Environment E>
 struct Scaled {
     using State = typename E::State;
     const E& environment;
     double factor;
 
+    /// Returns the environment's force and slope, multiplied.
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
         const EnvironmentSample sample = environment.at(x, state);
         return {factor * sample.force, factor * sample.slope, factor * sample.energy, sample.extrapolated};
@@ -27,9 +29,9 @@ struct Scaled {
     [[nodiscard]] State start(double x) const noexcept { return environment.start(x); }
 };
 
-/// An environment that feels like `E` through a coupling of stiffness K_c. The coupling's spring is taken out
-/// of the curve beforehand: the curve (x - f(x)/K_c, f(x)) in place of (x, f(x)), of slope
-/// K_c f' / (K_c - f') > -K_c. It exists where f' < K_c everywhere, and for forces without memory.
+/// An environment that feels like `E` through a coupling of stiffness K_c. The compliance of the coupling's spring is
+/// subtracted from the curve: (x - f(x)/K_c, f(x)) replaces (x, f(x)). Its slope is K_c f' / (K_c - f') > -K_c. This
+/// requires f' < K_c everywhere, and a force without memory.
 template <Environment E>
     requires std::same_as<typename E::State, Stateless>
 class Compensated {
@@ -39,10 +41,13 @@ class Compensated {
     Compensated(E environment, double coupling_stiffness)
         : environment_{std::move(environment)}, stiffness_{coupling_stiffness} {}
 
+    /// Returns the environment that the hand feels.
     [[nodiscard]] const E& felt() const noexcept { return environment_; }
+    /// Returns K_c [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
 
-    /// x - f(x)/K_c = shifted is the load line -f(x) + K_c x = K_c shifted.
+    /// Returns force and slope at a shifted position. x - f(x)/K_c = shifted is the load line -f(x) + K_c x = K_c
+    /// shifted.
     [[nodiscard]] EnvironmentSample at(double shifted, const State& state) const noexcept {
         const Solution found = LoadLineSolver{}.solve(Scaled<E>{environment_, -1.0}, state,
                                                       {stiffness_, stiffness_ * shifted}, shifted);
@@ -61,8 +66,8 @@ class Compensated {
     double stiffness_;
 };
 
-/// The load line of a compensated environment, f + p (x - f/K_c) = q, is one of f itself, multiplied:
-/// (1 - p/K_c) f(x) + p x = q. It rises wherever f' < K_c: one table, and one evaluation of f.
+/// Solves the load line of a compensated environment, f + p (x - f/K_c) = q. It is a multiple of a load line of f: (1 -
+/// p/K_c) f(x) + p x = q. It rises if f' < K_c: one table, and one evaluation of f.
 class CompensatedResolvent {
   public:
     using Memory = Resolvent::Memory;
@@ -73,13 +78,15 @@ class CompensatedResolvent {
           factor_{1.0 - p / coupling_stiffness},
           felt_{scaled(std::move(force), factor_), p, options} {}
 
+    /// Returns true if the load line has a table.
     [[nodiscard]] bool tabulated() const noexcept { return felt_.tabulated(); }
-    /// Whether every load line of this slope is certified to have one solution. f rises by the shifted position
-    /// where it does by x: x - f(x)/K_c rises with x.
+    /// Returns true if every load line of this slope is certified to have one solution. f rises with the shifted
+    /// position if it rises with x, because x - f(x)/K_c rises with x.
     [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && felt_.unique(p); }
-    /// The search for a force of which nothing is certified.
+    /// Returns the search for a force without a certificate.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return felt_.uncertified(); }
 
+    /// Solves the load line and updates the memory.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const Compensated<E>& environment,
                                                             const Stateless& state, LoadLine line,

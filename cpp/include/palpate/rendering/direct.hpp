@@ -12,14 +12,16 @@
 
 namespace palpate {
 
-/// F = f(x), x the measured position: no coupling, no state but the environment's own.
+/// Direct rendering: F = f(x), where x is the measured position. Its only state is that of the environment.
 template <Environment E>
 class Direct {
   public:
     explicit Direct(E environment) : environment_{std::move(environment)} { reset(0.0); }
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept { state_ = environment_.start(position); }
 
+    /// Returns the force at the measured position.
     [[nodiscard]] Rendered step(double position) noexcept {
         const EnvironmentSample sample = environment_.at(position, state_);
         if (!std::isfinite(position) || !std::isfinite(sample.force)) {
@@ -34,14 +36,16 @@ class Direct {
     typename E::State state_;
 };
 
-/// F = f(x, v), v = (x_k - x_{k-1}) / T: direct rendering of a force of position and velocity. The difference is
-/// that of two samples and no more, because the proof of its certificate is about that one.
+/// Direct rendering of a force of position and velocity: F = f(x, v), v = (x_k - x_{k-1}) / T. The velocity is the
+/// difference of two samples, because the proof of the certificate requires it.
 class DirectVelocity {
   public:
     DirectVelocity(VelocityNetwork force, double period_s) : force_{std::move(force)}, period_s_{period_s} {}
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept { last_ = position; }
 
+    /// Returns the force at the measured position and velocity.
     [[nodiscard]] Rendered step(double position) noexcept {
         const double velocity = (position - last_) / period_s_;
         const double force = force_.force(position, velocity);
@@ -63,27 +67,27 @@ static_assert(Structure<DirectVelocity>);
 /// Largest number of samples that a prediction uses.
 inline constexpr int most_prediction_taps = 16;
 
-/// Weights w_1 to w_m of the steps d_{k-j} = x_{k-j+1} - x_{k-j} in the advance of m taps:
-/// w_j = (m - j + 1) / (m (m + 1)), with the sum 1/2.
+/// Returns the weight w_j of the step d_{k-j} = x_{k-j+1} - x_{k-j} in the prediction with m taps: w_j = (m - j + 1) /
+/// (m (m + 1)). The sum of w_1 to w_m is 1/2.
 [[nodiscard]] constexpr double prediction_weight(int taps, int j) noexcept {
     return static_cast<double>(taps - j + 1) / (taps * (taps + 1.0));
 }
 
-/// Predicts the position half a sample ahead, where a force that is held for a sample belongs on average:
+/// Predicts the position half a sample ahead, the mean position while a force is held for a sample:
 ///
 ///     x_hat = x_k + (x_k - mean(x_{k-1}, ..., x_{k-m})) / (m + 1) = x_k + sum of w_j d_{k-j}.
 ///
-/// At constant velocity it is exact for every m. More taps need less damping and react later (docs/certificate.md).
+/// It is exact at constant velocity for every m. More taps need less damping and react later (docs/certificate.md).
 class HalfSamplePrediction {
   public:
-    /// `taps`: m, from 1 to `most_prediction_taps`.
+    /// Makes a prediction with m = `taps`, from 1 to `most_prediction_taps`.
     explicit HalfSamplePrediction(int taps) noexcept
         : taps_{static_cast<std::size_t>(taps)}, share_{1.0 / (taps * (taps + 1.0))} {}
 
-    /// The object rests at a position: so does the past.
+    /// Sets all past positions to the position of an object at rest.
     void reset(double position) noexcept { past_.fill(position); }
 
-    /// x_hat, from a position and the m before it.
+    /// Returns x_hat from a position and the m before it.
     [[nodiscard]] double ahead(double position) const noexcept {
         double moved = 0.0;
         for (std::size_t j = 0; j < taps_; ++j) {
@@ -92,7 +96,7 @@ class HalfSamplePrediction {
         return position + share_ * moved;
     }
 
-    /// Takes a position into the past.
+    /// Adds a position to the past.
     void advance(double position) noexcept {
         past_[next_] = position;
         next_ = next_ + 1 == taps_ ? 0 : next_ + 1;
@@ -105,8 +109,9 @@ class HalfSamplePrediction {
     std::array<double, most_prediction_taps> past_{};
 };
 
-/// F = f(x_hat), x_hat the position predicted half a sample ahead. The memory of the environment, the play of a
-/// hysteresis, follows the measured position: the force is that of a trial move from there to x_hat.
+/// Direct rendering with prediction: F = f(x_hat), where x_hat is the position predicted half a sample ahead. The
+/// environment's memory, such as the play of a hysteresis, follows the measured position. The force is that of a trial
+/// motion from there to x_hat.
 template <Environment E>
 class PredictedDirect {
   public:
@@ -114,11 +119,13 @@ class PredictedDirect {
         reset(0.0);
     }
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         prediction_.reset(position);
     }
 
+    /// Returns the force at the predicted position.
     [[nodiscard]] Rendered step(double position) noexcept {
         const double ahead = prediction_.ahead(position);
         typename E::State state = state_;
@@ -138,8 +145,9 @@ class PredictedDirect {
     HalfSamplePrediction prediction_;
 };
 
+/// Builds direct rendering: `Direct`, or `PredictedDirect` if the prediction has taps.
 struct DirectStructure {
-    static constexpr StructureTraits traits{.name = "direct", .predicts = true};
+    static constexpr StructureTraits traits{.name = "direct", .velocity = true, .predicts = true};
 
     template <Environment E, class SolverOf, class Visit>
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,

@@ -12,28 +12,30 @@
 
 namespace palpate {
 
-/// m v' = F_c - f(x) - B_o v behind the coupling with the force that does exactly the work that is stored,
-/// D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}), and midpoint kinematics: the load line D + p y = q with
+/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, integrated without generated energy. The object's
+/// force does exactly the work that is stored, D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}). With midpoint kinematics the
+/// load line D + p y = q has
 ///
 ///     p = 2m/T^2 + B_o/T + K_c + B_c/T,
-///     q = (2m/T^2 + B_o/T) y_{k-1} + (2m/T) v_{k-1} + K_c x_k + B_c (v_device + y_{k-1}/T),
-///     v_k = 2 (y_k - y_{k-1}) / T - v_{k-1}.
+///     q = (2m/T^2 + B_o/T) y_{k-1} + (2m/T) v_{k-1} + K_c x_k + B_c (v_device + y_{k-1}/T).
 ///
-/// D alone rings on stiff walls. With the switch it stands in for f(y) only where f(y) would generate energy,
+/// The velocity is v_k = 2 (y_k - y_{k-1}) / T - v_{k-1}.
+///
+/// D alone oscillates on stiff walls. With `switched` it replaces f(y) only if f(y) would generate energy, which means
 /// (f(y) - D)(y - y_{k-1}) < 0.
 ///
-/// Every root keeps the energy account. With f' >= -s, D + p y = q has one root y_D where p > s/2, because D falls
-/// by at most s/2; the switched step has one where p > s, and up to three between. The step takes y_D if D stands in
-/// for f there. Otherwise f + p y - q has changed its sign between y_{k-1} and y_D, and the step takes its root that
-/// is nearest to y_{k-1}: D + p y < q there, so that f stands for itself. `Solver` finds that root; one that cannot
-/// tell the nearest may find another between y_{k-1} and y_D.
+/// Every root satisfies the energy account. With f' >= -s, D + p y = q has one root y_D if p > s/2, because D falls by
+/// at most s/2. The switched step has one root if p > s, and up to three between s/2 and s. The step takes y_D if D
+/// replaces f there. Otherwise f + p y - q changes its sign between y_{k-1} and y_D, and the step takes its root
+/// nearest to y_{k-1}. D + p y < q there, so D does not replace f. `Solver` finds that root; a solver that cannot
+/// identify the nearest root may return another one between y_{k-1} and y_D.
 ///
-/// A force limit acts as in `Implicit`: beyond it device and object both get G = +-F_max.
+/// A force limit acts as in `Implicit`: beyond it device and object both receive G = +-F_max.
 template <Environment E, class Solver = LoadLineSolver>
 class EnergyConsistent {
   public:
-    /// `shortest`: steps below it take D from Gauss points of f, because the quotient loses digits; 1e-2 of
-    /// the finest wavelet's width is right.
+    /// Makes the structure. Steps below `shortest` compute D from Gauss points of f, because the quotient loses digits;
+    /// 1e-2 of the finest wavelet's width is suitable.
     EnergyConsistent(E environment, Inertia inertia, VirtualCoupling coupling, double period,
                      double shortest = 1e-4, bool switched = true,
                      double force_limit = std::numeric_limits<double>::infinity(), Solver solver = {})
@@ -48,12 +50,13 @@ class EnergyConsistent {
         reset(0.0);
     }
 
-    /// p of every step behind the coupling.
+    /// Returns p of every step behind the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return inertia.midpoint_slope(period) + coupling.stiffness + coupling.damping / period;
     }
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -61,7 +64,7 @@ class EnergyConsistent {
         velocity_ = 0.0;
     }
 
-    /// Behind the coupling: the device's measured position in, the force on device and object out.
+    /// Returns the force on device and object for the device's measured position.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
         const double push = coupling_.force(device, device_velocity + position_ / period_);
@@ -87,16 +90,17 @@ class EnergyConsistent {
         return moved_to(solution, force);
     }
 
-    /// Without the coupling: a given force drives the environment.
+    /// Moves the object by a given force, without the coupling.
     [[nodiscard]] Rendered drive(double force) noexcept {
         const Solution solution = solve({0.0, 0.0}, force);
         return solution.status == Status::NonFinite ? detail::refused(position_) : moved_to(solution, force);
     }
 
+    /// Returns the velocity of the object [m/s or rad/s].
     [[nodiscard]] double velocity() const noexcept { return velocity_; }
 
   private:
-    /// f or D as an environment of its own, for the step from `from`.
+    /// f or D as an environment, for the step from `from`.
     struct Stepped {
         using State = typename E::State;
         const E& environment;
@@ -110,7 +114,7 @@ class EnergyConsistent {
             const double moved = y - from;
             const double quotient = mean(y, sample, state);
             if (!switched || (sample.force - quotient) * moved < 0.0) {
-                // D' = (f - D) / (y - from), and half of f' where that is nothing over nothing.
+                // D' = (f - D) / (y - from), and half of f' if both are zero.
                 sample.slope =
                     std::abs(moved) > shortest ? (sample.force - quotient) / moved : 0.5 * sample.slope;
                 sample.force = quotient;
@@ -120,13 +124,13 @@ class EnergyConsistent {
         void advance(double y, State& state) const noexcept { environment.advance(y, state); }
         [[nodiscard]] State start(double y) const noexcept { return environment.start(y); }
 
-        /// Whether f would generate energy at y.
+        /// Returns true if f would generate energy at y.
         [[nodiscard]] bool generates(double y, const State& state) const noexcept {
             const EnvironmentSample sample = environment.at(y, state);
             return (sample.force - mean(y, sample, state)) * (y - from) < 0.0;
         }
 
-        /// D, near `from` by three Gauss points.
+        /// Returns D; near `from` by three Gauss points.
         [[nodiscard]] double mean(double y, const EnvironmentSample& at_y,
                                   const State& state) const noexcept {
             if (std::abs(y - from) > shortest) {
@@ -141,7 +145,8 @@ class EnergyConsistent {
         }
     };
 
-    /// `push` is what the coupling would exert on an environment at rest at 0, its damper's memory included.
+    /// Returns the load line. `push` is the force of the coupling on an environment at rest at 0, with the memory of
+    /// its damper.
     [[nodiscard]] LoadLine line_of(VirtualCoupling coupling, double push) const noexcept {
         const double memory = load_line_slope(inertia_, {0.0, 0.0}, period_);
         return {load_line_slope(inertia_, coupling, period_),
@@ -152,7 +157,7 @@ class EnergyConsistent {
         return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
     }
 
-    /// The first root of the step that is met from `start`.
+    /// Returns the first root of the step from `start`.
     [[nodiscard]] Solution search(VirtualCoupling coupling, double push, double start) const noexcept {
         Solution solution =
             LoadLineSolver{}.solve(stepped(switched_), state_, line_of(coupling, push), start);
@@ -160,7 +165,7 @@ class EnergyConsistent {
         return solution;
     }
 
-    /// The end of the step.
+    /// Returns the end of the step.
     [[nodiscard]] Solution solve(VirtualCoupling coupling, double push) const noexcept {
         const LoadLine line = line_of(coupling, push);
         const Stepped quotient = stepped(false);
@@ -183,7 +188,7 @@ class EnergyConsistent {
             if (by_force.status != Status::Ok || !generates(by_force)) {
                 return end(by_force, 0);
             }
-            // The one root of the step is y_D, because it cannot be that of f.
+            // The only root of the step is y_D, because it cannot be a root of f.
             const Solution by_energy =
                 newton.solve(quotient, state_, line, by_force.position, up_to(by_force.position));
             return end(by_energy, by_energy.evaluations);
@@ -221,7 +226,7 @@ class EnergyConsistent {
     double period_;
     double shortest_;
     bool switched_;
-    double force_limit_;  ///< F_max
+    double force_limit_;  ///< F_max [N or N*m]
     Solver solver_;
     typename E::State state_;
     double device_ = 0.0;    ///< x_{k-1}
@@ -229,6 +234,7 @@ class EnergyConsistent {
     double velocity_ = 0.0;  ///< v_{k-1}
 };
 
+/// Builds `EnergyConsistent`.
 struct EnergyConsistentStructure {
     static constexpr StructureTraits traits{
         .name = "energy-consistent", .coupling = true, .mass = true, .solved = true, .keeps_loss = true};

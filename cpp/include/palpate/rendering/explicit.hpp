@@ -9,9 +9,9 @@
 
 namespace palpate {
 
-/// Slope of the environment below which the explicit structure is stable at a held device, behind a coupling or
-/// (K_c = B_c = 0) driven by a force: linearised at an equilibrium, its poles stay inside the unit circle for
-/// 0 < K and
+/// Returns the slope of the environment below which the explicit structure is stable at a held device, behind a
+/// coupling or driven by a force (K_c = B_c = 0). Linearised at an equilibrium, its poles stay inside the unit circle
+/// for 0 < K and
 ///
 ///     K + K_c < (4 m - 2 (B_o + B_c) T) / T^2.
 [[nodiscard]] constexpr double explicit_slope_limit(const Inertia& inertia, const VirtualCoupling& coupling,
@@ -20,7 +20,7 @@ namespace palpate {
     return (4.0 * inertia.mass - 2.0 * damping * period) / (period * period) - coupling.stiffness;
 }
 
-/// Object with B_o = ratio m / T for which the slope limit is `limit`: the inverse of `explicit_slope_limit`.
+/// Returns the object with B_o = ratio m / T whose slope limit is `limit`: the inverse of `explicit_slope_limit`.
 [[nodiscard]] constexpr Inertia explicit_object(double limit, const VirtualCoupling& coupling, double ratio,
                                                 double period) noexcept {
     const double mass = ((limit + coupling.stiffness) * period * period + 2.0 * coupling.damping * period) /
@@ -28,9 +28,8 @@ namespace palpate {
     return {mass, ratio * mass / period};
 }
 
-/// m v' = F_c - f(x) - B_o v with the paper's delayed integrator (figure 14): everything on the right is one
-/// sample old, so nothing has to be solved, and the step is stable only for slopes below
-/// `explicit_slope_limit`:
+/// Object with mass, m v' = F_c - f(x) - B_o v, with the paper's delayed integrator (figure 14). All terms on the right
+/// are one sample old, so no equation is solved. The step is stable only for slopes below `explicit_slope_limit`:
 ///
 ///     v_k = v_{k-1} + (T/m)(F_{k-1} - f(y_{k-1}) - B_o v_{k-1}),   y_k = y_{k-1} + T v_k,
 ///     F_k = K_c (x_k - y_k) + B_c (v_device - v_k).
@@ -42,6 +41,7 @@ class Explicit {
         reset(0.0);
     }
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -50,7 +50,7 @@ class Explicit {
         force_ = environment_.at(position, state_).force;
     }
 
-    /// Behind the coupling: the device's measured position in, the coupling's force out.
+    /// Returns the force of the coupling for the device's measured position.
     [[nodiscard]] Rendered step(double device) noexcept {
         if (!std::isfinite(device)) {
             return detail::refused(position_);
@@ -65,7 +65,7 @@ class Explicit {
         return rendered;
     }
 
-    /// Without the coupling: a given force drives the environment.
+    /// Moves the object by a given force, without the coupling.
     [[nodiscard]] Rendered drive(double force) noexcept {
         const EnvironmentSample sample = environment_.at(position_, state_);
         const double velocity =
@@ -92,10 +92,11 @@ class Explicit {
     double force_ = 0.0;     ///< F_{k-1}
 };
 
+/// Builds `Explicit`.
 struct ExplicitStructure {
     static constexpr StructureTraits traits{.name = "explicit", .coupling = true, .mass = true};
 
-    /// Slopes of the model from this one on are sure to diverge.
+    /// Returns the slope of the model from which the structure diverges.
     [[nodiscard]] static double slope_limit(const StructureNumbers& numbers) noexcept {
         return explicit_slope_limit(numbers.inertia, numbers.coupling, numbers.period_s);
     }

@@ -12,18 +12,18 @@
 
 namespace palpate {
 
-/// m v' = F_c - f(x) - B_o v behind the coupling, backward Euler with the coupling inside the solve: the load
-/// line with
+/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, by backward Euler with the coupling in the same
+/// equation. The load line has
 ///
 ///     p = m/T^2 + B_o/T + K_c + B_c/T,
 ///     q = m (2 y_{k-1} - y_{k-2}) / T^2 + B_o y_{k-1} / T + K_c x_k + B_c (v_k + y_{k-1} / T),
 ///
-/// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit
-/// equation of section 4.3, with the damping of figure 14.
+/// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit equation of
+/// section 4.3, with the damping of figure 14.
 ///
-/// A force limit acts on device and object alike. If |F| > F_max at the solution y*, the object is driven by
-/// G = +-F_max alone: y is the first root of its load line from y* in the direction of -G. There |F(y)| > F_max,
-/// because F falls with y, and the device gets the same G.
+/// A force limit acts equally on device and object. If |F| > F_max at the solution y*, only G = +-F_max drives the
+/// object: y is the first root of its load line from y* in the direction of -G. There |F(y)| > F_max, because F falls
+/// with y, and the device receives the same G.
 template <Environment E, class Solver = LoadLineSolver>
 class Implicit {
   public:
@@ -31,7 +31,8 @@ class Implicit {
              double force_limit = std::numeric_limits<double>::infinity())
         : Implicit{std::move(environment), inertia, coupling, period, solver, force_limit, solver} {}
 
-    /// `solver` is for the load line behind the coupling, `alone` for that of the object alone.
+    /// Makes the structure with two solvers: `solver` for the load line behind the coupling, `alone` for that of the
+    /// object alone.
     Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver,
              double force_limit, Solver alone)
         : environment_{std::move(environment)},
@@ -48,7 +49,7 @@ class Implicit {
         reset(0.0);
     }
 
-    /// p of every step behind the coupling; with a coupling of zeros that of the object alone.
+    /// Returns p of every step behind the coupling; with a coupling of zeros, p of the object alone.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return coupling.load_line_slope(period) + inertia.load_line_slope(period);
@@ -56,6 +57,7 @@ class Implicit {
 
     [[nodiscard]] const Solver& solver() const noexcept { return coupled_; }
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -64,7 +66,7 @@ class Implicit {
         before_ = position;
     }
 
-    /// Behind the coupling: the device's measured position in, the force on device and object out.
+    /// Returns the force on device and object for the device's measured position.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double velocity = (device - device_) / period_;
         const LoadLine line{coupled_slope_, coupling_.force(device, velocity) - inertial_ * before_ +
@@ -89,7 +91,7 @@ class Implicit {
         return moved_to(solution, force, 0);
     }
 
-    /// Without the coupling: a given force drives the environment (paper figure 12).
+    /// Moves the object by a given force, without the coupling (paper figure 12).
     [[nodiscard]] Rendered drive(double force) noexcept { return drive_from(position_, force, 0); }
 
   private:
@@ -117,12 +119,12 @@ class Implicit {
     E environment_;
     VirtualCoupling coupling_;
     double period_;
-    double force_limit_;     ///< F_max
+    double force_limit_;     ///< F_max [N or N*m]
     double inertial_;        ///< m/T^2
     double coupled_slope_;   ///< p behind the coupling
     double alone_slope_;     ///< p without it
-    double coupled_factor_;  ///< the factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
-    double alone_factor_;    ///< and without the coupling: 2m/T^2 + B_o/T
+    double coupled_factor_;  ///< factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
+    double alone_factor_;    ///< the same without the coupling: 2m/T^2 + B_o/T
     Solver coupled_;
     Solver alone_;
     typename E::State state_;
@@ -132,6 +134,7 @@ class Implicit {
     double before_ = 0.0;    ///< y_{k-2}
 };
 
+/// Builds `Implicit`.
 struct ImplicitStructure {
     static constexpr StructureTraits traits{
         .name = "implicit", .coupling = true, .mass = true, .solved = true};

@@ -13,12 +13,11 @@
 
 namespace palpate {
 
-/// The environment without mass or damping behind the coupling. Coupling force and f are equal, which is the
-/// load line with
+/// Object without mass and damping behind the coupling. The force of the coupling equals f. The load line has
 ///
 ///     p = K_c + B_c / T,   q = K_c x_k + (B_c / T)(x_k - x_{k-1} + y_{k-1});   then F = f(y).
 ///
-/// A force limit belongs to the environment: `LimitedEnvironment`.
+/// `LimitedEnvironment` adds a force limit.
 template <Environment E, class Solver = LoadLineSolver>
 class Massless {
   public:
@@ -30,13 +29,14 @@ class Massless {
         reset(0.0);
     }
 
-    /// p of every step.
+    /// Returns p of every step.
     [[nodiscard]] static double load_line_slope(VirtualCoupling coupling, double period) noexcept {
         return coupling.load_line_slope(period);
     }
 
     [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
 
+    /// Sets the object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -44,6 +44,7 @@ class Massless {
         memory_ = typename Solver::Memory{position};
     }
 
+    /// Returns the force for the device's measured position.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double damping = coupling_.damping / period_;
         const LoadLine line{
@@ -61,7 +62,7 @@ class Massless {
     }
 
   private:
-    /// True if the environment has a force limit, and it acts at an exact solution.
+    /// Returns true if the environment has a force limit that is active at an exact solution.
     [[nodiscard]] bool limited(const Solution& solution) const noexcept {
         if constexpr (requires { environment_.force_limit(); }) {
             return solution.status == Status::Ok &&
@@ -81,6 +82,7 @@ class Massless {
     double position_ = 0.0;  ///< y_{k-1}
 };
 
+/// Builds `Massless`.
 struct MasslessStructure {
     static constexpr StructureTraits traits{.name = "massless", .coupling = true, .solved = true};
 

@@ -11,21 +11,23 @@
 #include "palpate/fields/field_table.hpp"
 #include "palpate/rendering/structure.hpp"
 
-// Forces on the device while a real object, or the device itself, is measured.
+// Forces on the device during the measurement of a real object or of the device.
 namespace palpate {
 
-/// No virtual object at all: the handle is free, and what moves it is watched.
+/// Renders zero force: the handle moves freely while its motion is recorded.
 class FreeMotion {
   public:
+    /// Does not change any state.
     void reset(double /*position*/) noexcept {}
 
+    /// Returns zero force.
     [[nodiscard]] Rendered step(double position) noexcept {
         return std::isfinite(position) ? Rendered{0.0, position, 0, Status::Ok, false}
                                        : detail::refused(position);
     }
 };
 
-/// How a device feels its way over a real object by itself.
+/// Settings of an automatic sweep over a real object.
 struct ProbeSettings {
     double lower = 0.0;
     double upper = 0.5;
@@ -47,7 +49,7 @@ inline constexpr auto fields_of<ProbeSettings> = std::tuple{
     Field<&ProbeSettings::force_limit>{
         "force_limit", "Where an object holds this much, the sweep turns round [N or N*m].", Rule::Positive}};
 
-/// Throws std::invalid_argument: the field, its value, what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const ProbeSettings& settings) {
     check_fields(settings, "probe: ");
     if (!(settings.upper > settings.lower)) {
@@ -55,23 +57,25 @@ inline void validate(const ProbeSettings& settings) {
     }
 }
 
-/// A slow sweep to and fro that a spring draws the handle along, so that the force of a real object shows at every
-/// position, where it falls steeply too (the "Haptic Camera" of MacLean, 1996):
+/// Sweeps slowly back and forth: a spring pulls the handle along, so that the force of a real object is measured at
+/// every position, also where it falls steeply (the "Haptic Camera" of MacLean, 1996):
 ///
 ///     F = K (x - s(t)) + B (v - ds/dt),  |F| <= force_limit,  s a triangle between lower and upper.
 ///
-/// Where the object holds the limit the sweep turns round at once: it ends at what the object allows.
+/// If the object holds the limit, the sweep reverses at once, so the object can limit the range.
 class Probe {
   public:
     Probe(const ProbeSettings& settings, double period_s) : settings_{settings}, period_{period_s} {
         validate(settings_);
     }
 
+    /// Starts the sweep at a position.
     void reset(double position) noexcept {
         sweep_ = last_ = position;
         direction_ = 1.0;
     }
 
+    /// Returns the force of the spring for the measured position.
     [[nodiscard]] Rendered step(double position) noexcept {
         if (!std::isfinite(position)) {
             return detail::refused(sweep_);
@@ -85,7 +89,8 @@ class Probe {
         const double velocity = (position - last_) / period_ - direction_ * settings_.speed;
         last_ = position;
         const double spring = settings_.stiffness * (position - sweep_);
-        if (std::abs(spring) > settings_.force_limit) {  // the object holds: back, from as far as it let us
+        if (std::abs(spring) > settings_.force_limit) {  // The object holds the handle, so the sweep reverses
+                                                         // here.
             const double held = std::copysign(settings_.force_limit, spring);
             sweep_ = position - held / settings_.stiffness;
             direction_ = std::copysign(1.0, spring);
@@ -103,16 +108,18 @@ class Probe {
     double direction_ = 1.0;
 };
 
-/// Short small pushes to either side. They show the sign of a device's force, its delay and its mechanics. Two sizes
-/// of push separate friction from damping: both take a share of the force, but only damping grows with the speed.
+/// Settings of short small pushes to either side. The pushes show the sign of a device's force, its delay and its
+/// mechanics. Two sizes of push separate friction from damping: both reduce the motion, but only damping grows with
+/// speed.
 struct PulseSettings {
-    double force = 0.02;    ///< of a push, the sign alternates [N or N*m]
-    double smaller = 0.6;   ///< size of every second three pushes, over `force` [-]
-    double push_s = 0.03;   ///< how long it lasts [s]
-    double rest_s = 0.17;   ///< how long nothing follows [s]
-    double farthest = 0.2;  ///< a handle that got this far from its start is pushed no more [m or rad]
+    double force = 0.02;    ///< force of a push [N or N*m]; the sign alternates
+    double smaller = 0.6;   ///< size of every second three pushes / `force`
+    double push_s = 0.03;   ///< duration [s]
+    double rest_s = 0.17;   ///< pause after a push [s]
+    double farthest = 0.2;  ///< distance from the start that ends the pushes [m or rad]
 };
 
+/// Pushes the handle to either side, alternately.
 class Pulses {
   public:
     Pulses(const PulseSettings& settings, double period_s) : settings_{settings} {
@@ -123,11 +130,13 @@ class Pulses {
         rest_ = static_cast<std::uint64_t>(std::llround(settings.rest_s / period_s));
     }
 
+    /// Starts the pushes at a position.
     void reset(double position) noexcept {
         start_ = position;
         tick_ = 0;
     }
 
+    /// Returns the force of the current push, or zero.
     [[nodiscard]] Rendered step(double position) noexcept {
         if (!std::isfinite(position)) {
             return detail::refused(start_);

@@ -11,22 +11,23 @@
 
 namespace palpate {
 
-/// Size of a model relative to a model that suits the default knob. Default numbers are multiplied by it; times stay as
-/// they are.
+/// Size of a model relative to a model that suits the default knob. It multiplies default numbers; times do not change.
 struct ModelScale {
     double length = 1.0;  ///< positions, relative to those of the knob
     double force = 1.0;   ///< forces, relative to those of the knob
 
+    /// Returns force divided by length.
     [[nodiscard]] double stiffness() const noexcept { return force / length; }
 };
 
 namespace detail {
 
 inline constexpr double knob_travel = 0.5;     ///< of a model that suits the default knob [rad]
-inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device over the largest force
+inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device, divided by the largest
+                                               ///< force
 
-/// Returns the force while sliding in a direction, +1 for pressing and -1 for releasing. A model of position and
-/// velocity slides at the largest velocity of its data.
+/// Returns the force while sliding in a direction, +1 for press and -1 for release. A model of position and velocity
+/// slides at the largest velocity of its data.
 [[nodiscard]] inline double sliding_force(const ForceModel& model, double position,
                                           double direction) noexcept {
     if (const VelocityNetwork* force = model.velocity()) {
@@ -37,6 +38,7 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
                                          : model.network()->at(position, {}).force;
 }
 
+/// Returns the largest force in either direction [N or N*m].
 [[nodiscard]] inline double largest_force(const ForceModel& model) noexcept {
     const double lower = model.domain().lower[0];
     const double step = (model.domain().upper[0] - lower) / 1000.0;
@@ -51,9 +53,9 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
 
 }  // namespace detail
 
-/// Returns the scale of a model of position, or of position and velocity. `is_angle`: its positions are in rad, so it
-/// suits the knob as it is. For any other unit (millimetres of a keyswitch, micrometres under an AFM tip) travel and
-/// largest force are compared with the knob's.
+/// Returns the scale of a model of position, or of position and velocity. If `is_angle`, its positions are in rad and
+/// it suits the knob unchanged. For any other unit (millimetres of a keyswitch, micrometres under an AFM tip) travel
+/// and largest force are compared with those of the knob.
 [[nodiscard]] inline ModelScale scale_of(const ForceModel& model, bool is_angle) {
     require_renderable(model);
     if (is_angle) {
@@ -81,7 +83,7 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
     return device;
 }
 
-/// Fields of a scheme that the user chose, in the model's own units. The others follow the model.
+/// Fields of a scheme that the user chose, in the units of the model. The others follow the model.
 struct SchemeChoices {
     std::optional<StructureKind> structure;
     std::optional<bool> compensated;
@@ -92,14 +94,14 @@ struct SchemeChoices {
     std::optional<double> play_radius;
     std::optional<int> predict;
 
-    /// True if a field is chosen. A flag that is not set chooses nothing.
+    /// Returns true if a field is chosen. A flag that is false does not count.
     [[nodiscard]] bool any() const noexcept {
         return structure || compensated.value_or(false) || coupling_stiffness || coupling_damping || mass ||
                damping || play_radius || predict;
     }
 };
 
-/// Returns the default play radius of a model that leaves it to the rendering, else 0.
+/// Returns the default play radius of a model without one; otherwise 0.
 [[nodiscard]] inline double default_play_radius(const ForceModel& model, double encoder_step) noexcept {
     if (model.hysteresis() == nullptr || model.play_radius()) {
         return 0.0;
@@ -107,7 +109,7 @@ struct SchemeChoices {
     return usual_play_radius(model.domain().upper[0] - model.domain().lower[0], encoder_step);
 }
 
-/// Returns the scheme with the chosen fields, and the default ones at the model's scale elsewhere.
+/// Returns the scheme with the chosen fields; the others have the defaults at the model's scale.
 [[nodiscard]] inline Scheme scheme_for(const ForceModel& model, const ModelScale& scale,
                                        const DeviceProfile& device, const SchemeChoices& chosen = {}) {
     const Scheme standard;

@@ -22,8 +22,7 @@
 
 namespace palpate {
 
-/// How a model is rendered: the structure and its numbers. Fields that a structure has no use for are
-/// ignored.
+/// The structure that renders a model, and its numbers. A structure ignores fields that it does not use.
 struct Scheme {
     StructureKind structure = StructureKind::Massless;
     VirtualCoupling coupling;
@@ -47,7 +46,7 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
                             "m: samples used to predict the position half a sample ahead, 0 to 16; 0 = none.",
                             Rule::NotNegative}};
 
-/// The same scheme with its standard numbers where the structure has no use for them.
+/// Returns the scheme with standard numbers in the fields that its structure does not use.
 [[nodiscard]] inline Scheme used_part(Scheme scheme) noexcept {
     if (!has_coupling(scheme.structure)) {
         scheme.coupling = {0.0, 0.0};
@@ -58,18 +57,18 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     return scheme;
 }
 
-/// Steepest slope of a model from which a coupling can be taken out [share of its stiffness].
+/// Steepest slope of a model that can be compensated [share of the coupling's stiffness].
 inline constexpr double compensated_share = 0.9;
 
-/// Throws std::invalid_argument: the field, its value, what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
     const std::string structure{name_of(scheme.structure)};
     const StructureTraits& traits = traits_of(scheme.structure);
     require_renderable(model);
-    detail::require(model.velocity() == nullptr || !traits.coupling,
-                    "structure is " + structure +
-                        ", must be direct: of a force of position and velocity behind a coupling no bound is "
-                        "known");
+    detail::require(
+        model.velocity() == nullptr || traits.velocity,
+        "structure is " + structure +
+            ", must be direct: of a force of position and velocity no bound is known in another structure");
     if (traits.coupling) {
         check_fields(scheme.coupling, "coupling_");
     }
@@ -101,8 +100,8 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     }
 }
 
-/// Largest slope that the structure meets, never below 0. While a hysteresis model sticks, h / r is part of it;
-/// a compensated model has had the coupling's spring taken out.
+/// Returns the largest slope in the structure, at least 0. While a hysteresis model sticks, h / r is part of it. A
+/// compensated model has a steeper slope, because the compliance of the coupling's spring is subtracted.
 [[nodiscard]] inline double steepest_slope(const Scheme& scheme, const ForceModel& model) {
     const std::optional<double> radius =
         scheme.play_radius > 0.0 ? std::optional{scheme.play_radius} : model.play_radius();
@@ -111,7 +110,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     return scheme.compensated ? stiffness * steepest / (stiffness - steepest) : steepest;
 }
 
-/// The same, and refuses what is sure to diverge at this period.
+/// Throws std::invalid_argument also for schemes that diverge at this period.
 inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
     validate(scheme, model);
     with_kind(scheme.structure, [&](auto structure) {
@@ -127,13 +126,14 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
     });
 }
 
-/// Calls `visit` with the structure that the scheme asks for, built over the model's environment. The one place
-/// that prepares a model for the loop: curves become certified polynomials and load lines certified tables, each
-/// where that can be proved, in a few milliseconds.
+/// Calls `visit` with the structure of the scheme, built over the model's environment. Only this function prepares a
+/// model for the loop: it compiles curves to certified polynomials and load lines to certified tables, as far as that
+/// can be proved, in a few milliseconds.
 ///
-/// `force_limit`: of the device [N or N*m], infinite for none. Massless objects and objects with mass have it inside
-/// their solution, so that object and device get the same force. The direct and the explicit structure do not know
-/// it: the guards clip their force, and a linear bound of the explicit structure holds below the limit only.
+/// `force_limit` is that of the device [N or N*m], infinity without a limit. Massless objects and objects with mass
+/// include it in their solution, so that object and device receive the same force. The direct and the explicit
+/// structure ignore it: the guards clip their force, and a linear bound of the explicit structure holds only below the
+/// limit.
 template <class Visitor>
 auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, double force_limit,
                     Visitor visit) {
@@ -162,8 +162,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
     return build(network, [&](double p) { return Resolvent{curve, p}; });
 }
 
-/// How the load line of a rendering is solved: "table" where it is at least in part, else "newton"; nothing
-/// where there is none to solve.
+/// Returns the method that solves the load line of a rendering: "table" if at least a part has one, else "newton";
+/// nothing if the structure does not solve one.
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
     return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),

@@ -11,17 +11,17 @@
 
 namespace palpate {
 
-/// What one tick of a structure yields.
+/// Result of one tick of a structure.
 struct Rendered {
-    double force = 0.0;                 ///< on the device, pushing it out of the object [N or N*m]
-    double environment_position = 0.0;  ///< y, where the virtual object was evaluated
-    int evaluations = 0;                ///< of the environment
+    double force = 0.0;                 ///< force on the device, positive out of the object [N or N*m]
+    double environment_position = 0.0;  ///< y, position of the virtual object [m or rad]
+    int evaluations = 0;                ///< evaluations of the environment
     Status status = Status::Ok;
-    bool extrapolated = false;  ///< y lies outside the model's data
+    bool extrapolated = false;  ///< true if y lies outside the model's data
 };
 
-/// A way to turn the measured position of the device into a force, once a tick. `reset` puts the object at
-/// rest under the device; a `step` whose input or result is not finite yields zero force and changes nothing.
+/// Computes a force from the measured position of the device, once a tick. `reset` sets the object at rest under the
+/// device. A `step` whose input or result is not finite returns zero force and does not change the state.
 template <class S>
 concept Structure = requires(S& structure, double position) {
     { structure.reset(position) } noexcept;
@@ -30,27 +30,28 @@ concept Structure = requires(S& structure, double position) {
 
 /// Properties of a structure that do not depend on the model.
 struct StructureTraits {
-    std::string_view name;
-    bool coupling = false;    ///< the object stands behind a virtual coupling
-    bool mass = false;        ///< the object has mass and damping
-    bool solved = false;      ///< each step solves a load line
-    bool predicts = false;    ///< the force can be taken at a predicted position
-    bool keeps_loss = false;  ///< the step need not lose what the play of a hysteresis loses
+    std::string_view name;    ///< in options, records and files
+    bool coupling = false;    ///< a virtual coupling to the device
+    bool mass = false;        ///< an object with mass and damping
+    bool solved = false;      ///< a load line to solve in each step
+    bool velocity = false;    ///< a force of position and velocity
+    bool predicts = false;    ///< a force at a predicted position
+    bool keeps_loss = false;  ///< a loss that may be below the play's loss
 };
 
-/// Everything but the environment that a structure is built from.
+/// Numbers from which a structure is built, without the environment.
 struct StructureNumbers {
     VirtualCoupling coupling;
     Inertia inertia;
-    int predict = 0;
-    double period_s = 1e-3;
-    double force_limit = 0.0;   ///< infinite for none
+    int predict = 0;            ///< taps of the prediction
+    double period_s = 1e-3;     ///< period T [s]
+    double force_limit = 0.0;   ///< infinity without a limit [N or N*m]
     double finest_width = 0.0;  ///< of the model's wavelets [m or rad]
 };
 
 namespace detail {
 
-/// The answer to an input that is not a number: no force, state untouched.
+/// Returns the result for an input that is not finite: zero force, unchanged state.
 [[nodiscard]] inline Rendered refused(double environment_position) noexcept {
     return {0.0, environment_position, 0, Status::NonFinite, false};
 }

@@ -22,15 +22,18 @@ enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, 
 using Structures = std::tuple<DirectStructure, MasslessStructure, ImplicitStructure, ExplicitStructure,
                               EnergyConsistentStructure>;
 
+/// Properties of all structures, in the order of `Structures`.
 inline constexpr auto structure_traits =
     std::apply([](auto... structure) { return std::array{structure.traits...}; }, Structures{});
 
+/// Names of all structures, in the order of `Structures`.
 inline constexpr auto structure_names =
     std::apply([](auto... structure) { return std::array{structure.traits.name...}; }, Structures{});
 
 template <>
 inline constexpr auto words_of<StructureKind> = structure_names;
 
+/// Returns the properties of a structure.
 [[nodiscard]] constexpr const StructureTraits& traits_of(StructureKind kind) noexcept {
     return structure_traits[static_cast<std::size_t>(kind)];
 }

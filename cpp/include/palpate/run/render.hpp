@@ -263,7 +263,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     validate(loop);
     validate(job.guards);
     validate(job.scheme, job.model, 1.0 / loop.rate_hz);
-    if (!model.plan && !options.scheme.any() && job.scheme.structure != StructureKind::Direct) {
+    if (!model.plan && !options.scheme.any() && has_coupling(job.scheme.structure)) {
         job.notes.emplace_back(
             "no plan in the model: rendered behind the default coupling, which is felt; 'palpate plan' finds "
             "the simplest rendering that is not");

@@ -21,17 +21,17 @@
 
 namespace palpate {
 
-/// One tick in virtual time, and the simulated device before and after it.
+/// One tick in virtual time, with the simulated device before and after it.
 struct SimulatedTick {
     std::size_t number = 0;
     Tick tick;
     Motion start;               ///< the handle when the tick began
     Motion end;                 ///< the handle when it ended
-    double force_before = 0.0;  ///< of the device when the tick began [N or N*m]
-    double force = 0.0;         ///< of the device when it ended [N or N*m]
+    double force_before = 0.0;  ///< of the device at the start of the tick [N or N*m]
+    double force = 0.0;         ///< of the device at its end [N or N*m]
 };
 
-/// Runs a controller on a simulated device in virtual time. `watch(SimulatedTick)` is called after every tick; the loop
+/// Runs a controller on a simulated device in virtual time. Calls `watch(SimulatedTick)` after every tick; the loop
 /// ends when it returns false. Returns the number of ticks.
 template <Device D, Structure S, class Watch>
 std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_t ticks, Watch&& watch) {
@@ -50,23 +50,23 @@ std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_
     return now.number;
 }
 
-/// Start of a closed loop with energy account, its integration and its guards.
+/// Start, integration and guards of a closed loop with energy account.
 struct ClosedLoopSettings {
     int substeps = usual_substeps;  ///< of a tick
     double start_position = 0.0;    ///< [m or rad]
     double start_velocity = 0.0;    ///< of handle and hand [m/s or rad/s]
-    Guards guards{};                ///< default: no limit but the device's
+    Guards guards{};                ///< default: only the limit of the device
 };
 
-/// End of a closed loop with energy account.
+/// Result of a closed loop with energy account.
 struct ClosedLoopEnd {
     EnergyAccount energy;
-    Motion met;             ///< the handle when the object's first force began to act on it
+    Motion met;             ///< the handle when the object's first force acted on it
     Motion handle;          ///< the handle at the end
-    std::size_t ticks = 0;  ///< that were watched
+    std::size_t ticks = 0;  ///< number of ticks
 };
 
-/// Runs a structure on a simulated device with an energy account. `watch(tick, handle, account)` is called after every
+/// Runs a structure on a simulated device with an energy account. Calls `watch(tick, handle, account)` after every
 /// tick; the loop ends when it returns false.
 template <Structure S, SimulatedHand H, class Watch>
 [[nodiscard]] ClosedLoopEnd closed_loop(S structure, const DeviceProfile& profile, H hand, std::size_t ticks,
@@ -89,19 +89,21 @@ template <Structure S, SimulatedHand H, class Watch>
 
 /// A simulated rendering, one row for each tick.
 struct Trace {
-    std::vector<double> time;                  ///< [s]
-    std::vector<double> position;              ///< measured by the encoder
-    std::vector<double> velocity;              ///< differenced by the device
-    std::vector<double> handle_start;          ///< true position when the encoder was read
-    std::vector<double> handle_middle;         ///< true position in the middle of the tick
-    std::vector<double> handle_end;            ///< true position at the end of the tick that holds the force
-    std::vector<double> environment_position;  ///< y
-    std::vector<double> force;                 ///< commanded
-    std::vector<double> applied;               ///< force of the device at the end of the tick
-    std::vector<double> mean_applied;          ///< mean force over the tick, which a fractional delay divides
-    std::vector<int> evaluations;
+    std::vector<double> time;      ///< time [s]
+    std::vector<double> position;  ///< measured by the encoder [m or rad]
+    std::vector<double> velocity;  ///< difference quotient, computed by the device [m/s or rad/s]
+
+    std::vector<double> handle_start;   ///< true position when the encoder was read [m or rad]
+    std::vector<double> handle_middle;  ///< true position in the middle of the tick [m or rad]
+    std::vector<double> handle_end;  ///< true position at the end of the tick that holds the force [m or rad]
+
+    std::vector<double> environment_position;  ///< y [m or rad]
+    std::vector<double> force;                 ///< commanded force [N or N*m]
+    std::vector<double> applied;               ///< force of the device at the end [N or N*m]
+    std::vector<double> mean_applied;          ///< mean force over the tick [N or N*m]
+    std::vector<int> evaluations;              ///< evaluations of the model
     std::vector<Status> status;
-    std::vector<std::uint8_t> extrapolated;  ///< 1 where y lay outside the model's data
+    std::vector<std::uint8_t> extrapolated;  ///< 1 if y lies outside the model's data
 };
 
 /// Largest number of ticks of `simulate`: one hour at 1 kHz, about 270 MB.
@@ -120,8 +122,8 @@ inline constexpr std::size_t most_simulated_ticks = 3'600'000;
     return static_cast<std::size_t>(ticks);
 }
 
-/// Renders a model on a simulated device with a hand on it, in virtual time. `each(tick)` is called at every tick; an
-/// exception from it ends the work.
+/// Renders a model on a simulated device with a hand, in virtual time. Calls `each(tick)` at every tick; an exception
+/// from it ends the simulation.
 template <class Each>
 [[nodiscard]] Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
                              const Hand& hand, std::size_t ticks, int substeps, double start_position,
@@ -157,14 +159,15 @@ template <class Each>
     return trace;
 }
 
+/// Renders a model without a callback.
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
                                     int substeps = usual_substeps, double start_position = 0.0) {
     return simulate(model, scheme, profile, hand, ticks, substeps, start_position, [](std::size_t) {});
 }
 
-/// Returns the force rendered along a recorded motion of the device. `each(k)` is called before every sample; an
-/// exception from it ends the work.
+/// Returns the force rendered along a recorded motion of the device. Calls `each(k)` before every sample; an exception
+/// from it ends the simulation.
 template <class Each>
 [[nodiscard]] std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
                                                   std::span<const double> position, double period_s,
@@ -190,7 +193,8 @@ template <class Each>
     return motion_driven(model, scheme, position, period_s, [](std::size_t) {});
 }
 
-/// Returns the motion of the environment driven by a recorded force (paper figures 12 and 14). `each` as above.
+/// Returns the motion of the environment driven by a recorded force (paper figures 12 and 14). Calls `each(k)` before
+/// every sample.
 template <class Each>
 [[nodiscard]] std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
                                                  std::span<const double> force, double period_s,
@@ -209,8 +213,7 @@ template <class Each>
                 return rendered;
             } else {
                 throw std::invalid_argument(
-                    "structure is " +
-                    std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
+                    "structure is " + std::string(name_of(scheme.structure)) +
                     ", must be implicit or explicit: only an inertia turns force into motion");
             }
         });

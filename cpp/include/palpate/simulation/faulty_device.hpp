@@ -17,37 +17,36 @@
 
 namespace palpate {
 
-/// What can go wrong between a host and a device.
+/// Faults between a host and a device.
 enum class FaultKind : std::uint8_t {
-    Late,        ///< no answer in time: Timeout; the sample itself is skipped
-    Lost,        ///< one more sample was taken that nobody saw
-    Repeated,    ///< the last sample comes again
+    Late,        ///< no sample in time
+    Lost,        ///< one sample is missing
+    Repeated,    ///< the last sample again
     NotANumber,  ///< the position is NaN
-    Frozen,      ///< the encoder repeats its value, everything else goes on
+    Frozen,      ///< the encoder repeats its value
     Jump,        ///< the encoder is off by `jump`
-    Saturated,   ///< the motor makes half of the force, and says Limited
-    Gone,        ///< Fault, for good, and no force
+    Saturated,   ///< half of the force, reported as Limited
+    Gone,        ///< Fault until the end, without force
 };
 
 inline constexpr std::array<std::string_view, 8> fault_names{"late",   "lost", "repeated",  "nan",
                                                              "frozen", "jump", "saturated", "gone"};
 
-/// One fault: from which exchange on, and for how many.
+/// One fault: its first exchange and its number of samples.
 struct Fault {
     FaultKind kind = FaultKind::Late;
     std::uint64_t exchange = 0;
     std::uint64_t samples = 1;
 };
 
-/// A device with scripted faults, for tests and for seeing what a program does with them. The faults speak as a
-/// real device does: by status, by sequence number, or by nothing but wrong numbers. It does not model the time
-/// that a late answer takes.
+/// A device with scripted faults, for tests of programs. The faults are visible as on a real device: in the status, in
+/// the sequence number, or only in wrong numbers. The time of a late sample is not simulated.
 template <Device D>
 class Faulty {
   public:
     static constexpr bool paces_host = palpate::paces_host<D>;
 
-    /// `jump`: by how much a jumping encoder is off [m or rad].
+    /// Makes the device; `jump` is the error of a jumping encoder [m or rad].
     Faulty(D device, std::vector<Fault> script, double jump)
         : device_{std::move(device)}, script_{std::move(script)}, jump_{jump} {
         std::stable_sort(script_.begin(), script_.end(),
@@ -61,6 +60,7 @@ class Faulty {
         return device_.open();
     }
 
+    /// Exchanges a command for a reading, with the fault of this exchange.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         const Fault* fault = fault_of(exchanges_++);
         gone_ = gone_ || (fault != nullptr && fault->kind == FaultKind::Gone);
@@ -132,8 +132,8 @@ class Faulty {
     Reading last_;
 };
 
-/// Reads "KIND@SECONDS" or "KIND@SECONDSxSAMPLES", such as late@1.5 or frozen@2x200.
-/// Throws std::invalid_argument with what would be right.
+/// Reads "KIND@SECONDS" or "KIND@SECONDSxSAMPLES", such as late@1.5 or frozen@2x200. Throws std::invalid_argument with
+/// the valid form.
 [[nodiscard]] inline Fault parse_fault(const std::string& text, double period_s) {
     const auto refuse = [&] {
         std::string names;

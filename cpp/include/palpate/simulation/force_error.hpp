@@ -14,17 +14,16 @@
 
 namespace palpate {
 
-/// Error of a rendered force against a force law f along the true motion x(t) of the handle, over all ticks. The
-/// force F that the device holds is compared with f at different times of the tick [t_k, t_k + T]:
+/// Error of a rendered force against a force law f along the true motion x(t) of the handle, over all ticks. The force
+/// F that the device holds is compared with f at different times of the tick [t_k, t_k + T]:
+/// - end: F(t_k + T) - f(x(t_k + T)), RMS
+/// - instant: F(t_k + T) - f(x(t_k)), RMS
+/// - mean: e_k = (1/T) integral of F(t) - f(x(t)) dt, RMS
+/// - band: e_k filtered with zero phase to below 50 Hz, RMS
+/// - work: integral of (F - f) dx over all ticks; below 0 the rendering gives energy
 ///
-///     end       F(t_k + T) - f(x(t_k + T)),                        RMS
-///     instant   F(t_k + T) - f(x(t_k)),                            RMS
-///     mean      e_k = (1/T) integral of F(t) - f(x(t)) dt,         RMS
-///     band      e_k filtered with zero phase to below 50 Hz,       RMS
-///     work      integral of (F - f) dx over all ticks; below 0 the rendering gives energy
-///
-/// The error at the end rewards a force that is ahead of the motion. The mean does not: it is what a hand feels that
-/// is slow against the sample rate.
+/// The error at the end is smaller for a force that leads the motion. The mean is not, so it describes the error that a
+/// hand feels, which is slow compared with the sample rate.
 struct ForceError {
     double end = 0.0;      ///< [N or N*m]
     double instant = 0.0;  ///< [N or N*m]
@@ -36,8 +35,8 @@ struct ForceError {
 /// Largest frequency of the band-limited force error [Hz].
 inline constexpr double force_error_band_hz = 50.0;
 
-/// A signal without what lies above a frequency, phase kept: convolved with sin(2 pi f t) / (pi t) under a Hann
-/// window of +-4 / f. The signal is mirrored at its ends. At f the amplitude is halved.
+/// Removes the part of a signal above a frequency, without a phase shift. Convolves it with sin(2 pi f t) / (pi t)
+/// under a Hann window of +-4 / f. The signal is mirrored at its ends. The amplitude at f is halved.
 [[nodiscard]] inline std::vector<double> below_frequency(std::span<const double> signal, double period_s,
                                                          double frequency_hz) {
     const double cycles = frequency_hz * period_s;
@@ -71,22 +70,22 @@ inline constexpr double force_error_band_hz = 50.0;
     return filtered;
 }
 
-/// The handle's true motion and the force on it, a value for each tick: spans of a `Trace`, or of columns that were
-/// made of one.
+/// True motion of the handle and the force on it, a value for each tick: spans of a `Trace`, or of its columns.
 struct HeldForces {
     std::span<const double> start;         ///< handle at the start of the tick
-    std::span<const double> middle;        ///< in its middle
-    std::span<const double> end;           ///< at its end
+    std::span<const double> middle;        ///< handle in the middle of the tick
+    std::span<const double> end;           ///< handle at the end of the tick
     std::span<const double> applied;       ///< force at the end of the tick
     std::span<const double> mean_applied;  ///< mean force over the tick
 };
 
+/// Returns the columns of a trace.
 [[nodiscard]] inline HeldForces held_forces(const Trace& trace) noexcept {
     return {trace.handle_start, trace.handle_middle, trace.handle_end, trace.applied, trace.mean_applied};
 }
 
-/// The errors of forces against `law(motion, step_s)`: the force law along a motion with this time from each position
-/// to the next. Within a tick f is taken at four evenly spaced times, on the parabola through start, middle and end.
+/// Returns the errors of forces against `law(motion, step_s)`, the force law along a motion with a constant time step.
+/// Within a tick f is evaluated at four evenly spaced times, on the parabola through start, middle and end.
 template <class Law>
 [[nodiscard]] ForceError force_error(const HeldForces& held, double period_s, Law&& law) {
     const std::size_t ticks = held.start.size();
@@ -100,8 +99,8 @@ template <class Law>
         return {};
     }
     constexpr std::size_t parts = 4;
-    std::vector<double> motion;  // the middles of the parts
-    std::vector<double> moved;   // in each part
+    std::vector<double> motion;  // middles of the parts
+    std::vector<double> moved;   // motion in each part
     std::vector<double> ends{held.start[0]};
     for (std::size_t k = 0; k < ticks; ++k) {
         const double slope = held.end[k] - held.start[k];
@@ -142,7 +141,7 @@ template <class Law>
     return error;
 }
 
-/// The errors of a trace against a model rendered exactly, its play of `play_radius` included.
+/// Returns the errors of a trace against a model that is rendered exactly, with play radius `play_radius`.
 [[nodiscard]] inline ForceError force_error(const ForceModel& model, double play_radius,
                                             const HeldForces& held, double period_s) {
     Scheme exact;

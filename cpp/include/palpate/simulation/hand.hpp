@@ -13,8 +13,8 @@ struct Motion {
     double velocity = 0.0;  ///< [m/s or rad/s]
 };
 
-/// Force of a hand on a handle during one tick: a push, a spring to a target, a damper to ground, and the mass that moves
-/// with the handle,
+/// Force of a hand on a handle during one tick: a push, a spring to a target, a damper to ground, and the mass that
+/// moves with the handle,
 ///
 ///     F = push + stiffness (target - x) - damping v - mass v'.
 struct Grip {
@@ -24,19 +24,19 @@ struct Grip {
     double push = 0.0;       ///< [N or N*m]
     double mass = 0.0;       ///< [kg or kg*m^2]
 
-    /// Returns the force without the mass, which belongs to the handle's equation of motion.
+    /// Returns the force without that of the mass, which is in the handle's equation of motion.
     [[nodiscard]] double force(const Motion& handle) const noexcept {
         return push + stiffness * (target - handle.position) - damping * handle.velocity;
     }
 };
 
-/// A simulated hand: `grip` is called once a tick.
+/// A simulated hand; the simulation calls `grip` once a tick.
 template <class H>
 concept SimulatedHand = requires(H& hand, double time, const Motion& handle) {
     { hand.grip(time, handle) } noexcept -> std::same_as<Grip>;
 };
 
-/// A hand that sweeps: a spring to a target that moves between two positions, and a damper to ground,
+/// A sweeping hand: a spring to a target that moves between two positions, and a damper to ground,
 ///
 ///     target(t) = lower + (upper - lower)(1 - cos 2 pi f t)/2.
 struct Hand {
@@ -44,13 +44,15 @@ struct Hand {
     double damping = 0.05;      ///< [N*s/m or N*m*s/rad]
     double lower = 0.02;        ///< least target [m or rad]
     double upper = 0.47;        ///< largest target [m or rad]
-    double frequency_hz = 0.5;  ///< sweeps a second [Hz]
+    double frequency_hz = 0.5;  ///< frequency f of the sweep [Hz]
 
+    /// Returns the target at a time [m or rad].
     [[nodiscard]] double target(double time) const noexcept {
         const double phase = 2.0 * std::numbers::pi * frequency_hz * time;
         return lower + 0.5 * (upper - lower) * (1.0 - std::cos(phase));
     }
 
+    /// Returns the force of the hand at a time.
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         return {stiffness, damping, target(time), 0.0, 0.0};
     }

@@ -21,7 +21,7 @@
 
 namespace palpate {
 
-/// Opens the simulated device for rendering: that of the certificate if one holds, else the default knob at the model's
+/// Opens the simulated device for rendering: that of a valid certificate, otherwise the default knob at the model's
 /// scale.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
                                                                 const PlannedModel& model) {
@@ -84,8 +84,8 @@ namespace palpate {
                                 : open_simulated(options, model);
 }
 
-/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or simulated with the model `object`
-/// mounted. Options that follow the device are set.
+/// Returns a closed device for a measurement by its name: usb[:SERIAL], or simulated with the model `object` mounted.
+/// Sets the options that depend on the device.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
                                                                    const std::optional<ForceModel>& object) {
     if (options.device == "usb" || options.device.starts_with("usb:")) {

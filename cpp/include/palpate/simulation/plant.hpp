@@ -10,24 +10,27 @@
 
 namespace palpate {
 
-/// What a handle is by itself.
+/// Mechanical properties of a handle.
 struct Mechanics {
     double inertia = 0.0;   ///< [kg or kg*m^2], > 0
     double damping = 0.0;   ///< b [N*s/m or N*m*s/rad]
     double friction = 0.0;  ///< f_c [N or N*m]
 };
 
-/// What every way to move a handle shares where it has nothing to forget and no force transducer.
+/// Base of integrators without memory and without a force transducer.
 struct PlainPlant {
+    /// Does nothing, because there is not any state.
     void start() noexcept {}
+    /// Returns NaN, because there is not a transducer.
     [[nodiscard]] static double measured(const Motion& /*handle*/) noexcept {
         return std::numeric_limits<double>::quiet_NaN();
     }
 };
 
-/// Semi-implicit Euler, the usual integrator of a simulated device. Coulomb friction takes away at most the
-/// velocity there is: it can stop the handle but never turn it round.
+/// Semi-implicit Euler, the usual integrator of a simulated device. Coulomb friction reduces the velocity at most to
+/// zero: it can stop the handle but never reverses it.
 struct SemiImplicitEuler : PlainPlant {
+    /// Moves the handle over one tick.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) const noexcept {
         const double inertia = handle.inertia + grip.mass;
@@ -43,12 +46,13 @@ struct SemiImplicitEuler : PlainPlant {
 
 /// Semi-implicit Euler with a real object mounted on the handle.
 struct MountedObject {
-    /// Over position, positive out of the object; none: nothing is mounted. It must neither throw nor allocate.
+    /// Force over position, positive out of the object; empty without an object. It must neither throw nor allocate.
     std::function<double(double)> force;
-    bool transducer = true;  ///< whether the device measures that force
+    bool transducer = true;  ///< true if the device measures that force
 
     void start() noexcept {}
 
+    /// Moves the handle over one tick.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) const noexcept {
         for (int k = 0; k < substeps; ++k) {
@@ -57,33 +61,36 @@ struct MountedObject {
         }
     }
 
+    /// Returns the force of the transducer; NaN without one.
     [[nodiscard]] double measured(const Motion& handle) const noexcept {
         return force && transducer ? force(handle.position) : PlainPlant::measured(handle);
     }
 };
 
-/// Where energy went since the device was opened. The port is between hand and handle, so the handle's damping
-/// and friction are inside: hand = motor + loss + what the handle's inertia holds more than at the start.
+/// Energy flows since the device was opened. The port is between hand and handle, so the handle's damping and friction
+/// are inside: hand = motor + loss + increase of the handle's kinetic energy.
 struct EnergyAccount {
-    double hand = 0.0;        ///< work of the hand on the handle [J]
-    double motor = 0.0;       ///< work of the handle against the motor, into the virtual object [J]
-    double loss = 0.0;        ///< to damping and friction [J], >= 0
-    double throughput = 0.0;  ///< of hand and motor, to and fro: what rounding is measured against [J]
+    double hand = 0.0;        ///< work on the handle [J]
+    double motor = 0.0;       ///< work against the motor [J]
+    double loss = 0.0;        ///< by damping and friction [J]
+    double throughput = 0.0;  ///< absolute work of hand and motor, the scale of rounding errors [J]
     double least = 0.0;       ///< least of hand + 1e-12 throughput after any substep [J]
 };
 
-/// The midpoint rule, which books every joule: with u the mean velocity of a substep of length h,
+/// The midpoint rule, whose energy account is exact. With u the mean velocity of a substep of length h,
 ///
 ///     M (v_1 - v_0) / h = push + K (target - x_0 - h u / 2) - D u - f_c sgn u - applied,
 ///     v_1 = 2u - v_0,   x_1 = x_0 + h u,
 ///
-/// force times way is exactly the work, whatever h. Where friction holds a handle that would turn round, it
-/// takes what speed is left.
+/// force times distance is exactly the work, for every h. If friction holds a handle that would reverse, it dissipates
+/// the remaining speed.
 class Midpoint : public PlainPlant {
   public:
     // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): known by its type, never through the base
+    /// Resets the energy account.
     void start() noexcept { account_ = {}; }
 
+    /// Moves the handle over one tick and updates the energy account.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) noexcept {
         const double momentum = 2.0 * (handle.inertia + grip.mass) / step;
@@ -96,7 +103,8 @@ class Midpoint : public PlainPlant {
             const double pull = grip.push + grip.stiffness * (grip.target - motion.position);
             const double driving = momentum * before + pull - applied;
             const double friction = std::copysign(handle.friction, driving);
-            // Changes are computed, not new values: a heavy hand's momentum is far above every force.
+            // Changes are computed instead of new values, because the momentum of a heavy hand is much larger than
+            // every force.
             const double change = std::abs(driving) > handle.friction
                                       ? mobility * (pull - applied - drag * before - friction)
                                       : -before;
@@ -116,10 +124,11 @@ class Midpoint : public PlainPlant {
         }
     }
 
+    /// Returns the energy account since the start.
     [[nodiscard]] const EnergyAccount& account() const noexcept { return account_; }
 
   private:
-    static constexpr double rounding = 1e-12;  ///< of the throughput
+    static constexpr double rounding = 1e-12;  ///< relative to the throughput
 
     void stop(const Mechanics& handle, const Grip& grip, double applied, Motion& motion) noexcept {
         const double pull = grip.push + grip.stiffness * (grip.target - motion.position);

@@ -17,16 +17,15 @@
 
 namespace palpate {
 
-inline constexpr int usual_substeps = 20;   ///< of one tick of 1 ms of a simulated device
-inline constexpr int most_substeps = 1000;  ///< of one tick of a simulated device
+inline constexpr int usual_substeps = 20;   ///< in one tick of 1 ms of a simulated device
+inline constexpr int most_substeps = 1000;  ///< in one tick of a simulated device
 
-/// A haptic device with a hand on it, one tick of virtual time an exchange: inertia, viscous and Coulomb
-/// friction, encoder, force step and limit, hold over the tick, delay. `Plant` moves the
-/// handle: SemiImplicitEuler, Midpoint where energy is accounted for, or MountedObject where the device is there
-/// to measure a real thing.
+/// A haptic device with a hand, one tick of virtual time for each exchange. It models inertia, viscous and Coulomb
+/// friction, encoder, force step and limit, hold over the tick, and delay. `Plant` moves the handle: SemiImplicitEuler,
+/// Midpoint for an energy account, or MountedObject for the measurement of a real object.
 ///
-/// It does not model: motor electrical dynamics, torque ripple, backlash, flexible parts, jitter of the
-/// sample time, the noise of a force transducer.
+/// It does not model electrical dynamics of the motor, torque ripple, backlash, flexible parts, jitter of the sample
+/// time, and noise of a force transducer.
 template <SimulatedHand H, class Plant>
 class SimulatedHandle {
   public:
@@ -40,10 +39,10 @@ class SimulatedHandle {
         }
     }
 
-    /// Puts in what moves the handle, if it has anything to be told.
+    /// Replaces the plant, for example to mount an object.
     void mount(Plant plant) { plant_ = std::move(plant); }
 
-    /// Puts the handle at its start, at rest unless it was given a velocity.
+    /// Sets the handle to its start position and velocity.
     Opened open() {
         handle_ = start_;
         plant_.start();
@@ -54,8 +53,8 @@ class SimulatedHandle {
         return {};
     }
 
-    /// Applies the command over one period (later by the delay) and samples the encoder at its end. With a
-    /// fractional delay the force changes within the tick; the reading reports the later one.
+    /// Applies the command over one period (later by the delay) and samples the encoder at its end. With a fractional
+    /// delay the force changes within the tick; the reading reports the later one.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         pend(converted(command.force));
         const double late = profile_.delay_fraction();
@@ -75,7 +74,7 @@ class SimulatedHandle {
     void close() noexcept { applied_ = 0.0; }
 
     [[nodiscard]] const DeviceProfile& profile() const noexcept { return profile_; }
-    /// The handle's true motion, which no real host knows.
+    /// Returns the true motion of the handle, which a real host cannot measure.
     [[nodiscard]] const Motion& handle() const noexcept { return handle_; }
     [[nodiscard]] double handle_position() const noexcept { return handle_.position; }
     [[nodiscard]] double handle_velocity() const noexcept { return handle_.velocity; }
@@ -85,12 +84,14 @@ class SimulatedHandle {
   private:
     [[nodiscard]] double time() const noexcept { return static_cast<double>(tick_) * profile_.period_s; }
 
+    /// Returns the reading of the encoder [m or rad].
     [[nodiscard]] double encoded(double position) const noexcept {
         const double step = profile_.encoder_step;
         return step > 0.0 ? step * std::floor(position / step + 0.5) : position;
     }
 
-    /// What the motor makes of a command: nothing of a number that is none, the limit, the force step.
+    /// Returns the force of the motor for a command: zero if it is not finite, otherwise limited and rounded to the
+    /// force step.
     [[nodiscard]] double converted(double force) const noexcept {
         if (!std::isfinite(force)) {
             return 0.0;
@@ -100,7 +101,7 @@ class SimulatedHandle {
         return step > 0.0 ? step * std::round(limited / step) : limited;
     }
 
-    /// Keeps the command of this tick until its delay is over.
+    /// Stores the command of this tick until its delay is over.
     void pend(double force) noexcept {
         const auto delay = static_cast<std::size_t>(profile_.whole_delay_samples());
         pending_[(tick_ + delay) % pending_.size()] = force;
@@ -125,13 +126,13 @@ class SimulatedHandle {
     double applied_ = 0.0;
     double last_reading_ = 0.0;
     std::uint64_t tick_ = 0;
-    std::array<double, longest_delay_samples + 2> pending_{};  ///< forces on their way, by tick
+    std::array<double, longest_delay_samples + 2> pending_{};  ///< pending forces, by tick
 };
 
-/// The device of demonstrations, tests and examples, with a hand that sweeps.
+/// Simulated device with a sweeping hand, for demonstrations, tests and examples.
 using SimulatedDevice = SimulatedHandle<Hand, SemiImplicitEuler>;
 
-/// The same with a real object on it: what a recording is made of.
+/// Simulated device with a real object, from which recordings are made.
 using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
 
 static_assert(Device<SimulatedDevice>);

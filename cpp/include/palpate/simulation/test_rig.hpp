@@ -18,14 +18,14 @@
 
 namespace palpate {
 
-/// Simulated device and hand scaled to a model. An angle is rendered on the default knob; for any other unit lengths
-/// and forces of the knob and its hand are multiplied by the model's scale.
+/// Simulated device and hand scaled to a model. An angle is rendered on the default knob. For any other unit the
+/// model's scale multiplies lengths and forces of the knob and its hand.
 struct TestRig {
     DeviceProfile device;
     Hand hand;
     ModelScale scale;
 
-    /// Returns the scheme with the chosen fields, and the default ones at the model's scale elsewhere.
+    /// Returns the scheme with the chosen fields; the others have the defaults at the model's scale.
     [[nodiscard]] Scheme scheme(const ForceModel& model, const SchemeChoices& chosen = {}) const {
         return scheme_for(model, scale, device, chosen);
     }
@@ -33,8 +33,8 @@ struct TestRig {
 
 namespace detail {
 
-/// Returns the target at which the handle comes to rest at the end of a slow motion, or before it where the felt force
-/// exceeds 80 % of the force limit: coupling and damping need the rest.
+/// Returns the target at which the handle rests at the end of a slow motion, or before it if the felt force exceeds 80
+/// % of the force limit. The remaining 20 % are for coupling and damping.
 [[nodiscard]] inline double resting_target(const std::vector<Rendered>& felt,
                                            const std::vector<double>& motion, double force_limit,
                                            double hand_stiffness) {
@@ -46,11 +46,11 @@ namespace detail {
     return motion[last] + felt[last].force / hand_stiffness;
 }
 
-/// Returns a hand that leads the handle through the domain except for 1 % at either end, and never beyond it.
+/// Returns a hand that moves the handle through the domain, except 1 % at either end.
 ///
-/// The hand is a spring to a moving target, which is ahead of the handle by the felt force over the hand's stiffness.
-/// A coupling reduces the felt force, so the target is computed from the force felt behind the default coupling. Stiffer
-/// structures are pressed less far, and none is extrapolated.
+/// The hand is a spring to a moving target, which leads the handle by the felt force divided by the hand's stiffness. A
+/// coupling reduces the felt force, so the target is computed from the force felt behind the default coupling. Stiffer
+/// structures are pressed less far, and the handle never leaves the domain.
 [[nodiscard]] inline Hand sweeping_hand(const ForceModel& model, const TestRig& rig) {
     constexpr int steps = 1000;
     const double lower = model.domain().lower[0];
@@ -81,7 +81,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns the test rig for a model of position, or of position and velocity. `is_angle`: its positions are in rad.
+/// Returns the test rig for a model of position, or of position and velocity. If `is_angle`, its positions are in rad.
 [[nodiscard]] inline TestRig rig_for(const ForceModel& model, bool is_angle, double period_s) {
     TestRig rig;
     rig.scale = scale_of(model, is_angle);
@@ -90,8 +90,8 @@ namespace detail {
     return rig;
 }
 
-/// Returns the force of a model over position, as an object that can be mounted on the simulated device of its rig. It
-/// is at rest at `start`.
+/// Returns the force of a model over position, as an object that can be mounted on the simulated device of its rig. The
+/// object is at rest at `start`.
 [[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, const TestRig& rig,
                                                              double start) {
     SchemeChoices direct;

@@ -20,44 +20,43 @@
 
 namespace palpate {
 
-/// Solves f(y) + p y = q in at most four evaluations, for every start and every q, where p is certified to make
-/// F(y) = f(y) + p y rise. Where it is not, `LoadLineSolver` searches from the last position.
+/// Solves f(y) + p y = q in at most four evaluations, for every start and every q, if p is certified to make F(y) =
+/// f(y) + p y rise. Otherwise `LoadLineSolver` searches from the last position.
 ///
-/// On load the line is cut into cells of width w with
+/// When the model is loaded, all positions are cut into cells of width w with
 ///
-///     w max|F''| <= min F' / 4,                                                                        (C)
+///     w max|F''| <= min F' / 4.                                                                        (C)
 ///
-/// certified by Taylor's formula about the middle of each cell, and F is stored at their borders. Cells over the
-/// whole line prove that F rises. A step finds the cell of q among the border values, interpolates linearly and
-/// takes Newton's steps inside the cell:
-/// - The interpolation misses F by at most w^2 max|F''| / 8, and the position by w/32. A guess within w/32 of it,
-///   such as the tangent of the last step, is at most w/16 beside the solution.
-/// - A step turns an error e into at most c e^2, c = max|F''| / (2 min F') <= 1/(8w). Errors: w/16, w/2^11,
-///   w/2^25, w/2^53. Clamping to the cell, which holds the solution, increases none.
-/// - A correction d shows the error before it: e <= |d| + c e^2 <= |d| + e/8, so that after it at most
-///   (64/49) c d^2 is left. A step that leaves less than `tolerance`, or a residual below rounding, needs no
-///   evaluation to confirm it.
+/// Taylor's formula about the middle of each cell certifies (C), and F is stored at the borders. Cells over all
+/// positions prove that F rises. A step finds the cell of q among the border values, interpolates linearly and applies
+/// Newton's method inside the cell:
+/// - The error of the interpolation is at most w^2 max|F''| / 8 in F and w/32 in the position. A guess within w/32 of
+///   it, such as the tangent of the last step, is at most w/16 away from the solution.
+/// - A step changes an error e to at most c e^2, c = max|F''| / (2 min F') <= 1/(8w). Errors: w/16, w/2^11, w/2^25,
+///   w/2^53. Clamping to the cell does not increase them, because the cell holds the solution.
+/// - A correction d bounds the error before it: e <= |d| + c e^2 <= |d| + e/8. The error after it is at most (64/49) c
+///   d^2. If that is below `tolerance`, or the residual is below rounding, no evaluation is needed to confirm the step.
 ///
-/// Where the tangent stays in the cell of the last step, it is tried before the cell is looked for: one evaluation
-/// then suffices for most steps of a slow motion, and at most three more follow.
+/// If the tangent stays in the cell of the last step, it is tried before the search for the cell. Most steps of a slow
+/// motion then need one evaluation; the others need at most three more.
 ///
-/// A hysteresis has three sheets: F with g + h (pressing), with g - h (releasing) and with g + (y - play) h / r
-/// (sticking). Each rises and obeys (C), the last for all |y - play| <= r + w at once, so that one partition serves
-/// every `play`. F is the median of the three, and the median of their interpolations, or of their Newton steps, is
-/// as near as each of them is to its own sheet. For at the solution two sheets are >= q and two are <= q: two of the
-/// steps end below it but for c e^2, and two above it.
+/// A hysteresis has three sheets: F with g + h (press), with g - h (release) and with g + (y - play) h / r (sticking).
+/// Each rises and satisfies (C), the last one for all |y - play| <= r + w, so one partition serves every `play`. F is
+/// the median of the three. The median of their interpolations, or of their Newton steps, is as accurate as each of
+/// them on its sheet. At the solution two sheets are >= q and two are <= q. Two of the steps therefore end below it
+/// (except for c e^2), and two above it.
 class CertifiedSolver {
   public:
-    /// What the last step leaves to the next: its solution as a function of q, and how far F is smooth around it.
+    /// State between two steps: the last solution as a function of q, and the range around it in which F is smooth.
     struct Memory {
-        double position = 0.0;    ///< the last solution
-        double at_zero = 0.0;     ///< what its tangent predicts for q = 0
-        double compliance = 0.0;  ///< its 1 / F'
+        double position = 0.0;    ///< last solution [m]
+        double at_zero = 0.0;     ///< prediction of the last tangent for q = 0 [m]
+        double compliance = 0.0;  ///< 1 / F' of the last solution
         double low =
-            std::numeric_limits<double>::infinity();  ///< the ends of its cell; none: nothing predicted
+            std::numeric_limits<double>::infinity();  ///< ends of its cell; empty range: no prediction
         double high = -std::numeric_limits<double>::infinity();
         double curvature = 0.0;  ///< c of its cell
-        double play = 0.0;       ///< the play that this holds for
+        double play = 0.0;       ///< position of the play operator for which this holds [m]
 
         Memory() = default;
         explicit Memory(double at) noexcept : position{at} {}
@@ -68,12 +67,13 @@ class CertifiedSolver {
         : CertifiedSolver{piecewise(pair, 0.0), piecewise_loss(pair), pair.play_radius(), p} {}
 
     [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
-    /// Whether every load line of this slope is certified to have one solution.
+    /// Returns true if every load line of this slope is certified to have one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p >= least_slope_; }
-    /// The search for a force of which nothing is certified.
+    /// Returns the search for a force without a certificate.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return search_; }
     [[nodiscard]] std::size_t cells() const noexcept { return borders_.empty() ? 0 : borders_.size() - 1; }
 
+    /// Solves the load line and updates the memory.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
@@ -83,12 +83,13 @@ class CertifiedSolver {
             return from_borders(environment, state, line, memory, y, 0);
         }
         const EnvironmentSample sample = environment.at(y, state);
-        // Newton's correction by the last compliance and two terms of its geometric series: nothing has to wait for
-        // a division. Of the correction the share missing^3 is left.
+        // Newton's correction by the last compliance and two terms of its geometric series, which avoids a division.
+        // The remaining error is the share missing^3 of the correction.
         const double rough = (sample.force + (line.slope * y - line.intercept)) * memory.compliance;
         const double missing = (1.0 - memory.compliance * line.slope) - memory.compliance * sample.slope;
         const double correction = -rough - rough * (missing + missing * missing);
-        // F' changes by at most a quarter over a cell: the solution is in it if the ends are farther away than this.
+        // F' changes by at most a quarter over a cell. The solution is in the cell if the ends are farther away than
+        // this.
         const double reach = 3.0 * std::abs(correction);
         const double left = 2.0 * (std::abs(rough * missing) * (missing * missing) +
                                    memory.curvature * (correction * correction));
@@ -99,7 +100,7 @@ class CertifiedSolver {
         return found(sample, y + correction, 1.0 / (line.slope + sample.slope), line, 1, memory);
     }
 
-    /// The search from the last position, as for a force of which nothing is certified.
+    /// Searches from the last position, as for a force without a certificate.
     template <Environment E>
     [[nodiscard]] Solution search(const E& environment, const typename E::State& state, LoadLine line,
                                   Memory& memory) const noexcept {
@@ -122,32 +123,32 @@ class CertifiedSolver {
         double curvature;
     };
 
-    /// Cell k lies below border k and above the one before it; the outermost two are half-lines.
+    /// Cell k lies below border k and above border k - 1; the outermost two are half-lines.
     struct Cell {
         double low;
         double high;
         double curvature;
     };
 
-    /// Cell k, of a knob that has turned so far.
+    /// Index of a cell, and the turns of a knob as a distance.
     struct Place {
         std::size_t cell;
         double turned;
     };
 
-    /// A stretch over which force and loss are networks; a line is one without wavelets.
+    /// An interval over which force and loss are networks; a straight line is a network without wavelets.
     struct Piece {
         Interval positions;
         NetworkParameters force;
         NetworkParameters loss;
     };
 
-    /// Where a step of Newton's method leads.
+    /// Result of one Newton step.
     struct Trial {
         double position;
         double correction;
-        double compliance;  ///< 1 / F' where it was evaluated
-        double steepest;    ///< largest F' there of any sheet
+        double compliance;  ///< 1 / F' at the evaluated position
+        double steepest;    ///< largest F' of any sheet at that position
         EnvironmentSample sample;
     };
 
@@ -178,24 +179,24 @@ class CertifiedSolver {
         }
     }
 
-    /// Distance at which a position is surely on one side of a kink.
+    /// Returns the distance from which a position is certainly on one side of a kink.
     [[nodiscard]] double margin(double y) const noexcept { return 4.0 * epsilon * (std::abs(y) + travel_); }
 
     [[nodiscard]] static double median(double a, double b, double c) noexcept {
         return std::max(std::min(a, b), std::min(std::max(a, b), c));
     }
 
-    /// Whether a play operator may stick at some position of the cell.
+    /// Returns true if a play operator can stick at some position of the cell.
     [[nodiscard]] bool may_stick(const Cell& cell, double play) const noexcept {
         return radius_ > 0.0 && cell.low < play + radius_ && cell.high > play - radius_;
     }
 
-    /// 1 where the cell lies above the positions that stick, -1 where it lies below.
+    /// Returns 1 if the cell lies above the positions that stick, -1 if it lies below.
     [[nodiscard]] double direction(const Cell& cell, double play) const noexcept {
         return cell.low >= play + radius_ ? 1.0 : -1.0;
     }
 
-    /// F at a border, sliding or sticking, where a knob has turned so far.
+    /// Returns F at a border, sliding or sticking, for a knob after `turned`.
     [[nodiscard]] double value(const Border& border, double turned, double p, double play) const noexcept {
         const double y = border.position + turned;
         const double s = std::clamp((y - play) * by_radius_, -1.0, 1.0);
@@ -208,7 +209,7 @@ class CertifiedSolver {
                 k == 0 ? 0.0 : borders_[k - 1].curvature};
     }
 
-    /// Newton's method from y, clamped to the cell. Evaluated some units in the last place beside the borders,
+    /// Applies one Newton step from y, clamped to the cell. Evaluates a few units in the last place inside the borders,
     /// because f' may jump there.
     template <class E, class State>
     [[nodiscard, gnu::always_inline]] inline Trial newton(const E& environment, const State& state,
@@ -265,7 +266,7 @@ class CertifiedSolver {
                 Status::Ok};
     }
 
-    /// From the border values and their interpolation, or a guess that agrees with it.
+    /// Solves from the border values and their interpolation, or from a guess that agrees with it.
     template <Environment E>
     [[nodiscard, gnu::noinline]] Solution from_borders(const E& environment, const typename E::State& state,
                                                        LoadLine line, Memory& memory, double guess,
@@ -297,7 +298,7 @@ class CertifiedSolver {
         }
     }
 
-    /// How far F is smooth around y.
+    /// Stores the range around y in which F is smooth.
     void remember(const Cell& cell, double y, double play, Memory& memory) const noexcept {
         memory.low = cell.low + margin(y);
         memory.high = cell.high - margin(y);
@@ -315,7 +316,7 @@ class CertifiedSolver {
         memory.play = play;
     }
 
-    /// The cell of the solution, by the values at the borders alone.
+    /// Returns the cell of the solution, from the values at the borders only.
     [[nodiscard]] Place locate(LoadLine line, double play) const noexcept {
         const Border& first = borders_.front();
         double turned = 0.0;
@@ -326,7 +327,7 @@ class CertifiedSolver {
             double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
                                       (line.slope * period_));
             turned = turns * period_;
-            // A loss, or rounding, may be worth some turns.
+            // Loss or rounding can shift the solution by some turns.
             constexpr int farthest = 4;
             for (int k = 0; k < farthest && !lies_below(first); ++k) {
                 turned = --turns * period_;
@@ -339,7 +340,8 @@ class CertifiedSolver {
         return {static_cast<std::size_t>(above - borders_.begin()), turned};
     }
 
-    /// Where the chords of the sheets over cell k reach q. On a half-line its end: every sheet is a line there.
+    /// Returns the position at which the chords of the sheets over cell k reach q. On a half-line returns its end,
+    /// because every sheet is a line there.
     [[nodiscard]] double interpolated(std::size_t k, double turned, LoadLine line,
                                       double play) const noexcept {
         if (k == 0 || k == borders_.size()) {
@@ -370,14 +372,14 @@ class CertifiedSolver {
         return {1, {}, {}, {}, {slope}, at_zero};
     }
 
-    /// The loss of a force without memory, in the same pieces.
+    /// Returns a loss of zero in the same pieces, for a force without memory.
     [[nodiscard]] static PiecewiseForce silent(const PiecewiseForce& force) {
         PiecewiseForce loss = scaled(force, 0.0);
         loss.network = straight(0.0, 0.0);
         return loss;
     }
 
-    /// From left to right; on both sides the last line reaches to infinity.
+    /// Returns the pieces from left to right; on both sides the last line is infinite.
     [[nodiscard]] static std::vector<Piece> pieces_of(const PiecewiseForce& force,
                                                       const PiecewiseForce& loss) {
         std::vector<Piece> pieces;
@@ -404,7 +406,7 @@ class CertifiedSolver {
         return pieces;
     }
 
-    /// c of a cell of which (C) is certified for every sheet; infinite where it is not.
+    /// Returns c of a cell on which (C) is certified for every sheet; infinity if it is not.
     [[nodiscard]] double certified_curvature(const Piece& piece, double from, double to,
                                              double p) const noexcept {
         const double reach = std::max(std::abs(from), std::abs(to));
@@ -424,18 +426,18 @@ class CertifiedSolver {
                          sheet_curvature(g, h, -s, by_radius_, radius, p)});
     }
 
-    /// A network about the middle of a cell.
+    /// Derivatives of a network in the middle of a cell, with bounds over the cell.
     struct Expansion {
         Derivatives middle;
         Derivatives rounding;
         DerivativeBounds over;
     };
 
-    /// The same of g + s h, and with by_radius of the sheet that sticks, whose s grows with y. Both bounds are
-    /// linear in s, so that s and -s are enough for all in between.
+    /// Returns c for g + s h, or with `by_radius` for the sheet that sticks, whose s grows with y. Both bounds are
+    /// linear in s, so s and -s cover all values between them.
     [[nodiscard]] static double sheet_curvature(const Expansion& g, const Expansion& h, double s,
                                                 double by_radius, double radius, double p) noexcept {
-        // Derivative n of f in the middle, and what rounding may add to it.
+        // Derivative n of f in the middle, and a bound of its rounding error.
         std::array<double, 5> f{};
         std::array<double, 5> rounding{};
         for (std::size_t n = 1; n < f.size(); ++n) {
@@ -461,7 +463,8 @@ class CertifiedSolver {
         return least > 0.0 && 8.0 * r * most <= least ? 0.5 * most / least : infinity;
     }
 
-    /// Cells from left to right, each about as wide as can be certified; none at all where one cannot.
+    /// Makes the cells from left to right, each about as wide as can be certified. Makes none if one cannot be
+    /// certified.
     void cut(const std::vector<Piece>& pieces, double p) {
         constexpr std::size_t most_cells = 4096;
         constexpr double narrowest = 1e-12;
@@ -473,7 +476,7 @@ class CertifiedSolver {
         for (const Piece& piece : pieces) {
             const auto [lower, upper] = piece.positions;
             if (!std::isfinite(lower) || !std::isfinite(upper)) {
-                // F is a line, because no loss changes out there.
+                // F is a straight line, because the loss is constant there.
                 const double edge = std::isfinite(lower) ? lower : upper;
                 const double slope = piece.force.linear[0];
                 const double gain = by_radius_ * jet(piece.loss, edge)[0];
@@ -506,12 +509,12 @@ class CertifiedSolver {
     }
 
     LoadLineSolver search_;
-    double radius_;     ///< r of a hysteresis; else 0
-    double by_radius_;  ///< 1 / r; else 0
+    double radius_;     ///< r of a hysteresis, otherwise 0 [m]
+    double by_radius_;  ///< 1 / r, otherwise 0 [1/m]
     double travel_;
-    double period_;                  ///< of a knob; else 0
-    double tolerance_;               ///< of the position
-    double least_slope_ = infinity;  ///< p for which the cells are certified; larger ones are as well
+    double period_;                  ///< of a knob, otherwise 0 [m]
+    double tolerance_;               ///< of the position [m]
+    double least_slope_ = infinity;  ///< smallest p for which the cells are certified
     std::vector<Border> borders_;
 };
 

@@ -18,34 +18,37 @@
 
 namespace palpate {
 
-/// How exact a tabulated resolvent must be, and how large it may become.
+/// Required accuracy and largest size of a tabulated resolvent.
 struct ResolventOptions {
-    double relative_error = 1e-12;     ///< of the travel, rounding included
-    std::size_t largest_table = 8192;  ///< cells of 64 bytes, for each branch
+    double relative_error = 1e-12;     ///< largest error, divided by the travel; includes rounding
+    std::size_t largest_table = 8192;  ///< largest number of cells of 64 bytes for each branch
 };
 
-/// What is inverted: F(y) = f(y) + p y where it rises, f a network of one input without continuation.
+/// Function to invert: F(y) = f(y) + p y on an interval where it rises; f is a network of one input without
+/// continuation.
 struct RisingForce {
     const NetworkParameters& network;
     double p = 0.0;
     Interval positions;
     Interval values;           ///< F at both ends
-    bool folds_below = false;  ///< F has a fold at the lower end; else it goes on rising there
+    bool folds_below = false;  ///< true: F has a fold at the lower end; false: it continues to rise there
     bool folds_above = false;
 };
 
-/// A stretch of the inverse of a rising F as polynomials of degree 7, with a proof of its error.
+/// Part of the inverse of a rising F as polynomials of degree 7, with a proved error.
 struct InverseTable {
     Interval values{std::numeric_limits<double>::infinity(),
-                    -std::numeric_limits<double>::infinity()};  ///< of F: what it answers for
-    Interval positions;                                         ///< the answers at both ends
+                    -std::numeric_limits<double>::infinity()};  ///< of F: range of the table
+    Interval positions;                                         ///< inverse at both ends
     double error = 0.0;                                         ///< proved bound of |y - F^-1(q)|
     PiecewiseSeptic table;
 
     [[nodiscard]] bool empty() const noexcept { return table.empty(); }
+    /// Returns true if q lies in the table.
     [[nodiscard, gnu::always_inline]] inline bool covers(double q) const noexcept {
         return q >= values.lower && q <= values.upper;
     }
+    /// Returns the inverse at q.
     [[nodiscard, gnu::always_inline]] inline double at(double q) const noexcept { return table.value(q); }
 };
 
@@ -53,10 +56,10 @@ namespace detail {
 
 /// The inverse of F on cells of one width.
 ///
-/// Every cell is certified for itself by the residual of its polynomial P, r(q) = F(P(q)) - q. At both borders r
-/// and three derivatives vanish, so |r| <= max|r^(8)| h^8 / (256 * 8!), the composition's eighth derivative is
-/// bounded by the bounds of both factors' Taylor coefficients, and the error is at most |r| / min F' over what
-/// the cell covers.
+/// Each cell is certified separately by the residual of its polynomial P, r(q) = F(P(q)) - q. At both borders r and
+/// three derivatives are zero, so |r| <= max|r^(8)| h^8 / (256 * 8!). Bounds of the Taylor coefficients of both
+/// functions bound the eighth derivative of their composition. The error is at most |r| / min F' over the positions of
+/// the cell.
 class InverseCells {
   public:
     InverseCells(const RisingForce& force, double asked, double width) : force_{force}, asked_{asked} {
@@ -75,12 +78,12 @@ class InverseCells {
         }
     }
 
-    /// How many cells are certified, and how many of the others might be if they were narrower.
+    /// Return the number of certified cells, and of the others that could be certified if they were narrower.
     [[nodiscard]] std::size_t certified() const noexcept { return certified_; }
     [[nodiscard]] std::size_t curable() const noexcept { return curable_; }
     [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
 
-    /// The runs of certified cells, from left to right; not worth the while are those of a cell or two.
+    /// Returns the runs of certified cells from left to right. Runs of fewer than four cells are dropped as too short.
     [[nodiscard]] std::vector<InverseTable> runs() const {
         constexpr std::size_t shortest = 4;
         std::vector<InverseTable> runs;
@@ -91,7 +94,7 @@ class InverseCells {
                 run.error = std::max(run.error, errors_[past++]);
             }
             if (past - first >= shortest) {
-                // A border itself may be rounded into the next cell.
+                // Rounding may place a border itself in the next cell.
                 const double low = table_.middle(first) - 0.5 * table_.width();
                 const double high = table_.middle(past - 1) + 0.5 * table_.width();
                 run.values = {std::max(force_.values.lower, std::nextafter(low, high)),
@@ -107,16 +110,16 @@ class InverseCells {
     }
 
   private:
-    /// The inverse and its derivatives at one q, with what they came from.
+    /// The inverse and its derivatives at one q, with the forward function at that position.
     struct InverseJet {
         Jet inverse;
-        Jet forward;      ///< F and its derivatives there
+        Jet forward;      ///< F and its derivatives at the inverse
         double residual;  ///< F(y) - q
     };
 
     [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= asked_; }
 
-    /// Newton's method to the last digit: in a bracket between the ends, from the end beyond it.
+    /// Applies Newton's method to the last digit, in a bracket between the ends.
     [[nodiscard]] InverseJet invert(double q) const noexcept {
         constexpr double infinity = std::numeric_limits<double>::infinity();
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -153,7 +156,7 @@ class InverseCells {
         return at;
     }
 
-    /// From the border before, where there is one, by its Taylor polynomial.
+    /// Returns a Taylor polynomial from the border before, if there is one.
     [[nodiscard]] double first_guess(double q, double low, double high) const noexcept {
         if (!borders_.empty()) {
             const InverseJet& last = borders_.back();
@@ -167,10 +170,10 @@ class InverseCells {
         return std::isfinite(low) ? (std::isfinite(high) ? 0.5 * (low + high) : low) : high;
     }
 
-    /// The error of a cell that no narrower one would cure.
+    /// Error of a cell that a narrower cell would not reduce.
     static constexpr double by_rounding = std::numeric_limits<double>::max();
 
-    /// |P - F^-1| on one cell; infinite where nothing is proved.
+    /// Returns a bound of |P - F^-1| on one cell; infinity without a proof.
     [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
         constexpr std::size_t order = 8;
         const auto c = table_.coefficients(k);
@@ -195,7 +198,7 @@ class InverseCells {
         if (!(least_slope > 0.0)) {
             return std::numeric_limits<double>::infinity();
         }
-        // The coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j t^j)^k. k = 1 has none: P has degree 7.
+        // The coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j t^j)^k. k = 1 adds 0, because P has degree 7.
         std::array<double, order + 1> composed = inner;
         double eighth = 0.0;
         double factorial = 1.0;
@@ -217,7 +220,7 @@ class InverseCells {
         return rounding < asked_ ? truncation + rounding : by_rounding;
     }
 
-    /// How far rounding at a border may take the value of a cell's polynomial.
+    /// Returns a bound of the change of a cell's polynomial by rounding at a border.
     [[nodiscard]] double border_rounding(const InverseJet& at, const Jet& of_f,
                                          double least_slope) const noexcept {
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -225,7 +228,7 @@ class InverseCells {
         const double argument =
             4.0 * epsilon * (std::abs(at.forward[0]) + std::abs(force_.p * at.inverse[0]));
         const double off = (std::abs(at.residual) + of_f[0] + argument) / least_slope;
-        // An error in y moves every derivative by the next one; the fourth is below what rounding costs.
+        // An error in y changes every derivative by the next one; the change by the fourth is below rounding.
         const double f2 = std::abs(second);
         const double f3 = std::abs(third);
         const double d1 = of_f[1] + f2 * off + 2.0 * epsilon * s;
@@ -254,9 +257,9 @@ class InverseCells {
 
 }  // namespace detail
 
-/// The inverse of a rising F in tables, by the widest cells that cover all values, or all that any cells do.
-/// Near a fold the inverse is a square root, which no polynomial follows: a few cells are missing there, as they
-/// are where F is so flat that rounding alone is more than the error asked for.
+/// Returns tables of the inverse of a rising F, with the widest cells that cover all values or as many as any cells do.
+/// Near a fold the inverse is a square root, which polynomials do not approximate, so a few cells are missing there.
+/// They are also missing if F is so flat that rounding alone exceeds the required error.
 [[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double asked,
                                                               std::size_t largest_table) {
     const double range = force.values.upper - force.values.lower;

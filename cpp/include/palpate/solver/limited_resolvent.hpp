@@ -11,17 +11,17 @@
 
 namespace palpate {
 
-/// Solves the load line of a force-limited environment, c(f(y)) + p y = q, by the solver of f(y) + p y = q.
+/// Solves the load line of a force-limited environment, c(f(y)) + p y = q, with the solver of f(y) + p y = q.
 ///
-/// Let F(y) = f(y) + p y rise, and let F(u) = q. Then c(f(y)) + p y rises too, because p > 0 and every slope of
-/// it is F' or p, so that it has one solution:
+/// Let F(y) = f(y) + p y rise, and let F(u) = q. Then c(f(y)) + p y also rises, because p > 0 and each of its slopes is
+/// F' or p. It has one solution:
 /// - |f(u)| <= F_max: u itself, since c(f(u)) = f(u).
-/// - f(u) > F_max: y = (q - F_max) / p. Since p y = q - F_max > q - f(u) = p u, y > u and F(y) > q, which is
-///   f(y) > q - p y = F_max: the limit acts at y.
+/// - f(u) > F_max: y = (q - F_max) / p. Since p y = q - F_max > q - f(u) = p u, y > u and F(y) > q. This means f(y) > q
+///   - p y = F_max: the limit is active at y.
 /// - f(u) < -F_max: y = (q + F_max) / p in the same way.
-/// For an environment with memory this holds for each of its states.
 ///
-/// Where p does not certify that F rises, the limited environment is searched from the last position.
+/// For an environment with memory this holds for each of its states. If p does not certify that F rises, the solver
+/// searches the limited environment from the last position.
 template <class Solver>
 class LimitedResolvent {
   public:
@@ -38,6 +38,7 @@ class LimitedResolvent {
     [[nodiscard]] bool tabulated() const noexcept { return unlimited_.tabulated(); }
     [[nodiscard]] const Solver& unlimited() const noexcept { return unlimited_; }
 
+    /// Solves the load line and updates the memory.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const LimitedEnvironment<E>& environment,
                                                             const typename E::State& state, LoadLine line,

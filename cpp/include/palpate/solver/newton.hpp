@@ -9,59 +9,59 @@
 
 namespace palpate {
 
-/// What a time step asks of the environment: the position y where
+/// The equation that a time step solves for the position y of the environment:
 ///
 ///     f(y) + slope * y = intercept.
 ///
-/// Inertia, damping and the virtual coupling are all in the two numbers, so every implicit structure ends in
-/// the same scalar equation. It has one solution for every intercept where slope + f' > 0.
+/// The two numbers contain inertia, damping and the virtual coupling, so every implicit structure uses the same scalar
+/// equation. It has one solution for every intercept if slope + f' > 0.
 struct LoadLine {
-    double slope = 0.0;      ///< p
-    double intercept = 0.0;  ///< q
+    double slope = 0.0;      ///< p [N/m]
+    double intercept = 0.0;  ///< q [N]
 };
 
-/// The position on the load line, and why the search ended there.
+/// Position on the load line, and the result of the search.
 struct Solution {
-    double position = 0.0;
-    EnvironmentSample environment;
-    double residual = 0.0;  ///< f(y) + p y - q [N or N*m]; 0 where a bound confirms what was not evaluated
-    int evaluations = 0;    ///< of the environment
+    double position = 0.0;          ///< solution y [m]
+    EnvironmentSample environment;  ///< force, slope and energy there
+    double residual = 0.0;  ///< f(y) + p y - q [N or N*m]; 0 if a bound confirms it without an evaluation
+    int evaluations = 0;    ///< evaluations of the environment
     Status status = Status::Ok;
 };
 
-/// What the last step leaves to the next.
+/// State between two steps.
 struct WarmStart {
-    double position = 0.0;  ///< the last solution
+    double position = 0.0;  ///< last solution [m]
 
     WarmStart() = default;
     explicit WarmStart(double at) noexcept : position{at} {}
 };
 
-/// Where a solution is known to lie.
+/// Interval that contains the solution.
 struct Bracket {
     double low = -std::numeric_limits<double>::infinity();  ///< residual < 0 here: the solution lies above
     double high = std::numeric_limits<double>::infinity();  ///< residual > 0 here: the solution lies below
 };
 
-/// Newton's method on f(y) + p y = q for a force of which nothing is certified: kept inside a bracket and bounded
-/// in evaluations. (`CertifiedSolver` solves what is certified to have one solution.)
+/// Applies Newton's method to f(y) + p y = q for a force without a certificate, inside a bracket and with a limit of
+/// evaluations. (`CertifiedSolver` solves load lines that are certified to have one solution.)
 ///
-/// Until the residual changes sign the search walks in the direction of -residual, no farther than
-/// `longest_step` at a time: where the solution is not unique it ends on the first branch met from the start,
-/// which is the branch a slow motion would follow.
+/// Until the residual changes sign the search moves in the direction of -residual, at most `longest_step` at a time. If
+/// the solution is not unique, the search ends on the first branch from the start. A slow motion would follow the same
+/// branch.
 struct LoadLineSolver {
-    int max_evaluations = 64;
-    double tolerance = 1e-13;                                       ///< on |residual / slope|, times 1 + |y|
-    double longest_step = std::numeric_limits<double>::infinity();  ///< while searching the bracket
+    int max_evaluations = 64;  ///< evaluations after which the search stops
+    double tolerance = 1e-13;  ///< largest |residual / slope|, divided by 1 + |y|
+    double longest_step = std::numeric_limits<double>::infinity();  ///< until the bracket is found [m]
 
     using Memory = WarmStart;
 
     [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
-    /// Whether every load line of this slope is certified to have one solution: never.
+    /// Returns false: without a certificate several solutions are possible.
     [[nodiscard]] static constexpr bool unique(double /*p*/) noexcept { return false; }
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return *this; }
 
-    /// Solves from the last position. A step that is not finite leaves the memory as it was.
+    /// Solves from the last position. A step that is not finite does not change the memory.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  WarmStart& memory) const noexcept {
@@ -72,20 +72,20 @@ struct LoadLineSolver {
         return solution;
     }
 
-    /// From a start, without memory.
+    /// Solves from a start, without memory.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  double start) const noexcept {
         return search(environment, state, line, start, Bracket{});
     }
 
-    /// From a start inside a bracket in which the residual rises.
+    /// Solves from a start inside a bracket in which the residual rises.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  double start, Bracket bracket) const noexcept {
         Solution at = search(environment, state, line, start, bracket);
         if (at.status == Status::NotUnique) {
-            at.status = Status::Ok;  // the very end of the rise
+            at.status = Status::Ok;  // the end of the rising interval
         }
         return at;
     }
@@ -113,8 +113,8 @@ struct LoadLineSolver {
                 at.status = Status::NonFinite;
                 return at;
             }
-            // Tested before the bracket may halve the step, and never below what rounding leaves of a residual:
-            // the bracket's end would cost dozens of bisections.
+            // This test comes before the bracket can halve the step, and its bound is at least the rounding error of a
+            // residual. Otherwise the end of the bracket would cost dozens of bisections.
             const double close = accepted(at.position);
             const double size = std::abs(line.slope * at.position) + std::abs(line.intercept);
             if (std::abs(at.residual) <= std::fmax(close * std::abs(slope), rounding * size)) {
@@ -130,7 +130,7 @@ struct LoadLineSolver {
             if (bracketed && high - low <= close) {
                 return at;
             }
-            // Newton's step is trusted while it leads uphill and the search is getting somewhere.
+            // Newton's step is used while it leads uphill and reduces the residual.
             const double newton = slope > 0.0 ? -at.residual / slope : 0.0;
             const double direction = at.residual < 0.0 ? 1.0 : -1.0;
             double step = newton;

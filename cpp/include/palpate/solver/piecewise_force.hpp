@@ -11,26 +11,26 @@
 
 namespace palpate {
 
-/// A stretch beyond the domain over which a force is a line.
+/// Interval outside the domain over which a force is a straight line.
 struct OuterLine {
-    double length;  ///< infinity for the last
-    double slope;
+    double length;  ///< length of the interval; infinity for the last [m]
+    double slope;   ///< slope of the line [N/m]
 };
 
-/// A force over the whole line in its pieces: a network inside the domain, and either lines beyond its edges or
-/// the same period again and again.
+/// A force over all positions in pieces: a network inside the domain, and outside either straight lines or the same
+/// period repeated.
 struct PiecewiseForce {
     NetworkParameters network;
     double lower = 0.0;
     double upper = 0.0;
     bool periodic = false;
-    std::vector<OuterLine> below;  ///< from the edge outward
-    std::vector<OuterLine> above;
+    std::vector<OuterLine> below;  ///< from the lower edge outward
+    std::vector<OuterLine> above;  ///< from the upper edge outward
 };
 
 namespace detail {
 
-/// The pieces of a sum of edge lines; `slope_at(x)` is that sum's slope, `reaches` where it may change.
+/// Returns the pieces of a sum of edge lines. `slope_at(x)` is that sum's slope; it may change at `reaches`.
 template <class Slope>
 [[nodiscard]] std::vector<OuterLine> outer_lines(double edge, double outward, std::vector<double> reaches,
                                                  Slope slope_at) {
@@ -49,6 +49,7 @@ template <class Slope>
 
 }  // namespace detail
 
+/// Returns the pieces of a curve.
 [[nodiscard]] inline PiecewiseForce piecewise(const NetworkCurve& curve) {
     PiecewiseForce force{curve.parameters(), curve.lower(), curve.upper(), curve.periodic(), {}, {}};
     if (!force.periodic) {
@@ -62,7 +63,7 @@ template <class Slope>
     return force;
 }
 
-/// What a hysteresis pair is while it slides: g + s h, s = 1 pressing and -1 releasing.
+/// Returns a hysteresis pair while it slides: g + s h, s = 1 for press and -1 for release.
 [[nodiscard]] inline PiecewiseForce piecewise(const HysteresisNetwork& pair, double s) {
     const NetworkCurve& g = pair.force();
     const NetworkCurve& h = pair.loss();
@@ -83,7 +84,7 @@ template <class Slope>
     return force;
 }
 
-/// The loss h of a hysteresis pair, in the same pieces.
+/// Returns the loss h of a hysteresis pair, in the same pieces.
 [[nodiscard]] inline PiecewiseForce piecewise_loss(const HysteresisNetwork& pair) {
     PiecewiseForce loss = piecewise(pair, 0.0);
     loss.network = pair.loss().parameters();
@@ -98,7 +99,7 @@ template <class Slope>
     return loss;
 }
 
-/// The force multiplied by a factor.
+/// Returns the force multiplied by a factor.
 [[nodiscard]] inline PiecewiseForce scaled(PiecewiseForce force, double factor) {
     for (double& weight : force.network.weight) {
         weight *= factor;

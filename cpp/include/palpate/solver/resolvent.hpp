@@ -21,23 +21,23 @@
 
 namespace palpate {
 
-/// A stretch over which F(y) = f(y) + p y rises from `values.lower` to `values.upper`: one solution for every q
-/// in between, by table, on a line, or else by Newton's method between its ends.
+/// Interval over which F(y) = f(y) + p y rises from `values.lower` to `values.upper`. Each q between them has one
+/// solution, which comes from a table, a straight line, or Newton's method between the ends.
 struct Branch {
     Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     InverseTable table;
-    double line_slope = 0.0;  ///< p + f' of a line; 0: a curve
+    double line_slope = 0.0;  ///< p + f' of a straight line; 0: a curve
     double bend_low = 0.0;    ///< |f''| at an end that is a fold
     double bend_high = 0.0;
 
-    /// The position on a line, from the end that is finite.
+    /// Returns the position on a straight line, from its finite end.
     [[nodiscard]] double on_line(double q) const noexcept {
         return std::isfinite(positions.upper) ? positions.upper + (q - values.upper) / line_slope
                                               : positions.lower + (q - values.lower) / line_slope;
     }
 
-    /// Near a fold F is a parabola; elsewhere the last position is as good a guess.
+    /// Returns a start for Newton's method: a parabola near a fold, elsewhere the last position.
     [[nodiscard]] double first_guess(double q, double last) const noexcept {
         const double near = 0.1 * (values.upper - values.lower);
         if (bend_high > 0.0 && values.upper - q < near) {
@@ -50,25 +50,24 @@ struct Branch {
     }
 };
 
-/// y = R(q), the solution of f(y) + p y = q as a function of q, for a fixed p: the implicit step without any
-/// iteration.
+/// y = R(q), the solution of f(y) + p y = q as a function of q for a fixed p: the implicit step without iteration.
 ///
-/// F = f + p y rises along its branches; between some of them it falls. A branch inside the domain has a table of
-/// its own, certified cell by cell (`inverse_tables`); beyond the edges f is a line, which is solved exactly; a
-/// knob repeats them all with every turn. Which branch a solution lies on is defined by the motion: from the last
-/// one the step walks in the direction of -residual to the first root. From a rising branch that is simple: while
-/// q is above its highest F, on to the next; while it is below its lowest, back.
+/// F = f + p y rises along its branches; between some of them it falls. A branch inside the domain has a table that is
+/// certified cell by cell (`inverse_tables`). Outside the edges f is a straight line, which is solved exactly. A knob
+/// repeats all branches with every turn. The motion defines the branch of the solution: the step moves from the last
+/// position in the direction of -residual to the first root. From a rising branch it goes to the next branch while q is
+/// above the branch's highest F, and back while q is below its lowest F.
 ///
-/// Near a fold, and where the error asked for cannot be certified, a short branch has no table. A load line with
-/// one solution is solved there by `CertifiedSolver`, others by Newton's method between the branch's ends. Where
-/// not even the folds can be told, all is left to `CertifiedSolver`.
+/// Near a fold, and if the required error cannot be certified, a short branch is without a table. There
+/// `CertifiedSolver` solves a load line with one solution, and Newton's method between the branch's ends solves the
+/// others. If the folds cannot be located, `CertifiedSolver` solves all load lines.
 class Resolvent {
   public:
-    /// What the last step leaves to the next: the branch it ended on.
+    /// State between two steps: the branch of the last solution.
     struct Memory {
         CertifiedSolver::Memory newton;
-        std::size_t branch = 0;  ///< 0: not known
-        double turns = 0.0;      ///< of a knob
+        std::size_t branch = 0;  ///< 0: unknown
+        double turns = 0.0;      ///< turns of a knob
 
         Memory() = default;
         explicit Memory(double position) noexcept : newton{position} {}
@@ -83,7 +82,7 @@ class Resolvent {
     Resolvent(const NetworkCurve& curve, double p, const ResolventOptions& options = {})
         : Resolvent{piecewise(curve), p, options} {}
 
-    /// Whether at least one branch has a table.
+    /// Returns true if at least one branch has a table.
     [[nodiscard]] bool tabulated() const noexcept { return cells() > 0; }
     [[nodiscard]] std::size_t cells() const noexcept {
         std::size_t sum = 0;
@@ -92,7 +91,7 @@ class Resolvent {
         }
         return sum;
     }
-    /// Proved bound of |y - R(q)| where a table answers; zero where there is none.
+    /// Returns a proved bound of |y - R(q)| for the tables [m]; 0 without tables.
     [[nodiscard]] double position_error() const noexcept {
         double worst = 0.0;
         for (const Branch& branch : branches_) {
@@ -100,15 +99,16 @@ class Resolvent {
         }
         return worst;
     }
-    /// Those of one turn, from left to right. The first is none: it stands for not knowing.
+    /// Returns the branches of one turn, from left to right. The first is empty and represents an unknown branch.
     [[nodiscard]] const std::vector<Branch>& branches() const noexcept { return branches_; }
     [[nodiscard]] const CertifiedSolver& solver() const noexcept { return solver_; }
-    /// Whether every load line of this slope is certified to have one solution.
+    /// Returns true if every load line of this slope is certified to have one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return solver_.unique(p); }
-    /// The search for a force of which nothing is certified.
+    /// Returns the search for a force without a certificate.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return solver_.uncertified(); }
 
-    /// Inlined, so that a step pays for what it uses of the answer.
+    /// Solves the load line and updates the memory. Inlined, so that the compiler drops the parts that a caller does
+    /// not use.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
@@ -122,7 +122,7 @@ class Resolvent {
         return elsewhere(environment, state, line, memory);
     }
 
-    /// The one solution where a table or a line gives it without an evaluation; NaN elsewhere.
+    /// Returns the unique solution if a table or a line gives it without an evaluation; otherwise NaN.
     [[nodiscard, gnu::always_inline]] inline Solution look_up(LoadLine line, Memory& memory) const noexcept {
         const Branch& branch = branches_[memory.branch];
         const double q = line.intercept;
@@ -132,7 +132,7 @@ class Resolvent {
         return look_further(line, memory);
     }
 
-    /// From a start, without memory.
+    /// Solves from a start, without memory.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  double start) const noexcept {
@@ -141,7 +141,7 @@ class Resolvent {
     }
 
   private:
-    /// The table gives position and force. Slope and energy would cost as much again, and no structure asks.
+    /// Returns position and force. Slope and energy would double the cost, and no structure uses them.
     [[nodiscard]] Solution answer(double y, double q, bool extrapolated) const noexcept {
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
         return {y, {q - slope_ * y, unknown, unknown, extrapolated}};
@@ -189,7 +189,7 @@ class Resolvent {
         return solution;
     }
 
-    /// The same on any branch.
+    /// Looks up the solution on any branch.
     [[nodiscard, gnu::noinline]] Solution look_further(LoadLine line, Memory& memory) const noexcept {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept))) {
             constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
@@ -200,7 +200,7 @@ class Resolvent {
         return on_branch(line.intercept, memory);
     }
 
-    /// By the table or line of the branch that is remembered; NaN where it has neither.
+    /// Looks up the solution on the branch in the memory; NaN if it has neither a table nor a line.
     [[nodiscard]] Solution on_branch(double intercept, const Memory& memory) const noexcept {
         const Branch& branch = branches_[memory.branch];
         const double turned = period_ * memory.turns;
@@ -215,7 +215,7 @@ class Resolvent {
         return answer(nowhere, nowhere, false);
     }
 
-    /// The branch that holds the last position; where F falls, the one that -residual leads to.
+    /// Sets the branch that holds the last position. Where F falls, sets the branch in the direction of -residual.
     template <Environment E>
     void place(const E& environment, const typename E::State& state, LoadLine line,
                Memory& memory) const noexcept {
@@ -251,11 +251,11 @@ class Resolvent {
         }
     }
 
-    /// Over the branches to the first that q meets, in the one direction in which there is something to walk.
+    /// Moves over the branches to the first one that contains q.
     void walk(double q, Memory& memory) const noexcept {
         const double turn = slope_ * period_;
         if (repeats_) {
-            // Whole turns that hold no root on the way.
+            // Skips whole turns without a root.
             if (q > highest_ + memory.turns * turn) {
                 memory.branch = 1;
                 memory.turns = std::ceil((q - highest_) / turn);
@@ -264,7 +264,7 @@ class Resolvent {
                 memory.turns = std::floor((q - lowest_) / turn);
             }
         }
-        // Twice around is more than enough; so far out that a turn is below rounding there is no end.
+        // Two turns are sufficient. The limit ends the loop at positions so large that rounding exceeds a turn.
         std::size_t steps = 2 * branches_.size();
         while (q - memory.turns * turn > branches_[memory.branch].values.upper && steps-- > 0) {
             advance(memory);
@@ -296,7 +296,7 @@ class Resolvent {
         return jet(force.network, y)[0] + slope_ * y;
     }
 
-    /// The tables of a rising stretch, and what they leave to Newton's method.
+    /// Adds the tables of a rising interval, and branches without a table for the gaps between them.
     void add_stretch(const PiecewiseForce& force, Interval positions, const ResolventOptions& options) {
         const Interval values{total(force, positions.lower), total(force, positions.upper)};
         const bool folds_below = positions.lower > force.lower;
@@ -313,7 +313,7 @@ class Resolvent {
                 branches_.push_back(gap);
             }
         };
-        // Where F goes on rising a bracket may be a little wider than the gap: its ends are not exact.
+        // If F continues to rise, a bracket may be slightly wider than the gap, because its ends are not exact.
         const double margin = 1e-9 * period_;
         for (InverseTable& table :
              inverse_tables({force.network, slope_, positions, values, folds_below, folds_above},
@@ -334,7 +334,7 @@ class Resolvent {
         lowest_ = std::min(lowest_, values.lower);
     }
 
-    /// Lines one after the other, from an edge outward. Where one falls there is no branch.
+    /// Adds straight lines one after the other, from an edge outward. A falling line is not a branch.
     void add_lines(const std::vector<OuterLine>& lines, double y, double q, double outward) {
         for (const OuterLine& line : lines) {
             const double y_end = y + outward * line.length;
@@ -355,7 +355,8 @@ class Resolvent {
     double slope_;
     double period_;
     bool repeats_ = false;
-    double highest_ = -std::numeric_limits<double>::infinity();  ///< F of any branch, in the first turn
+    double highest_ = -std::numeric_limits<double>::infinity();  ///< largest F of any branch, in the first
+                                                                 ///< turn
     double lowest_ = std::numeric_limits<double>::infinity();
     std::vector<Branch> branches_ = std::vector<Branch>(1);
 };

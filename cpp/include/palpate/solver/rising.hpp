@@ -13,12 +13,12 @@
 
 namespace palpate {
 
-/// The stretches of [lower, upper] over which F(y) = f(y) + p y rises, from left to right, f a network of one
-/// input without continuation. Between them lie the folds, where p + f' = 0, each enclosed to the last digit.
+/// Returns the intervals of [lower, upper] over which F(y) = f(y) + p y rises, from left to right; f is a network of
+/// one input without continuation. Between them are the folds, where p + f' = 0; each is located to the last digit.
 ///
-/// Proved on every cell of a bisection: either p + f' keeps its sign, or it is monotone and has one zero, by its
-/// value and slope in the middle of the cell and the bound of |f'''| over it. Nothing is returned where a fold is
-/// too flat to be told from none.
+/// A bisection proves on every cell that p + f' keeps its sign, or that it is monotone and has one zero. The proof uses
+/// its value and slope in the middle of the cell and the bound of |f'''| over the cell. Returns nothing if a fold is
+/// too flat to be distinguished from a curve without a fold.
 [[nodiscard]] inline std::optional<std::vector<Interval>> rising_stretches(const NetworkParameters& network,
                                                                            double p, double lower,
                                                                            double upper) {
@@ -28,7 +28,7 @@ namespace palpate {
     const double margin = rounding[1] + std::numeric_limits<double>::epsilon() * std::abs(p);
     const auto slope = [&](double y) { return p + jet(network, y)[1]; };
 
-    std::vector<Interval> cells;  // the leftmost last
+    std::vector<Interval> cells;  // the leftmost cell is the last element
     for (int k = first_cells; k > 0; --k) {
         const auto border = [&](int j) { return lower + (upper - lower) * j / first_cells; };
         cells.push_back({k == 1 ? lower : border(k - 1), k == first_cells ? upper : border(k)});
@@ -39,7 +39,7 @@ namespace palpate {
         return std::nullopt;
     }
     bool rises = first_slope > 0.0;
-    double start = lower;  // of the stretch that is open
+    double start = lower;  // of the current interval
     for (int looked_at = 0; !cells.empty(); ++looked_at) {
         const Interval cell = cells.back();
         cells.pop_back();

@@ -14,12 +14,11 @@
 
 namespace palpate {
 
-/// The resolvent of a hysteresis pair: one table for the slide while pressing, g + h, one for the slide while
-/// releasing, g - h, and `CertifiedSolver` where neither answers: in between, where the object sticks, and beside
-/// the tables.
+/// The resolvent of a hysteresis pair: one table for sliding in press, g + h, and one for sliding in release, g - h.
+/// `CertifiedSolver` solves the cases outside the tables and the sticking between both slides.
 ///
-/// Where it certifies that f + p y rises, sliding or sticking, the solution is the one of the pressing slide if that
-/// lies at or above play + r, and the one of the releasing slide if that lies at or below play - r.
+/// If `CertifiedSolver` certifies that f + p y rises, sliding and sticking, the solution is that of press if it lies at
+/// or above play + r, and that of release if it lies at or below play - r.
 class SlidingResolvent {
   public:
     struct Memory {
@@ -37,13 +36,13 @@ class SlidingResolvent {
           solver_{pair, p},
           radius_{pair.play_radius()} {}
 
-    /// Whether both slides have a table.
+    /// Returns true if both slides have a table.
     [[nodiscard]] bool tabulated() const noexcept {
         return solver_.cells() > 0 && press_.tabulated() && release_.tabulated();
     }
-    /// Whether every load line of this slope is certified to have one solution.
+    /// Returns true if every load line of this slope is certified to have one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return solver_.unique(p); }
-    /// The search for a force of which nothing is certified.
+    /// Returns the search for a force without a certificate.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return solver_.uncertified(); }
     [[nodiscard]] const CertifiedSolver& solver() const noexcept { return solver_; }
     [[nodiscard]] std::size_t cells() const noexcept { return press_.cells() + release_.cells(); }
@@ -51,6 +50,7 @@ class SlidingResolvent {
         return std::max(press_.position_error(), release_.position_error());
     }
 
+    /// Solves the load line and updates the memory.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -19,6 +20,9 @@ namespace palpate {
 [[nodiscard]] inline bool agree(double stored, double recomputed) noexcept {
     const double larger = std::max(std::abs(stored), std::abs(recomputed));
     return std::isfinite(larger) && std::abs(stored - recomputed) <= 1e-9 * larger;
+}
+[[nodiscard]] inline bool agree(std::optional<double> stored, std::optional<double> recomputed) noexcept {
+    return stored && recomputed ? agree(*stored, *recomputed) : !stored && !recomputed;
 }
 
 namespace detail {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of Mexican hats for one instruction set. Included by hat_sum.hpp once for each, with
-//   PALPATE_KERNEL  the namespace,  PALPATE_LANES  doubles in a register,  PALPATE_TARGET  a function attribute.
-// No include guard: that is the point. Every function carries the attribute itself: only then are its vectors
-// kept in registers of that width.
+// Sums of Mexican hats for one instruction set. hat_sum.hpp includes this file once for each instruction set, with
+// PALPATE_KERNEL the namespace, PALPATE_LANES doubles in a register, PALPATE_TARGET a function attribute. The file has
+// no include guard, because it is included several times. Every function carries the attribute, because only then the
+// compiler keeps its vectors in registers of that width.
 
 namespace PALPATE_KERNEL {
 
@@ -13,13 +13,13 @@ PALPATE_TARGET inline void load(Lanes& lanes, const double* from) noexcept {
     __builtin_memcpy(&lanes, from, sizeof(Lanes));
 }
 
-/// e^{-s/2} for 0 <= s <= hat_reach^2: 2^n e^r, n an integer, |r| <= ln 2 / 2, e^r a polynomial. Without
-/// branches; NaN stays NaN.
+/// Computes e^{-s/2} for 0 <= s <= hat_reach^2 without branches: 2^n e^r with an integer n, |r| <= ln 2 / 2 and a
+/// polynomial for e^r. NaN stays NaN.
 PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexcept {
     const Lanes exponent = -0.5 * square;
     const Lanes rounded = exponent * 0x1.71547652b82fep+0 + 0x1.8p52;  // log2(e)
     const Lanes n = rounded - 0x1.8p52;
-    // ln 2 in two parts, the first short enough for an exact product.
+    // ln 2 as a sum of two numbers; the first is short enough for an exact product.
     const Lanes r = (exponent - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
     const Lanes r2 = r * r;
     const Lanes r4 = r2 * r2;
@@ -27,7 +27,7 @@ PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexce
     const Lanes low = (c[0] + c[1] * r) + (c[2] + c[3] * r) * r2;
     const Lanes middle = (c[4] + c[5] * r) + (c[6] + c[7] * r) * r2;
     const Lanes high = (c[8] + c[9] * r) + (c[10] + c[11] * r) * r2;
-    // The integer n stands in the low bits of `rounded`; n >= -1010, so that 2^n is a normal number.
+    // The low bits of `rounded` hold the integer n. n >= -1010, so 2^n is a normal number.
     Integers bits;
     __builtin_memcpy(&bits, &rounded, sizeof(bits));
     bits = (bits << 52) + 0x3ff0000000000000;
@@ -36,14 +36,14 @@ PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexce
     e = (low + (middle + high * r4) * r4) * power;
 }
 
-/// The same; larger s are taken for hat_reach^2.
+/// Computes e^{-s/2} for any s >= 0; limits s to hat_reach^2.
 PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
     const Lanes farthest = Lanes{} + hat_reach * hat_reach;
     square = square > farthest ? farthest : square;
     gaussian_within(square, e);
 }
 
-/// u within +-hat_reach, its square and e^{-u^2/2}.
+/// Limits u to +-hat_reach and computes its square and e^{-u^2/2}.
 PALPATE_TARGET inline void gaussian(Lanes& u, Lanes& square, Lanes& e) noexcept {
     const Lanes reach = Lanes{} + hat_reach;
     u = u > reach ? reach : u;
@@ -52,6 +52,7 @@ PALPATE_TARGET inline void gaussian(Lanes& u, Lanes& square, Lanes& e) noexcept 
     gaussian_within(square, e);
 }
 
+/// Returns the sum of the lanes.
 PALPATE_TARGET inline double total(const Lanes& lanes) noexcept {
     double sums[PALPATE_LANES];
     __builtin_memcpy(sums, &lanes, sizeof(sums));
@@ -63,7 +64,7 @@ PALPATE_TARGET inline double total(const Lanes& lanes) noexcept {
     return sums[0];
 }
 
-/// All sums at one x, a register of wavelets at a time. `size` is a multiple of the lanes.
+/// Adds all sums at one x, a register of wavelets at a time. `size` is a multiple of the lanes.
 PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexcept {
     Lanes value{};
     Lanes slope{};
@@ -91,7 +92,7 @@ PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexce
     sum.double_integral += total(double_integral);
 }
 
-/// One of the sums at a register of positions.
+/// Adds one of the sums at a register of positions.
 template <HatQuantity quantity>
 PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, Lanes& sum) noexcept {
     for (std::size_t i = 0; i < of.count; ++i) {
@@ -111,7 +112,7 @@ PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, L
     }
 }
 
-/// One of the sums at many x: added to `sum`.
+/// Adds one of the sums at many positions to `sum`.
 template <HatQuantity quantity>
 PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept {
     Lanes position, total;
@@ -188,7 +189,7 @@ PALPATE_TARGET inline void multiply(Lanes& product, const double* column) noexce
     product *= factor;
 }
 
-/// The sum over the wavelets of a product of columns.
+/// Returns the sum over the wavelets of a product of columns.
 template <class... Columns>
 PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns) noexcept {
     Lanes sum{};
@@ -200,9 +201,9 @@ PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns)
     return total(sum);
 }
 
-/// Taylor's formula about the middle of a box. With A_n = w (d + n - r^2) E of each wavelet, psi = -A_0,
-/// D psi = A_2 u, D^2 psi = A_2 I - A_4 u u', and D^3 psi = A_6 u u u less A_4 u_j wherever the other two indices
-/// are equal. First all of a wavelet, then sums over the wavelets.
+/// Computes Taylor's formula about the middle of a box. With A_n = w (d + n - r^2) E of each wavelet, psi = -A_0, D psi
+/// = A_2 u and D^2 psi = A_2 I - A_4 u u'. D^3 psi is A_6 u u u minus A_4 u_j for each pair of equal other indices. The
+/// factors of all wavelets are computed first, then the sums over the wavelets.
 PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* middle, const double* radius,
                                      RadialExpansion& sums) noexcept {
     const std::size_t n = of.size;
@@ -283,7 +284,7 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     }
 }
 
-/// e^{-s/2} for many s >= 0.
+/// Computes e^{-s/2} for many s >= 0.
 PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
     Lanes s, result;
     std::size_t k = 0;
@@ -303,6 +304,7 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
     }
 }
 
+/// Returns the functions of this instruction set.
 [[nodiscard]] inline HatKernel kernel() noexcept {
     return {at,
             {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},

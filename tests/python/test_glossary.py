@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The names in docs/glossary.md exist, and each term has one entry."""
+
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+import palpate
+from palpate._core import rendering
+from palpate.cli import main
+from palpate.identification.options import IdentifyOptions
+from palpate.model import Fit
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+ROWS = [
+    [cell.strip() for cell in line.strip("|").split("|")]
+    for line in PAGE.splitlines()
+    if line.startswith("| ") and not line.startswith("| term")
+]
+NAMES = [name for row in ROWS for name in re.findall(r"`([^`]+)`", row[-1])]
+HEADERS = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "cpp/include").rglob("*.hpp"))
+HOLDERS = {"Fit": Fit, "IdentifyOptions": IdentifyOptions, "Scheme": rendering.Scheme}
+"""Classes that `palpate` does not export"""
+
+
+def has_member(holder: type, member: str) -> bool:
+    fields = {name for base in holder.__mro__ for name in getattr(base, "__annotations__", {})}
+    return member in fields or hasattr(holder, member)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_of_the_glossary_exists(name: str) -> None:
+    if name.startswith("palpate::"):
+        assert re.search(rf"\b(?:class|struct|enum class) {name.removeprefix('palpate::')}\b", HEADERS)
+    elif name.startswith("--"):
+        option = name.split()[0]
+        sources = [*Path(inspect.getfile(main)).parent.glob("*.py"), *(ROOT / "cpp/control").glob("*.cpp")]
+        assert any(option in source.read_text(encoding="utf-8") for source in sources)
+    else:
+        holder, _, member = name.partition(".")
+        found = HOLDERS.get(holder) or getattr(palpate, holder)
+        assert not member or has_member(found, member)
+
+
+def test_a_term_has_one_entry_of_one_sentence() -> None:
+    terms = [term for row in ROWS for term in row[0].split(", ")]
+    assert len(terms) == len(set(terms))
+    for row in ROWS:
+        assert len(row) in (3, 4)
+        assert row[1].endswith(".")

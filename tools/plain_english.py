@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks the language of everything that people read: plain_english.py [--count] [FILE ...].
+
+Reads comments, docstrings, messages and test names of Python and C++ sources, and the paragraphs of Markdown
+pages. Reports each word or opening that CONTRIBUTING.md ("Language") forbids, each sentence of more than
+MOST_WORDS words, and a mean sentence length above MEAN_WORDS for each kind of text.
+"""
+
+import argparse
+import ast
+import io
+import re
+import subprocess
+import sys
+import tokenize
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from pygments.lexers import CppLexer
+from pygments.token import Token
+
+MOST_WORDS = 40
+"""Words of a sentence at most"""
+
+MEAN_WORDS = 20.0
+"""Words of a sentence on average, for each kind of text"""
+
+LEAST_MESSAGE_WORDS = 4
+"""Words from which a string of a program is taken for a message"""
+
+INSTEAD = {
+    # metaphors where a term exists
+    r"stor(?:y|ies) (?:of|[0-9])": "record, example",
+    r"the house|a new room|rooms? is|arrows": "architecture, module, dependency rule",
+    r"rungs?|ladders?": "model class, model selection, candidate structure",
+    r"buzz(?:es|ing)?": "limit cycle",
+    r"wish(?:es)?": "request",
+    r"outlets?": "record sink",
+    r"simulated bench": "test rig",
+    r"tells?|told|telling": "reports, states, distinguishes",
+    r"ask(?:s|ed|ing)?": "calls, requests, requires",
+    r"believ(?:e|es|ed)": "accepts, assumes",
+    r"a hair": "a number with a unit",
+    r"swallow(?:s|ed)?": "exceeds, hides",
+    r"earn(?:s|ed)?": "is accepted",
+    r"has a say|have a say|the last word": "limits",
+    r"answers? for": "is responsible for, replaces",
+    r"no news|luck|alive": "not independent, random error, active",
+    r"let go|gives? way|turn(?:s|ed)? (?:round|out)": "closed, yields, reverses, is",
+    r"stands?|stood|standing": "is, represents, is stored",
+    r"learn(?:s|t)? of": "receives",
+    # indirect subjects and negated nouns
+    r"what": "the noun itself",
+    r"somebody(?: else)?|nobody|who(?:m)?ever|whatever|wherever": "the user, a hand, no, any",
+    r"(?:is|are|was|were|be|has|have|had|makes?|gives?) no (?!longer)\w+": "is not a, does not have",
+    r"(?:that|which) (?:is|are|was|has|have|had)? ?(?:none|no)": "without",
+    r"but for|nothing but": "except, only",
+    r"no (?:more|less|fewer|other) than": "at most, at least, only",
+    r"as (?:\w+ ){1,3}as (?:it|they|if) \w+": "a number",
+    # possession and places used for existence
+    r"(?:of|with|in) (?:its|their|his|our) own": "its own X, separate",
+    r"by (?:itself|themselves)": "automatically, alone",
+    r"beside|anew|alike|at hand|amiss": "with, again, equal, available, wrong",
+    r"hardly|barely|ever (?:better|larger|smaller|finer)": "a number, 'almost not'",
+    r"lest|hence|thereof|therein|whereby|wherein|henceforth|upon|thus": "a plain conjunction",
+    r"for the sake of|by virtue of|in turn": "for, one after the other",
+    r"makes? (?:up|out)|brings? along": "is, needs",
+    r"(?:is|are|was) to be": "must be, is",
+}
+"""Pattern of a word or phrase, and the plain one"""
+
+OPENINGS = {
+    r"(?:whether|where|who|whose|how (?:far|large|many|much|often|long))\b": "a verb or a noun first",
+    r"(?:and|but|nor)\b": "a sentence of its own",
+    r"to be\b": "a verb in the third person",
+    r"as (?:\w+ ){1,3}as\b": "a number",
+}
+"""Pattern at the start of a text, and what stands there instead"""
+
+_WORD = re.compile(r"[A-Za-z][A-Za-z'\u2019-]*")
+_FORBIDDEN = [(re.compile(rf"\b(?:{pattern})\b", re.I), instead) for pattern, instead in INSTEAD.items()]
+_OPENINGS = [(re.compile(pattern, re.I), instead) for pattern, instead in OPENINGS.items()]
+_SENTENCE_END = re.compile(r"(?<=[.!?;:])\s+(?=[\"'`(]?[A-Z0-9`])|\n\s*\n|\n\s*[-*|]\s|\n\s*\d+\.\s")
+_SECTION = re.compile(r"^ *(Parameters|Returns|Raises|Notes|Examples|Attributes|Yields)\s*\n\s*-{4,}", re.M)
+
+
+class Text(NamedTuple):
+    """A piece of prose."""
+
+    file: Path
+    line: int
+    kind: str
+    """comment, docstring, message, page or test name"""
+    words: str
+
+
+def python_texts(file: Path) -> Iterator[Text]:
+    """Yields comments, docstrings, messages and test names of a Python file."""
+    source = file.read_text(encoding="utf-8")
+    lines: list[tuple[int, str]] = []
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT and "SPDX" not in token.string:
+            lines.append((token.start[0], token.string.lstrip("#: ")))
+    yield from _joined(file, lines)
+    tree = ast.parse(source)
+    documentation: set[int] = set()
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        for each in body if isinstance(body, list) else []:
+            value = each.value if isinstance(each, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                documentation.add(id(value))
+                yield Text(file, each.lineno, "docstring", _prose(value.value))
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            yield Text(file, node.lineno, "test name", node.name.removeprefix("test_").replace("_", " "))
+    inside: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            inside.update(id(part) for part in ast.walk(node) if part is not node)
+            words = "".join(
+                str(part.value) if isinstance(part, ast.Constant) else "N" for part in node.values
+            )
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            words = node.value
+        else:
+            continue
+        if id(node) not in documentation | inside and len(_WORD.findall(words)) >= LEAST_MESSAGE_WORDS:
+            yield Text(file, node.lineno, "message", _prose(words))
+
+
+def cpp_texts(file: Path) -> Iterator[Text]:
+    """Yields comments, messages and test names of a C++ file."""
+    source = file.read_text(encoding="utf-8")
+    lines: list[tuple[int, str]] = []
+    message, started, line = "", 0, 1
+    for kind, value in CppLexer().get_tokens(source):
+        if kind in Token.Comment.Single and "SPDX" not in value:
+            lines.append((line, value.lstrip("/<! ").rstrip()))
+        elif kind in Token.Comment.Multiline:
+            lines += [(line + at, each.strip("/* ")) for at, each in enumerate(value.splitlines())]
+        if kind in Token.Literal.String:
+            started, message = started or line, message + value
+        elif message and value.strip():
+            words = message.replace('"', "").replace("\\n", "\n")
+            if len(_WORD.findall(words)) >= LEAST_MESSAGE_WORDS and "#include" not in words:
+                yield Text(file, started, "message", _prose(words))
+            message, started = "", 0
+        line += value.count("\n")
+    yield from _joined(file, lines)
+    for found in re.finditer(r"^(?:TYPED_)?TEST(?:_[FP])?\(\s*(\w+),\s*(\w+)\)", source, re.M):
+        words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", found[2]).lower()
+        yield Text(file, source.count("\n", 0, found.start()) + 1, "test name", words)
+
+
+def page_texts(file: Path) -> Iterator[Text]:
+    """Yields the paragraphs of a Markdown page, without code and tables."""
+    source = re.sub(
+        r"^(```|~~~).*?^\1|^\s*\|.*?$|^<!--.*?-->|^(?: {4}|\t)\S.*?$|^\s*!\[.*?$",
+        lambda found: "\n" * found[0].count("\n"),
+        file.read_text(encoding="utf-8"),
+        flags=re.M | re.S,
+    )
+    line = 1
+    for paragraph in re.split(r"(\n\s*\n)", source):
+        if paragraph.strip():
+            yield Text(file, line, "page", _prose(paragraph.lstrip("# \n")))
+        line += paragraph.count("\n")
+
+
+def _joined(file: Path, lines: list[tuple[int, str]]) -> Iterator[Text]:
+    """Comments on lines that follow each other are one text."""
+    block: list[tuple[int, str]] = []
+    for line, words in lines:
+        if block and line != block[-1][0] + 1:
+            yield Text(file, block[0][0], "comment", _prose("\n".join(each for _, each in block)))
+            block = []
+        block.append((line, words))
+    if block:
+        yield Text(file, block[0][0], "comment", _prose("\n".join(each for _, each in block)))
+
+
+def _prose(words: str) -> str:
+    """The text without code, formulas in backquotes and addresses."""
+    words = re.sub(r"(?:^|\n)\s*(?:>>>|\.\.\.) .*", "\n", words)
+    words = re.sub(r"``.*?``|`[^`\n]*`|:\w+:`.*?`", "N", words)
+    return re.sub(r"https?://\S+|\]\([^)]*\)", "", words).strip()
+
+
+def sentences(text: Text) -> list[str]:
+    """The sentences of a text; a list item, a parameter and a paragraph end one."""
+    words = _SECTION.sub("\n\n", text.words)
+    if text.kind == "docstring":
+        words = re.sub(r"\n\s*[\w*, .]+ : .*\n", "\n\n", words)
+    return [each for each in _SENTENCE_END.split(words) if len(_WORD.findall(each)) > 1]
+
+
+def findings(text: Text) -> Iterator[tuple[str, str]]:
+    """Yields the kind and the sentence of each finding: forbidden words and openings, and long sentences."""
+    for pattern, instead in _FORBIDDEN:
+        for found in pattern.finditer(text.words):
+            word = " ".join(found[0].lower().split())
+            yield f'"{word}"', f'"{word}" is forbidden; write: {instead}'
+    if text.kind in ("comment", "docstring", "message"):
+        for pattern, instead in _OPENINGS:
+            if found := pattern.match(text.words):
+                yield f'opening "{found[0]}"', f'opens with "{found[0]}"; begin with {instead}'
+    for sentence in sentences(text):
+        if (count := len(_WORD.findall(sentence))) > MOST_WORDS:
+            start = " ".join(sentence.split()[:8])
+            yield "long sentence", f'{count} words, at most {MOST_WORDS}: "{start} ..."'
+
+
+READERS = {".py": python_texts, ".cpp": cpp_texts, ".hpp": cpp_texts, ".md": page_texts}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("files", nargs="*", type=Path, help="files to check; all tracked files by default")
+    parser.add_argument("--count", action="store_true", help="print the number of each kind of finding only")
+    options = parser.parse_args()
+    tracked = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=True).stdout
+    files = options.files or [Path(name) for name in tracked.splitlines()]
+    counts: Counter[str] = Counter()
+    lengths: dict[str, list[int]] = defaultdict(list)
+    for file in files:
+        if file.suffix not in READERS or file.name == Path(__file__).name or not file.exists():
+            continue
+        for text in READERS[file.suffix](file):
+            lengths[text.kind] += [len(_WORD.findall(each)) for each in sentences(text)]
+            for kind, finding in findings(text):
+                counts[f"{text.kind}: {kind}"] += 1
+                if not options.count:
+                    print(f"{file}:{text.line}: {text.kind}: {finding}")
+    if options.count:
+        for name, number in counts.most_common():
+            print(f"{number:6} {name}")
+    too_long = False
+    for kind, words in sorted(lengths.items()):
+        mean = sum(words) / max(len(words), 1)
+        too_long |= mean > MEAN_WORDS
+        print(f"{kind}: {len(words)} sentences, {mean:.1f} words on average (at most {MEAN_WORDS:g})")
+    print(f"{sum(counts.values())} findings")
+    return 1 if counts or too_long else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
