@@ -20,7 +20,7 @@ from .choices import (
     renderable_slopes,
 )
 from .limited_network import limit_slopes, scale_hysteresis, sliding_slopes
-from .static_error import static_force_error, with_network
+from .plan import static_force_error, with_network
 
 _COUPLING_DAMPING = 0.2
 """Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""

@@ -24,7 +24,7 @@ from ..identification.network.basis import Basis
 from ..identification.network.constraints import domain_bounds, impose, slope_limited
 from ..identification.network.fitted import FittedNetwork
 from ..identification.network.separable import Block, SeparableProblem
-from .static_error import SAMPLES, strokes, with_network
+from .plan import SAMPLES, strokes, with_network
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 """Standard deviation of the kernel [share of the travel]; True if the force must be restoring at both ends,

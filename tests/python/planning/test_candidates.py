@@ -14,7 +14,7 @@ from palpate._core.stability import balancing_shift, certify
 from palpate.planning import profile_file
 from palpate.planning.choices import renderable_slopes
 from palpate.planning.limited_network import limit_slopes
-from palpate.planning.static_error import static_force_error
+from palpate.planning.plan import static_force_error
 
 TURN = 2.0 * math.pi
 BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))
