@@ -41,7 +41,7 @@ MOST_FILES = 16
 
 
 AT_TURN = 0.01
-"""Share of the travel before its end, where the direction changes."""
+"""Share of the travel before the turn"""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from palpate._core.simulation import motion_driven, simulate
 from palpate._core.stability import certify, force_bounds
 from palpate.identification.network.constraints import slope_limited
 from palpate.planning import Plan
-from palpate.planning.choices import renderable_slopes
+from palpate.planning.limited_network import renderable_slopes
 from palpate.recording import Recording
 
 SAMPLES = 1001

@@ -19,18 +19,20 @@
 
 namespace palpate::bindings {
 
-/// Any array-like of numbers, as contiguous float64.
+/// Any array-like of numbers, converted to contiguous float64.
 using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
 
+/// Accepts any object as an `ArrayLike`.
 inline int any_object(PyObject* /*object*/) {
     return 1;
 }
 
-/// An argument of any type that numbers() turns into an Array, so that a wrong one can be named.
+/// An argument of any type that numbers() converts to an Array, so that an error can name it.
 class ArrayLike : public pybind11::object {
     PYBIND11_OBJECT_DEFAULT(ArrayLike, pybind11::object, any_object)
 };
 
+/// Returns the shape of an array as text, for messages.
 [[nodiscard]] inline std::string shape_of(const pybind11::array& array) {
     std::string text = "(";
     for (pybind11::ssize_t k = 0; k < array.ndim(); ++k) {
@@ -48,15 +50,15 @@ class ArrayLike : public pybind11::object {
     return {values.begin(), values.end()};
 }
 
-/// A one-dimensional array, or std::invalid_argument with the shape received.
+/// Throws std::invalid_argument with the shape unless the array is one-dimensional.
 inline void require_vector(const Array& array, const char* name) {
     if (array.ndim() != 1) {
         throw std::invalid_argument(std::string(name) + " has shape " + shape_of(array) + ", must be (n,)");
     }
 }
 
-/// The numbers of an array-like as contiguous float64; std::invalid_argument names the argument if it holds
-/// anything else than real numbers: text, None, complex or masked values.
+/// Returns the numbers of an array-like as contiguous float64. Throws std::invalid_argument with the name of the
+/// argument if it contains other values than real numbers: text, None, complex or masked values.
 [[nodiscard]] inline Array numbers(const pybind11::handle& value, const char* name) {
     namespace py = pybind11;
     const auto refuse = [name](const std::string& found) {
@@ -96,8 +98,8 @@ inline void require_vector(const Array& array, const char* name) {
     return array;
 }
 
-/// Calls work(first, count) for parts that make up 0..size, on as many processors as that pays for: starting a
-/// thread takes as long as some thousand samples. To be called without the interpreter's lock.
+/// Calls work(first, count) for the parts of 0..size, on several processors if that is faster: starting a thread takes
+/// the time of some thousand samples. Call it without the interpreter's lock.
 template <class Work>
 void in_parts(std::size_t size, const Work& work) {
     constexpr std::size_t least = 16'384;
@@ -113,13 +115,13 @@ void in_parts(std::size_t size, const Work& work) {
         try {
             others.emplace_back([&part, k] { part(k); });
         } catch (const std::system_error&) {
-            part(k);  // no thread to be had
+            part(k);  // the system refused a thread
         }
     }
     part(0);
 }
 
-/// Hands a vector to numpy without a copy.
+/// Moves a vector to numpy without a copy.
 template <class T>
 [[nodiscard]] pybind11::array_t<T> moved(std::vector<T>&& values) {
     auto owner = std::make_unique<std::vector<T>>(std::move(values));

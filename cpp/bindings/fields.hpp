@@ -15,9 +15,9 @@
 
 namespace palpate::bindings {
 
-/// Defines pickling, copying, comparison, hash and repr of a class by one list of names: the keyword arguments of its
-/// constructor, which are also its attributes. `with_repr` is false for a class with a shorter repr. A Python subclass
-/// with the same constructor is kept.
+/// Defines pickling, copying, comparison, hash and repr of a class from one list of names: the keyword arguments of its
+/// constructor, which are also its attributes. `with_repr` is false for a class with a shorter repr. An instance of a
+/// Python subclass with the same constructor keeps its type.
 template <class T>
 void define_by_fields(pybind11::class_<T>& type, const std::vector<std::string>& fields,
                       bool with_repr = true) {
@@ -64,10 +64,11 @@ void define_by_fields(pybind11::class_<T>& type, const std::vector<std::string>&
     });
 }
 
-/// A field of an enumeration is a str in Python.
+/// Type of a field in Python: str for an enumeration.
 template <class V>
 using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
 
+/// Converts a field to its Python type.
 template <class V>
 PythonType<V> to_python(const V& value) {
     if constexpr (HasWords<V>) {
@@ -90,7 +91,7 @@ void set_field(T& object, PythonType<FieldType<T, k>>&& value) {
     }
 }
 
-/// The first `required` fields have no default.
+/// Returns the keyword argument of a field. The first `required` fields are without a default.
 template <class T, std::size_t k, std::size_t required>
 auto argument_of(const T& standard) {
     const auto& field = std::get<k>(fields_of<T>);
@@ -101,8 +102,8 @@ auto argument_of(const T& standard) {
     }
 }
 
-/// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, and all of `define_by_fields`.
-/// `check` throws if the fields do not fit together.
+/// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, and the methods of
+/// `define_by_fields`. `check` throws if the fields contradict each other.
 template <class T, std::size_t required = 0, class Check>
 void bind_fields(pybind11::class_<T>& type, Check check, bool with_repr = true) {
     namespace py = pybind11;

@@ -17,6 +17,7 @@ using namespace py::literals;
 
 namespace {
 
+/// Converts JSON to a Python value.
 py::object to_python(const Json& value) {
     switch (value.type()) {
         case Json::value_t::object: {

@@ -20,16 +20,6 @@ using namespace py::literals;
 
 namespace {
 
-Continuation continuation_named(const std::string& name, const char* field) {
-    detail::require(name == "linear" || name == "free",
-                    std::string(field) + " is '" + name + "', must be 'linear' or 'free'");
-    return name == "free" ? Continuation::Free : Continuation::Linear;
-}
-
-std::string name_of(Continuation continuation) {
-    return continuation == Continuation::Free ? "free" : "linear";
-}
-
 /// The element k of an optional argument that is one value for all samples or one for each.
 class Broadcast {
   public:
@@ -54,7 +44,7 @@ class Broadcast {
     py::ssize_t stride_ = 0;
 };
 
-/// Force, slope and energy at x, for a hysteresis model by direction or by the play state.
+/// Returns force, slope and energy at x; for a hysteresis model by direction or by the play state.
 EnvironmentSample sample(const ForceModel& model, double x, std::optional<double> direction,
                          std::optional<double> play) {
     if (const WaveletNetwork* network = model.network()) {
@@ -67,6 +57,7 @@ EnvironmentSample sample(const ForceModel& model, double x, std::optional<double
     return both.at(x, {*play});
 }
 
+/// Throws unless the arguments fit the inputs of the model.
 void require_inputs(const ForceModel& model, bool direction, bool play) {
     detail::require(model.parameters().dimension == 1,
                     "the model has " + std::to_string(model.parameters().dimension) +
@@ -90,6 +81,7 @@ constexpr HatQuantity quantity_of(Member member) {
                                                  : HatQuantity::Integral;
 }
 
+/// Returns one quantity at one position.
 template <Member member>
 double scalar(const ForceModel& model, double position, const py::object& /*velocity*/,
               const py::object& /*acceleration*/, std::optional<double> direction,
@@ -98,6 +90,7 @@ double scalar(const ForceModel& model, double position, const py::object& /*velo
     return sample(model, position, direction, play).*member;
 }
 
+/// Returns one quantity at many positions.
 template <Member member>
 py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, const py::object& /*velocity*/,
                           const py::object& /*acceleration*/, const std::optional<ArrayLike>& given_direction,
@@ -129,7 +122,7 @@ py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, c
     return result;
 }
 
-/// One quantity of the model under one name: a number in, a number out; an array in, an array out.
+/// Binds one quantity of the model. A number gives a number, an array gives an array.
 template <Member member>
 void bind_quantity(py::class_<ForceModel>& type, const char* name, const char* doc) {
     type.def(name, &scalar<member>, doc, py::arg("position").noconvert(), py::kw_only(),
@@ -140,6 +133,7 @@ void bind_quantity(py::class_<ForceModel>& type, const char* name, const char* d
              "direction"_a = py::none(), "play"_a = py::none());
 }
 
+/// Makes a model from the arguments of its Python constructor.
 ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight, const Array& linear,
                       double bias, const std::optional<Array>& weight_hysteresis,
                       const std::optional<Array>& linear_hysteresis, std::optional<double> bias_hysteresis,
@@ -152,8 +146,8 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
                               copied(weight),
                               copied(linear),
                               bias};
-    Domain domain{copied(lower), copied(upper), continuation_named(below, "below"),
-                  continuation_named(above, "above"), period};
+    Domain domain{copied(lower), copied(upper), named<Continuation>(below, "below"),
+                  named<Continuation>(above, "above"), period};
     const int given = int{weight_hysteresis.has_value()} + int{linear_hysteresis.has_value()} +
                       int{bias_hysteresis.has_value()};
     detail::require(
@@ -181,7 +175,7 @@ Array row(const std::vector<double>& values) {
     return Array(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// Force at one row of X of a model of several inputs or with hysteresis.
+/// Returns the force for one row of X of a model of several inputs or with hysteresis.
 double row_force(const ForceModel& model, const double* row) {
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() != nullptr ? 1 : 0);
     if (!std::all_of(row, row + columns, [](double value) { return std::isfinite(value); })) {
@@ -192,6 +186,7 @@ double row_force(const ForceModel& model, const double* row) {
                              : model.hysteresis()->sliding(row[0], row[1]).force;
 }
 
+/// Returns the forces for the rows of X.
 py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     const Array x = numbers(rows, "X");
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() ? 1 : 0);
@@ -216,6 +211,7 @@ py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     return result;
 }
 
+/// Returns the states of a play operator along positions.
 py::array_t<double> play_states(const Array& position, double radius, std::optional<double> start) {
     require_vector(position, "position");
     detail::require(radius > 0.0, "radius is " + std::to_string(radius) + ", must be > 0");
@@ -239,6 +235,7 @@ std::pair<double, double> pair_of(Interval interval) {
     return {interval.lower, interval.upper};
 }
 
+/// Returns true at positions outside the data.
 py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
     const Array position = numbers(positions, "position");
     require_inputs(model, true, true);
@@ -254,19 +251,24 @@ py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
     return result;
 }
 
-Interval bounds_of(Interval (*bounds)(const NetworkParameters&, double, double, double), const Array& alpha,
-                   const Array& beta, const Array& weight, double linear, double bias, double lower,
-                   double upper, double relative) {
-    const NetworkParameters network{1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+NetworkParameters network_of(const Array& alpha, const Array& beta, const Array& weight, double linear,
+                             double bias) {
+    return {1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+}
+
+std::pair<double, double> network_slope_bounds(const Array& alpha, const Array& beta, const Array& weight,
+                                               double linear, double bias, double lower, double upper,
+                                               double relative) {
+    const NetworkParameters network = network_of(alpha, beta, weight, linear, bias);
     validate(network, {{lower}, {upper}, {}, {}, std::nullopt});
     detail::require(relative > 0.0, "relative is " + std::to_string(relative) + ", must be > 0");
-    return bounds(network, lower, upper, relative);
+    return pair_of(slope_bounds(network, lower, upper, relative));
 }
 
 py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta, const Array& weight,
                                            double linear, double bias, const Array& lower, const Array& upper,
                                            std::size_t order) {
-    const NetworkParameters network{1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+    const NetworkParameters network = network_of(alpha, beta, weight, linear, bias);
     validate(network, {{0.0}, {1.0}, {}, {}, std::nullopt});
     require_vector(lower, "lower");
     detail::require_size(copied(upper), view(lower).size(), "upper");
@@ -319,13 +321,6 @@ void bind_model(py::module_& module) {
     type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
-        "require_slopes_within",
-        [](const ForceModel& model, double least, double largest) {
-            model.require_slopes_within({least, largest});
-        },
-        "least"_a, "largest"_a,
-        "ValueError if stored slope bounds are narrower than the slopes of this model.");
-    type.def(
         "slope_range",
         [](const ForceModel& model, std::optional<double> radius) {
             require_one_input(model.parameters());
@@ -336,13 +331,6 @@ void bind_model(py::module_& module) {
         "Proved (smallest, largest) slope inside the domain, sliding either way, within 1 % of the "
         "steepest.\n"
         "With a play radius also while a hysteresis model sticks, where h / r adds to it.");
-    type.def(
-        "loss_range",
-        [](const ForceModel& model) {
-            detail::require(model.hysteresis() != nullptr, "the model has no hysteresis, so it has no loss");
-            return pair_of(model.hysteresis()->loss().value_bounds());
-        },
-        "Proved (smallest, largest) h inside the domain; within 1 % of the largest.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -369,8 +357,10 @@ void bind_model(py::module_& module) {
     });
     type.def_property_readonly("lower", [](const ForceModel& m) { return row(m.domain().lower); });
     type.def_property_readonly("upper", [](const ForceModel& m) { return row(m.domain().upper); });
-    type.def_property_readonly("below", [](const ForceModel& m) { return name_of(m.domain().below); });
-    type.def_property_readonly("above", [](const ForceModel& m) { return name_of(m.domain().above); });
+    type.def_property_readonly("below",
+                               [](const ForceModel& m) { return std::string(name_of(m.domain().below)); });
+    type.def_property_readonly("above",
+                               [](const ForceModel& m) { return std::string(name_of(m.domain().above)); });
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
 
@@ -379,22 +369,9 @@ void bind_model(py::module_& module) {
         "State (n,) of the play operator of a radius along a motion (n,), started at rest unless told\n"
         "otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).");
 
-    const auto bind_bounds = [&](const char* name, auto bounds, const char* doc) {
-        module.def(
-            name,
-            [bounds](const Array& alpha, const Array& beta, const Array& weight, double linear, double bias,
-                     double lower, double upper, double relative) {
-                return pair_of(bounds_of(bounds, alpha, beta, weight, linear, bias, lower, upper, relative));
-            },
-            py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a, "lower"_a, "upper"_a,
-            "relative"_a = 0.01, doc);
-    };
-    bind_bounds(
-        "value_bounds", &value_bounds,
-        "Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`\n"
-        "times max|f| wider than the true range.");
-    bind_bounds(
-        "slope_bounds", &slope_bounds,
+    module.def(
+        "slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a,
+        "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
         "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
         "times max|f'| wider than the true range.");
     module.def(

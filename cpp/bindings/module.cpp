@@ -7,7 +7,7 @@
 
 namespace {
 
-/// Bad input reaches Python as palpate.InputError, which is a ValueError.
+/// Raises bad input in Python as palpate.InputError, which is a ValueError.
 void translate_invalid_argument(std::exception_ptr thrown) {
     try {
         std::rethrow_exception(std::move(thrown));
@@ -27,7 +27,7 @@ PYBIND11_MODULE(_core, module) {
     using namespace palpate::bindings;
     const auto submodule = [&](const char* name, const char* doc, auto... bind) {
         pybind11::module_ made = module.def_submodule(name, doc);
-        // `from palpate._core.model import ...` looks here first
+        // `from palpate._core.model import ...` reads sys.modules first
         pybind11::module_::import("sys").attr("modules")[made.attr("__name__")] = made;
         (bind(made), ...);
     };

@@ -27,8 +27,8 @@ using namespace py::literals;
 namespace {
 
 /// Calls Python while a session runs without the interpreter's lock: its signal handlers, and ten times a second
-/// `progress(ticks, position, force, lost)`. What they raise ends the session and is raised again afterwards; Ctrl-C
-/// only ends the session.
+/// `progress(ticks, position, force, lost)`. An exception ends the session and is raised after it; Ctrl-C only ends the
+/// session.
 class Watcher {
   public:
     Watcher(const std::optional<py::function>& progress, std::atomic<double> LoopProgress::* force)
@@ -107,6 +107,7 @@ py::object python_of(const NamedValues& fields) {
     return dict;
 }
 
+/// Returns one field of all ticks as an array.
 template <class Value>
 py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord::* field) {
     py::array_t<Value> values(static_cast<py::ssize_t>(ticks.size()));
@@ -117,45 +118,23 @@ py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord
     return values;
 }
 
-template <class T>
-Setters<T> run_setters() {
-    return {{"device", setter<T>(&RunOptions::device)},
-            {"wait_s", setter<T>(&RunOptions::wait_s)},
-            {"rate_hz", setter<T>(&RunOptions::loop, &LoopSettings::rate_hz)},
-            {"duration_s", setter<T>(&RunOptions::loop, &LoopSettings::duration_s)},
-            {"lowest_rate_share", setter<T>(&RunOptions::loop, &LoopSettings::lowest_rate_share)},
-            {"priority", setter<T>(&RunOptions::real_time, &RealTimeOptions::priority)},
-            {"cpu", setter<T>(&RunOptions::real_time, &RealTimeOptions::cpu)},
-            {"record", setter<T>(&RunOptions::record)},
-            {"force", setter<T>(&RunOptions::force)},
-            {"telemetry_port", setter<T>(&RunOptions::telemetry_port)},
-            {"telemetry_hz", setter<T>(&RunOptions::telemetry_hz)}};
-}
-
 /// Sets the options from keywords; checks what no other function checks.
 template <class T>
-void set_options(T& options, const py::kwargs& given, const Setters<T>& setters) {
-    set_fields(options, given, setters);
+void set_options(T& options, const py::kwargs& given) {
+    set_fields(options, given);
     options.created_by = std::string("palpate ") + PALPATE_VERSION;
     detail::require(!options.wait_s || (*options.wait_s > 0.0 && *options.wait_s <= 10.0),
                     "wait_s is " + readable(options.wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
 }
 
+/// Renders a model and returns the fields of the summary.
 py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& plan,
                           const std::optional<ForceModel>& limited,
                           const std::optional<Certificate>& certificate, const std::string& position_unit,
                           const std::string& force_unit, const std::string& model_name,
                           const std::optional<py::function>& progress, const py::kwargs& given) {
-    static const auto setters = [] {
-        auto all = run_setters<RenderOptions>();
-        add_scheme_choices(all, &RenderOptions::scheme);
-        all["force_limit"] = setter<RenderOptions>(&RenderOptions::force_limit);
-        all["uncertified"] = setter<RenderOptions>(&RenderOptions::uncertified);
-        all["faults"] = setter<RenderOptions>(&RenderOptions::faults);
-        return all;
-    }();
     RenderOptions options;
-    set_options(options, given, setters);
+    set_options(options, given);
     options.rate_given = given.contains("rate_hz") && !given["rate_hz"].is_none();
     const PlannedModel planned{model_name, model, position_unit, force_unit, plan, limited, certificate};
     const auto device = open_device(options, planned);
@@ -172,26 +151,12 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     return result;
 }
 
+/// Measures an object and returns the fields of the summary.
 py::dict measure_in_python(const std::optional<ForceModel>& object, const std::string& position_unit,
                            const std::string& force_unit, const std::optional<py::function>& progress,
                            const py::kwargs& given) {
-    using Options = MeasureOptions;
-    static const auto setters = [] {
-        auto all = run_setters<Options>();
-        all.insert({{"probe", setter<Options>(&Options::probe)},
-                    {"lower", setter<Options>(&Options::lower)},
-                    {"upper", setter<Options>(&Options::upper)},
-                    {"speed", setter<Options>(&Options::speed)},
-                    {"stiffness", setter<Options>(&Options::stiffness)},
-                    {"force_limit", setter<Options>(&Options::force_limit)},
-                    {"push", setter<Options>(&Options::push)},
-                    {"keep", setter<Options>(&Options::keep)},
-                    {"transducer", setter<Options>(&Options::transducer)},
-                    {"friction_share", setter<Options>(&Options::friction_share)}});
-        return all;
-    }();
-    Options options;
-    set_options(options, given, setters);
+    MeasureOptions options;
+    set_options(options, given);
     options.units = record_units(position_unit, force_unit);
     const auto device = device_to_measure(options, object);
     Watcher watcher{progress, &LoopProgress::object_force};
@@ -224,6 +189,8 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
 }  // namespace
 
 void bind_run(py::module_& module) {
+    module.attr("tolerated_change") = detail::tolerated_change;
+    module.attr("smallest_domain_share") = detail::smallest_domain_share;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
     py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and limits of a session.")
         .def(py::init<>())

@@ -8,8 +8,8 @@
 
 namespace palpate::bindings {
 
-/// Keeps long work without the interpreter's lock open to Ctrl-C: called once for each step, it runs Python's signal
-/// handlers and calls `progress(step)` ten times a second. What they raise is thrown.
+/// Makes long work without the interpreter's lock interruptible by Ctrl-C. It is called once for each step, runs
+/// Python's signal handlers, and calls `progress(step)` ten times a second. Their exceptions are thrown.
 class Interruptible {
   public:
     explicit Interruptible(const pybind11::function* progress = nullptr) : progress_{progress} {}

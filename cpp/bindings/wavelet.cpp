@@ -22,11 +22,11 @@ using namespace py::literals;
 
 namespace {
 
-/// One radial hat at a block of samples, from the squares of u.
+/// One radial hat at a block of samples, computed from the squares of u.
 struct Hats {
     static constexpr std::size_t block = 64;
 
-    double inputs = 1.0;  ///< how many
+    double inputs = 1.0;  ///< number of inputs
     std::size_t first = 0, size = 0;
     std::array<double, block> square{}, gaussian{};
 
@@ -38,7 +38,7 @@ struct Hats {
 /// Samples and wavelets of one call: X (n, d), alpha and beta (N, d). One-dimensional arrays mean d = 1.
 struct Frame {
     std::size_t samples, wavelets, dimension;
-    std::vector<double> inputs;  ///< X input by input
+    std::vector<double> inputs;  ///< X, input by input
     const double *alpha, *beta;
 
     Frame(const Array& x_array, const Array& alpha_array, const Array& beta_array) {
@@ -68,23 +68,21 @@ struct Frame {
         beta = beta_array.data();
     }
 
-    /// u_j of wavelet i at sample k.
+    /// Returns u_j of wavelet i at sample k.
     [[nodiscard]] double scaled(std::size_t i, std::size_t k, std::size_t j) const noexcept {
         return alpha[i * dimension + j] * (inputs[j * samples + k] - beta[i * dimension + j]);
     }
 
-    /// The same for what a hat is multiplied by: far away it is zero whatever u is, even if it is infinite.
+    /// Returns u_j for products with a hat, limited to the reach of a hat. A distant hat is zero even if u is infinite.
     [[nodiscard]] double clamped(std::size_t i, std::size_t k, std::size_t j) const noexcept {
         return std::clamp(scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
     }
 
-    /// Calls visit(hats) for every block of samples with the radial hats of wavelet i there. Each line of the
-    /// work is a loop over a block that the compiler vectorises, and no exponential is taken where the wavelet
-    /// reaches no sample of it.
+    /// Calls visit(hats) with the radial hats of wavelet i for every block of samples. Each step is a loop over a block
+    /// that the compiler vectorises. A block beyond the reach of the wavelet needs no exponentials.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        // exp(-80) is 2e-35. Products of what lies farther out are denormal numbers, with which linear
-        // algebra takes ten times as long.
+        // exp(-80) is 2e-35. Products of smaller numbers are denormal, which makes linear algebra ten times as slow.
         constexpr double nothing_is_left = 160.0;
         constexpr double most = detail::hat_reach * detail::hat_reach;
         Hats hats;
@@ -119,15 +117,16 @@ struct Frame {
     }
 };
 
-/// An (n, N) array stored column by column, as linear algebra wants it.
+/// An (n, N) array stored column by column, the order that linear algebra requires.
 using Columns = py::array_t<double, py::array::f_style>;
 
 [[nodiscard]] Columns columns(std::size_t samples, std::size_t wavelets) {
     return Columns({static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
 }
 
-Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
-    const Frame frame(x, alpha, beta);
+/// value(hats, wavelet, k in its block) at every sample and wavelet.
+template <class Value>
+Columns filled(const Frame& frame, Value value) {
     auto result = columns(frame.samples, frame.wavelets);
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
@@ -135,11 +134,16 @@ Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
         frame.radial(i, [&](const Hats& hats) {
             double* column = out + i * frame.samples + hats.first;
             for (std::size_t k = 0; k < hats.size; ++k) {
-                column[k] = hats.at(k).value;
+                column[k] = value(hats, i, k);
             }
         });
     }
     return result;
+}
+
+Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
+    return filled(Frame(x, alpha, beta),
+                  [](const Hats& hats, std::size_t /*i*/, std::size_t k) { return hats.at(k).value; });
 }
 
 std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian(const Array& x,
@@ -233,35 +237,14 @@ Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& b
     if (frame.dimension != 1) {
         throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,): this is for one input");
     }
-    auto result = columns(frame.samples, frame.wavelets);
-    double* out = result.mutable_data();
-    const py::gil_scoped_release unlocked;
-    for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        frame.radial(i, [&](const Hats& hats) {
-            double* column = out + i * frame.samples + hats.first;
-            for (std::size_t k = 0; k < hats.size; ++k) {
-                column[k] =
-                    frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
-            }
-        });
-    }
-    return result;
+    return filled(frame, [&](const Hats& hats, std::size_t i, std::size_t k) {
+        return frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
+    });
 }
 
 }  // namespace
 
 void bind_wavelet(py::module_& module) {
-    module.def("mexican_hat", py::vectorize([](double u) { return mexican_hat(u).value; }), "u"_a,
-               "The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.");
-    module.def("mexican_hat_slope", py::vectorize([](double u) { return mexican_hat(u).slope; }), "u"_a,
-               "psi'(u) = (3u - u^3) exp(-u^2 / 2).");
-    module.def("mexican_hat_curvature", py::vectorize([](double u) { return mexican_hat_curvature(u); }),
-               "u"_a, "psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).");
-    module.def("mexican_hat_jerk", py::vectorize([](double u) { return mexican_hat_jerk(u); }), "u"_a,
-               "psi'''(u) = (-u^5 + 10u^3 - 15u) exp(-u^2 / 2).");
-    module.def("mexican_hat_integral", py::vectorize([](double u) { return mexican_hat(u).integral; }), "u"_a,
-               "An antiderivative of psi: -u exp(-u^2 / 2).");
-
     module.def(
         "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
         "psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.\n\n"

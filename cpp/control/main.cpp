@@ -31,7 +31,7 @@ void request_stop(int /*signal*/) {
     stop_requested.store(true, std::memory_order_relaxed);
 }
 
-/// Ctrl-C and a request to terminate stop the loop. A closed pipe and a full file do not.
+/// Installs handlers: Ctrl-C and a termination request stop the loop, a closed pipe and a full file do not.
 void handle_signals() {
     struct sigaction stop{};
     stop.sa_handler = request_stop;
@@ -45,7 +45,7 @@ void handle_signals() {
     }
 }
 
-/// Gives each closed standard stream a descriptor that cannot be used, so that no file opened later gets its number:
+/// Gives each closed standard stream an unusable descriptor. Otherwise a file opened later would get its number, and
 /// the summary would be written into the recording.
 void occupy_closed_streams() {
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {

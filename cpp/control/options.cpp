@@ -30,7 +30,7 @@ constexpr const char* epilogue =
 constexpr double least_positive = std::numeric_limits<double>::min();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// A number within bounds, said in words.
+/// Returns a validator for a number within bounds, with a message in words.
 CLI::Validator number_between(double low, double high) {
     CLI::Validator validator;
     validator.operation([low, high](std::string& text) -> std::string {
@@ -64,7 +64,7 @@ CLI::Validator structure_word() {
     return validator;
 }
 
-/// The help for a terminal of 80 columns, without the words of programmers.
+/// Formats the help for a terminal of 80 columns, without programming terms.
 class Help : public CLI::Formatter {
   public:
     Help() {
@@ -209,7 +209,7 @@ void add_running(CLI::App& app, RenderOptions& options) {
         ->type_name("FAULT");
 }
 
-/// What the parser complains about, in the words of the other refusals.
+/// Returns the message of a parser error, in the style of the other messages.
 std::string sentence_of(const CLI::ParseError& error) {
     const std::string said = error.what();
     if (error.get_name() == "ArgumentMismatch") {

@@ -8,15 +8,15 @@
 
 namespace palpate::control {
 
-/// The command line.
+/// Values of the command line.
 struct Options {
     std::string model;
     RenderOptions render;
     bool as_json = false;
 };
 
-/// Reads the command line. If the program is to end at once (help, version, a wrong option), the text has been printed
-/// and the exit code is returned.
+/// Reads the command line. Returns the exit code if the program must end at once (help, version, a wrong option); the
+/// text is then already printed.
 [[nodiscard]] std::optional<int> read_options(int count, char** words, Options& options);
 
 }  // namespace palpate::control

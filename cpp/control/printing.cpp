@@ -40,7 +40,7 @@ nlohmann::json json_of(const std::vector<NamedValues>& list) {
 }
 
 template <class T>
-nlohmann::json json_of(const T& value) {  // a number that is not finite is written as null
+nlohmann::json json_of(const T& value) {  // a number that is not finite becomes null
     return value;
 }
 
@@ -52,7 +52,7 @@ nlohmann::json json_of(const NamedValues& fields) {
     return object;
 }
 
-/// Returns as many of the parts as fit on one line of the terminal, because a longer one is not overwritten as a whole.
+/// Returns the first parts that fit on one line of the terminal, because a longer line is not overwritten completely.
 std::string fitting(const std::vector<std::string>& parts) {
     constexpr std::size_t usual_columns = 80;
     winsize size{};

@@ -30,8 +30,8 @@ class LiveView {
     int calls_ = 0;
 };
 
-/// Prints the verdict and the summary on standard output, as lines or as one JSON object; before it warnings and, after a
-/// fault, the last ticks on standard error.
+/// Prints the verdict and the summary on standard output, as lines or as one JSON object. Before them prints warnings
+/// and, after a fault, the last ticks on standard error.
 void print_summary(const Summary& summary, bool as_json);
 
 }  // namespace palpate::control

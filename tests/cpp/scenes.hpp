@@ -17,33 +17,35 @@
 
 namespace palpate::test {
 
-/// A hand that takes hold of a resting handle after a while: what the first forces of a delayed device find is
-/// the object at rest.
+/// A hand that grips a resting handle after some time, so that the first forces of a delayed device meet an object at
+/// rest.
 template <SimulatedHand H>
 struct Later {
     H hand;
-    double from = 0.0;  ///< [s]
+    double from = 0.0;  ///< time of the grip [s]
 
     [[nodiscard]] Grip grip(double time, const Motion& handle) noexcept {
         return time < from ? Grip{1e9, 1e6, handle.position, 0.0, 0.0} : hand.grip(time, handle);
     }
 };
 
+/// A certified rendering: model, scheme, device and start.
 struct Scene {
     ForceModel model;
     Scheme scheme;
     DeviceProfile device;
     double start = 0.0;
-    double steepest = 0.0;  ///< where f' is largest
+    double steepest = 0.0;  ///< position of the largest f' [m or rad]
 
-    /// What the object holds at the start above its least, and the largest |V|.
+    /// Stored energy at the start above its least, and the largest |V| [J].
     double held = 0.0;
     double largest = 0.0;
 };
 
+/// Returns a random model of position, with or without hysteresis.
 inline ForceModel random_model(Random& random, bool hysteresis) {
     NetworkParameters network = random_network(random, random() % 7);
-    if (random() % 2 == 0) {  // rising everywhere
+    if (random() % 2 == 0) {  // a force that rises everywhere
         network.linear[0] -= slope_bounds(network, 0.0, 1.0).lower;
     }
     const auto side = [&] { return random() % 2 == 0 ? Continuation::Linear : Continuation::Free; };
@@ -63,6 +65,7 @@ inline ForceModel random_model(Random& random, bool hysteresis) {
     return {network, loss, domain, uniform(random, 0.005, 0.05)};
 }
 
+/// Returns the position of the largest slope.
 inline double steepest_place(const ForceModel& model) {
     double place = 0.0;
     double most = -1e300;
@@ -80,7 +83,7 @@ inline double steepest_place(const ForceModel& model) {
     return place;
 }
 
-/// V of the object that a structure sees, at rest.
+/// Returns V of the object that a structure sees, at rest [J].
 inline double energy_at(const ForceModel& model, const Scheme& scheme, double x) {
     if (scheme.compensated) {
         return Compensated{*model.network(), scheme.coupling.stiffness}.at(x, {}).energy;
@@ -89,8 +92,8 @@ inline double energy_at(const ForceModel& model, const Scheme& scheme, double x)
                                          : model.network()->at(x, {}).energy;
 }
 
-/// A device with exactly the damping and friction that the certificate asks for, times `room`. Nothing where
-/// the scene cannot be certified by any.
+/// Returns the device with the damping and friction that the certificate requires, times `room`; nothing if the scene
+/// cannot be certified.
 inline std::optional<DeviceProfile> just_enough(const ForceModel& model, const Scheme& scheme,
                                                 DeviceProfile device, double room) {
     constexpr double any_damping = 12345.0;
@@ -112,7 +115,7 @@ inline std::optional<DeviceProfile> just_enough(const ForceModel& model, const S
     return device;
 }
 
-/// A random scene that is certified, with a margin of `room` - 1 in damping and friction.
+/// Returns a random certified scene, with a margin of `room` - 1 in damping and friction.
 inline Scene random_certified_scene(Random& random, double room) {
     for (;;) {
         constexpr std::array kinds{StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit,
@@ -159,6 +162,7 @@ inline Scene random_certified_scene(Random& random, double room) {
     }
 }
 
+/// Runs a scene in a closed loop with an energy account.
 template <SimulatedHand H, class Watch>
 ClosedLoopEnd run(const Scene& scene, H hand, std::size_t ticks, int substeps, Watch watch) {
     const double from = (scene.device.late_samples() + 2) * scene.device.period_s;

@@ -18,7 +18,7 @@
 
 namespace palpate::test {
 
-/// How many random cases to try: `quick` in the ordinary tier, PALPATE_TEST_SCALE times that in the full one.
+/// Returns the number of random cases: `quick` in the usual tier, PALPATE_TEST_SCALE times that in the full tier.
 inline int cases(int quick) {
     const char* scale = std::getenv("PALPATE_TEST_SCALE");
     return quick * std::max(1, scale == nullptr ? 1 : std::atoi(scale));
@@ -26,11 +26,12 @@ inline int cases(int quick) {
 
 using Random = std::mt19937_64;
 
+/// Returns a uniform random number.
 inline double uniform(Random& random, double low, double high) {
     return std::uniform_real_distribution<double>{low, high}(random);
 }
 
-/// A network of `size` wavelets over [0, 1]^d.
+/// Returns a network of `size` wavelets over [0, 1]^d.
 inline NetworkParameters random_network(Random& random, std::size_t size, std::size_t dimension = 1) {
     NetworkParameters network;
     network.dimension = dimension;
@@ -54,7 +55,7 @@ inline Domain unit_domain(Continuation below = Continuation::Linear,
     return {{0.0}, {1.0}, below, above, std::nullopt};
 }
 
-/// The steepest fall of f, edge lines included, within 1e-9 of max|f'|; negative where f rises everywhere.
+/// Returns the largest falling slope of f, edge lines included, within 1e-9 of max|f'|; negative if f rises everywhere.
 inline double steepest_fall(const PiecewiseForce& force) {
     double least = slope_bounds(force.network, force.lower, force.upper, 1e-9).lower;
     for (const auto* side : {&force.below, &force.above}) {
@@ -65,7 +66,7 @@ inline double steepest_fall(const PiecewiseForce& force) {
     return -least;
 }
 
-/// f = stiffness * x, the environment every limit is known of.
+/// A spring, f = stiffness * x, for which every limit is known.
 struct Spring {
     using State = Stateless;
     double stiffness;
@@ -77,8 +78,8 @@ struct Spring {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// The comparison scene of spec section 6: a spring, a click and a wall,
-/// f(x) = 2x + 0.6 exp(-((x - 0.15)/0.03)^2) + 60 * 0.004 softplus((x - 0.4)/0.004) N*m over rad.
+/// The comparison scene of spec section 6: a spring, a click and a wall, f(x) = 2x + 0.6
+/// exp(-((x - 0.15)/0.03)^2) + 60 * 0.004 softplus((x - 0.4)/0.004) N*m over rad.
 struct ClickAndWall {
     using State = Stateless;
 

@@ -21,7 +21,7 @@ class DeviceProfile:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        The fields that are written to a file, by name.
         """
     @property
     def coulomb_friction(self) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ForceModel', 'derivative_bounds', 'fingerprint', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'play', 'slope_bounds', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['ForceModel', 'fingerprint', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'play', 'slope_bounds', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
 class ForceModel:
     """
     A force identified over d inputs, with its domain and continuations.
@@ -134,11 +134,6 @@ class ForceModel:
     @property
     def weight_hysteresis(self) -> numpy.typing.NDArray[numpy.float64] | None:
         ...
-def derivative_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], order: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Proved bounds (k,) of |f^(order)| of a network of one input, up to the ninth, over the cells
-    [lower, upper], each (k,).
-    """
 def fingerprint(model: ForceModel) -> str:
     """
     16 hexadecimal digits that change with every number of which the model's force is made.
@@ -202,3 +197,6 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
     Derivatives of the wavelet columns by steps without a unit, d log(alpha) and alpha d(beta):
     (n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.
     """
+wavelet_curvature_bound: float = 3.0
+wavelet_jerk_bound: float = 5.7831
+wavelet_slope_bound: float = 1.3801190462

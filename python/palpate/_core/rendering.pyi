@@ -27,7 +27,7 @@ class Scheme:
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        The fields that are written to a file, by name.
         """
     def validate(self, model: palpate._core.model.ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """

@@ -27,7 +27,7 @@ class ForceBounds:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        The fields that are written to a file, by name.
         """
     @property
     def drag(self) -> float:
@@ -95,7 +95,7 @@ class Inequality:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        The fields that are written to a file, by name.
         """
     @property
     def formula(self) -> str:
@@ -165,7 +165,7 @@ class Certificate:
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        The fields that are written to a file, by name.
         """
     @property
     def bounds(self) -> ForceBounds:

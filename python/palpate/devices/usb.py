@@ -6,7 +6,6 @@ The stream of samples needs both directions at once, which pyusb cannot do: the 
 
 from __future__ import annotations
 
-import errno
 import os
 import shutil
 import subprocess
@@ -25,22 +24,6 @@ from ..recording.files import replacing
 
 _TIMEOUT_MS = 500
 
-_PERMISSION = (
-    "permission denied",
-    "run `sudo palpate devices --install-udev-rule` once, then plug it in again",
-)
-_GONE = ("it is gone", "plug it in again")
-_REASONS = {
-    errno.EACCES: _PERMISSION,
-    errno.EPERM: _PERMISSION,
-    errno.EBUSY: ("another program holds it", "close palpate-control or whatever else uses it"),
-    errno.ENODEV: _GONE,
-    errno.ENOENT: _GONE,
-    errno.EPIPE: ("it refuses the request (stall)", "its firmware may be of another version"),
-    errno.ETIMEDOUT: ("it does not answer", "plug it in again; look at its power supply"),
-    errno.EIO: ("the transfer failed", "try another cable or port"),
-}
-
 
 class DeviceError(Exception):
     """A device that cannot be used: one sentence that names it, the reason and the likely cure."""
@@ -48,9 +31,9 @@ class DeviceError(Exception):
 
 def device_error(device: str, doing: str, error: Any) -> DeviceError:
     """The sentence for an error of pyusb while `doing` something with `device`."""
+    cause = core.usb_cause(getattr(error, "backend_error_code", None) or 0)
     said = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    reason, cure = _REASONS.get(getattr(error, "errno", None) or 0, (said, "plug it in again"))
-    return DeviceError(f"{device}, {doing}: {reason}; {cure}")
+    return DeviceError(f"{device}, {doing}: {cause or f'{said}; plug it in again'}")
 
 
 def _pyusb() -> ModuleType:

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme, compensated_share, default_play_radius
-from .._core.stability import force_bounds
+from .._core.stability import explicit_scheme, force_bounds
 from .._typing import Float1D
 from ..planning import Plan
-from ..planning.choices import explicit_scheme
 from .look import grid, plain_decades, scale_for, thinned
 
 _LINES = ("-", "--", ":", "-.")

@@ -157,7 +157,7 @@ TEST(DeviceProfile, RefusesImpossibleValuesByName) {
     EXPECT_NE(refusal([](DeviceProfile& p) { p.viscous_damping = -1.0; }), "accepted");
 }
 
-/// A device whose readings the test writes down beforehand, to see what the controller makes of bad ones.
+/// A device with prescribed readings, for tests of the controller with invalid ones.
 class ScriptedDevice {
   public:
     Opened open() { return {}; }

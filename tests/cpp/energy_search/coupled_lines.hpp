@@ -15,7 +15,7 @@
 
 namespace palpate::energy_search {
 
-/// The least of V = integral of `force` over [low, high], and where it is.
+/// Minimum of V = integral of `force` over [low, high], and its position.
 struct Least {
     double place = 0.0;
     double energy = 0.0;
@@ -48,7 +48,7 @@ template <class Force>
     return least;
 }
 
-/// An object behind a coupling, its scheme and its device.
+/// An object behind a coupling, with its scheme and its device.
 struct CoupledScene {
     Scheme scheme;
     DeviceProfile device;
@@ -66,12 +66,12 @@ struct CoupledScene {
            readable(scene.device.force_limit);
 }
 
-/// What is tried: objects about as stiff as the coupling, objects that hardly move, or coupling forces far beyond a
-/// force limit.
+/// Kinds of scenes: objects about as stiff as the coupling, objects that almost never move, or coupling forces far
+/// above a force limit.
 enum class Regime { Usual, Firm, Limited };
 
-/// A coupling and an inertia about the size of the object's slopes. A firm object hardly moves: it is much stiffer
-/// than the coupling, or heavy.
+/// Returns a coupling and an inertia of about the size of the object's slopes. A firm object moves little: it is much
+/// stiffer than the coupling, or heavy.
 [[nodiscard]] inline Scheme random_coupling(test::Random& random, StructureKind structure, double slope,
                                             double period, Regime regime) {
     const bool firm = regime == Regime::Firm;
@@ -93,7 +93,7 @@ enum class Regime { Usual, Firm, Limited };
     return scheme;
 }
 
-/// A trial that optimises the motion once and compares the damping below which energy is taken out.
+/// Returns a trial that optimises the motion once and compares the damping below which energy is taken out.
 template <class Structure>
 [[nodiscard]] Trial motion_trial(test::Random& random, Structure structure, const CoupledScene& scene,
                                  const Need& need, int starts, int steps) {
@@ -127,7 +127,7 @@ template <class Structure>
             need, text_of(scene)};
 }
 
-/// The same for the friction below which energy is taken out.
+/// Returns the same trial for friction.
 template <class Structure>
 [[nodiscard]] Trial friction_trial(test::Random& random, Structure structure, const CoupledScene& scene,
                                    const Need& need, int starts, int steps) {
@@ -154,7 +154,7 @@ template <class Structure>
             need, text_of(scene)};
 }
 
-/// An object of straight pieces that holds finite energy.
+/// Returns an object of straight pieces that stores finite energy.
 [[nodiscard]] inline Pieces closed_pieces(test::Random& random, int count, double step, Slopes slopes) {
     std::vector<double> forces = random_forces(random, count, step, slopes);
     const double steepest = std::max(slopes.M, slopes.s);
@@ -262,7 +262,7 @@ template <class Structure>
     return build(PieceObject{g}, bounds_of(g));
 }
 
-/// An encoder with steps in front of a coupling: objects without mass, and springs with mass.
+/// Makes a scene of an encoder with steps before a coupling, with objects without mass or springs with mass.
 [[nodiscard]] inline std::optional<Trial> draw_coupled_encoder(test::Random& random, double delay,
                                                                bool mass) {
     CoupledScene scene;
@@ -315,7 +315,7 @@ template <class Structure>
                           starts, steps);
 }
 
-/// A force with hysteresis at a predicted position. The play follows the measured one.
+/// Makes a force with hysteresis at a predicted position. The play follows the measured position.
 [[nodiscard]] inline std::optional<Trial> draw_predicted_hysteresis(test::Random& random, double delay) {
     CoupledScene scene;
     scene.scheme.structure = StructureKind::Direct;

@@ -16,8 +16,8 @@
 
 namespace palpate::energy_search {
 
-/// Straight pieces between points of equal distance; constant beyond the ends, or the same turn again and again.
-/// The shapes of the proofs are of this kind: slopes M and -s, and nothing between them.
+/// Straight pieces between points of equal distance; constant beyond the ends, or periodic. The worst cases of the
+/// proofs have this shape: slopes M and -s only.
 class Pieces {
   public:
     Pieces(double from, double step, std::vector<double> force, bool repeats = false)
@@ -36,7 +36,7 @@ class Pieces {
     [[nodiscard]] std::size_t cells() const noexcept { return force_.size() - 1; }
     [[nodiscard]] const std::vector<double>& points() const noexcept { return force_; }
 
-    /// Value, slope and antiderivative.
+    /// Returns value, slope and antiderivative.
     [[nodiscard]] Curve at(double x) const noexcept {
         double u = (x - from_) / step_;
         const auto last = static_cast<double>(cells());
@@ -89,7 +89,7 @@ struct PieceObject {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// The exact bounds of straight pieces.
+/// Returns the exact bounds of straight pieces.
 [[nodiscard]] inline ForceBounds bounds_of(const Pieces& pieces) {
     ForceBounds bounds;
     bounds.slope = pieces.slopes();
@@ -97,7 +97,7 @@ struct PieceObject {
     return bounds;
 }
 
-/// The exact bounds of g + s h with a play, both of straight pieces between the same points.
+/// Returns the exact bounds of g + s h with a play, both of straight pieces between the same points.
 [[nodiscard]] inline ForceBounds bounds_of(const HysteresisPair<Pieces>& pair) {
     const Pieces& g = pair.force();
     const Pieces& h = pair.loss();
@@ -121,17 +121,17 @@ struct PieceObject {
     return bounds;
 }
 
-/// The slopes that a random force may have.
+/// Largest slopes of a random force.
 struct Slopes {
     double M = 1.0;
     double s = 0.0;
 };
 
-/// Any force, or one of the shapes for which the bounds are closest: long runs of the extreme slopes, falling no more
-/// steeply than rising, or not rising at all.
+/// Any force, or one of the shapes for which the bounds are closest: long runs of the extreme slopes, falling at most
+/// as steeply as rising, or never rising.
 enum class Shapes { Any, Steep };
 
-/// Rising only, falling only, or both.
+/// Returns slopes that only rise, only fall, or both.
 [[nodiscard]] inline Slopes random_slopes(test::Random& random, Shapes shapes = Shapes::Any) {
     const double M = std::exp(test::uniform(random, 0.0, 4.0));
     switch (random() % (shapes == Shapes::Any ? 4 : 3)) {
@@ -146,7 +146,7 @@ enum class Shapes { Any, Steep };
     }
 }
 
-/// Forces at `count` points: runs of the extreme slopes, mixed slopes, a wall, or a spring.
+/// Returns forces at `count` points: runs of the extreme slopes, mixed slopes, a wall, or a spring.
 [[nodiscard]] inline std::vector<double> random_forces(test::Random& random, int count, double step,
                                                        Slopes slopes, Shapes shapes = Shapes::Any) {
     std::vector<double> force{0.0};
@@ -179,7 +179,7 @@ enum class Shapes { Any, Steep };
     return force;
 }
 
-/// One turn of a wheel: random forces at `count` points with mean `mean`.
+/// Returns one turn of a wheel: random forces at `count` points with mean `mean`.
 [[nodiscard]] inline std::vector<double> random_wheel(test::Random& random, int count, double size,
                                                       double mean) {
     std::vector<double> force;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wheels, the ramp at the start, and softening.
+// Scenes of wheels, of the ramp at the start, and of softening.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace palpate::energy_search {
 
-/// Mean of a force over one turn from 0.
+/// Returns the mean of a force over one turn from 0.
 template <class Force>
 [[nodiscard]] double mean_over(double turn, const Force& force) {
     constexpr int parts = 20000;
@@ -26,7 +26,7 @@ template <class Force>
     return sum / parts;
 }
 
-/// A constant added to `force` so that `mean_of` the result is 0.
+/// Adds a constant to `force` so that `mean_of` the result is 0.
 template <class MeanOf>
 [[nodiscard]] std::vector<double> balanced(std::vector<double> force, const MeanOf& mean_of) {
     double low = -2.0 * largest_of(force);
@@ -45,7 +45,7 @@ template <class MeanOf>
     return shifted(0.5 * (low + high));
 }
 
-/// Nodes of a turn: many for slow turning, few for jumps.
+/// Returns the nodes of a turn: many for slow turning, few for jumps.
 [[nodiscard]] inline int wheel_nodes(double delay, bool slowly) {
     constexpr int slow[] = {3000, 1200, 600};
     constexpr int fast[] = {48, 24, 12};
@@ -53,7 +53,7 @@ template <class MeanOf>
     return slowly ? slow[samples] : fast[samples];
 }
 
-/// A wheel of straight pieces. Slow turning in many short moves tries the mean force, jumps try the damping.
+/// Makes a wheel of straight pieces. Slow turning in many short moves tests the mean force, jumps test the damping.
 [[nodiscard]] inline std::optional<Trial> draw_wheel(test::Random& random, double delay, bool slowly) {
     const int cells = 8 + static_cast<int>(random() % 9);
     const double turn = 1.0;
@@ -96,7 +96,7 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// A wheel of a few wavelets, as the core certifies it.
+/// Makes a wheel of a few wavelets, with the core's certificate.
 [[nodiscard]] inline std::optional<Trial> draw_network_wheel(test::Random& random, double delay,
                                                              bool slowly) {
     const NetworkParameters network = small_network(random);
@@ -125,7 +125,7 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// A wheel with hysteresis, turned slowly. Its loss may be more than its mean pushes.
+/// Makes a wheel with hysteresis that turns slowly. Its loss may exceed its mean force.
 [[nodiscard]] inline std::optional<Trial> draw_hysteresis_wheel(test::Random& random, double delay) {
     const int nodes = 300;
     const int cells = 10;
@@ -161,11 +161,11 @@ template <class MeanOf>
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, 1, true);
     scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     scene.held.assign(static_cast<std::size_t>(nodes),
-                      10.0 * (size + loss));  // only motion without end counts
+                      10.0 * (size + loss));  // only endless motion counts
     return trial_of(std::move(scene), *need, device);
 }
 
-/// The guard that makes the object softer after it has found `buzzes` limit cycles.
+/// Returns the guard that softens the object, after `buzzes` limit cycles.
 [[nodiscard]] inline LimitCycleDetector softened(int buzzes) {
     LimitCycleDetector detector{{1e-9, 1000, 0.0}};
     double side = 1.0;
@@ -176,7 +176,7 @@ template <class MeanOf>
     return detector;
 }
 
-/// A force that is made softer at any time, more than once, and never harder again. On a wheel or on pieces.
+/// Makes a force that is softened at any time, more than once, and never hardened. It is a wheel or straight pieces.
 [[nodiscard]] inline std::optional<Trial> draw_softening(test::Random& random, double delay) {
     const bool wheel = random() % 2 == 0;
     const int nodes = wheel ? wheel_nodes(delay, true) / 2 : 40;
@@ -243,8 +243,8 @@ template <class MeanOf>
                  *need};
 }
 
-/// A force that rises from nothing over the first samples. The hand may take out, once, the most that the object
-/// can hold.
+/// Makes a force that increases from zero over the first samples. The hand may take out, once, the largest energy that
+/// the object can store.
 [[nodiscard]] inline std::optional<Trial> draw_ramp(test::Random& random, double delay) {
     const Fineness fine = random_fineness(random, samples_of(delay));
     const double step = std::exp(test::uniform(random, -6.0, -2.0));

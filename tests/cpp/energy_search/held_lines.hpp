@@ -20,13 +20,13 @@
 
 namespace palpate::energy_search {
 
-/// How finely a scene is searched: jumps between all of a few positions, or short moves over many.
+/// Resolution of a search: jumps between all of a few positions, or short moves over many.
 struct Fineness {
     int nodes = 24;
     int reach = 23;
 };
 
-/// Number of remembered positions for a delay in samples.
+/// Returns the number of stored positions for a delay in samples.
 [[nodiscard]] inline int samples_of(double delay) {
     return static_cast<int>(std::ceil(delay));
 }
@@ -40,7 +40,7 @@ struct Fineness {
     return {coarse[std::min(memory, 3)], 23};
 }
 
-/// A device without limits or steps. `delay` is in samples; one without delay may have jitter.
+/// Returns a device without limits or steps. `delay` is in samples; without delay it may have jitter.
 [[nodiscard]] inline DeviceProfile random_device(test::Random& random, double delay) {
     DeviceProfile device;
     device.period_s = test::uniform(random, 3e-4, 2e-3);
@@ -53,7 +53,7 @@ struct Fineness {
     return device;
 }
 
-/// A limit that clips half of the scenes.
+/// Sets a force limit in half of the scenes.
 inline void limit_by(test::Random& random, DeviceProfile& device, double largest) {
     if (random() % 2 == 0 && largest > 0.0) {
         device.force_limit = largest * test::uniform(random, 0.2, 1.0);
@@ -79,7 +79,7 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
     return std::clamp(force, -device.force_limit, device.force_limit);
 }
 
-/// A trial that searches a held force on a grid.
+/// Returns a trial that searches a held force on a grid.
 [[nodiscard]] inline Trial trial_of(HeldScene scene, const Need& need, const DeviceProfile& device) {
     scene.need = {need.damping / device.longest_period_s(), need.friction, device.whole_delay_samples(),
                   device.delay_fraction()};
@@ -89,7 +89,7 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
         need};
 }
 
-/// A static force of straight pieces, rendered directly or through a coupling without damper.
+/// Makes a static force of straight pieces, rendered directly or through a coupling without damper.
 [[nodiscard]] inline std::optional<Trial> draw_static_pieces(test::Random& random, const Scheme& scheme,
                                                              double delay, Shapes shapes) {
     const Fineness fine = random_fineness(random, samples_of(delay), shapes);
@@ -110,12 +110,12 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
     return trial_of(std::move(scene), *need, device);
 }
 
-/// One to three wavelets and a straight line over [0, 1].
+/// Returns one to three wavelets and a straight line over [0, 1].
 [[nodiscard]] inline NetworkParameters small_network(test::Random& random) {
     return test::random_network(random, 1 + random() % 3);
 }
 
-/// Where the slope is largest in size.
+/// Returns the position of the largest absolute slope.
 template <class Force>
 [[nodiscard]] double steepest_place(const Force& force) {
     double place = 0.0;
@@ -131,7 +131,7 @@ template <class Force>
     return place;
 }
 
-/// A network of position by any structure whose force depends on the present position alone.
+/// Makes a network of position with a structure whose force depends only on the current position.
 [[nodiscard]] inline std::optional<Trial> draw_static_network(test::Random& random, double delay,
                                                               bool coupled) {
     const Fineness fine = random_fineness(random, samples_of(delay));
@@ -161,7 +161,7 @@ template <class Force>
     scene.table = with_structure(
         model, scheme, device.period_s, device.force_limit,
         [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
-    // Behind a coupling the force at x is that of the object at y: what is felt is again a static force.
+    // Behind a coupling the force at x is that of the object at y, so the felt force is again static.
     scene.held = coupled ? with_structure(model, scheme, device.period_s, device.force_limit,
                                           [&](auto structure) {
                                               return held_energy(scene.read.grid, [&](double x) {
@@ -190,7 +190,7 @@ template <class Force>
     return draw_static_network(random, delay, true);
 }
 
-/// g and h of straight pieces; the play a whole number of nodes.
+/// Makes g and h of straight pieces; the play is a whole number of nodes.
 [[nodiscard]] inline std::optional<Trial> draw_hysteresis_pieces(test::Random& random, double delay) {
     const bool far = random() % 2 == 0;
     const int nodes = far ? (samples_of(delay) == 0   ? 60
@@ -262,7 +262,7 @@ template <class Force>
     }
     const auto stick = [&](double x) {
         const Curve g = pair.force().at(x);
-        return g.value + pair.loss().at(x).integral / pair.play_radius();  // its slope is g' + h/r
+        return g.value + pair.loss().at(x).integral / pair.play_radius();  // slope g' + h/r
     };
     HeldScene scene;
     scene.read =
@@ -279,7 +279,7 @@ template <class Force>
     return random() % 3 != 0 ? draw_hysteresis_pieces(random, delay) : draw_hysteresis_network(random, delay);
 }
 
-/// A force of position and velocity: a straight line in both, or a few wavelets.
+/// Makes a force of position and velocity: a straight line in both, or a few wavelets.
 [[nodiscard]] inline std::optional<Trial> draw_velocity(test::Random& random, double delay) {
     const bool far = random() % 2 == 0;
     const int nodes = far ? 60 : (samples_of(delay) == 0 ? 16 : samples_of(delay) == 1 ? 9 : 6);
@@ -315,7 +315,7 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// An encoder with steps: the handle is anywhere within the count that is read.
+/// Makes a scene of an encoder with steps: the handle is anywhere within the count.
 [[nodiscard]] inline std::optional<Trial> draw_encoder(test::Random& random, double delay, bool hysteresis) {
     const int counts = hysteresis               ? (samples_of(delay) == 0   ? 14
                                                    : samples_of(delay) == 1 ? 8
@@ -351,7 +351,7 @@ template <class Force>
         if (need && random() % 2 == 0) {
             need = need_at_less_friction(device, *need, certified).value_or(*need);
         }
-        // The read play rests at the count, the handle up to half a count away.
+        // The read play rests at the count, the handle is up to half a count away.
         at_start = bounds_of(pair).loss_per_play * step * step / 8.0;
         scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     } else {
@@ -370,7 +370,7 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// A command with steps, on short moves about a place where its rounding changes.
+/// Makes a scene of a command with steps, with short moves around a position at which its rounding changes.
 [[nodiscard]] inline std::optional<Trial> draw_force_step(test::Random& random, double delay) {
     const Fineness fine = random_fineness(random, samples_of(delay));
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
@@ -396,7 +396,7 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// A static force on a device with jitter and a delay in seconds.
+/// Makes a static force on a device with jitter and a delay in seconds.
 [[nodiscard]] inline std::optional<Trial> draw_jitter(test::Random& random, double delay, Shapes shapes) {
     DeviceProfile device = random_device(random, delay);
     device.jitter_s = device.period_s * test::uniform(random, 0.02, 0.6);
@@ -439,7 +439,7 @@ template <class Force>
         *need};
 }
 
-/// A force at a position that is predicted from 1 to 3 samples; with an encoder, from 1 or 2.
+/// Makes a force at a position predicted from 1 to 3 samples; with an encoder, from 1 or 2.
 [[nodiscard]] inline std::optional<Trial> draw_prediction(test::Random& random, double delay, bool encoder,
                                                           Shapes shapes = Shapes::Any) {
     Scheme scheme;

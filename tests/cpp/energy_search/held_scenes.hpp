@@ -31,12 +31,12 @@ struct ScriptedDevice {
     void close() noexcept {}
 };
 
-/// What happens to a force between structure and handle.
+/// Path of a force from structure to handle.
 struct Sent {
     Guards guards;
-    double force_step = 0.0;  ///< of the command; rounded to the nearest [N or N*m]
+    double force_step = 0.0;  ///< of the command, rounded to the nearest [N or N*m]
 
-    /// The force that acts after a start at rest at `first[0]` and ticks at the positions first[0] to first[count - 1].
+    /// Returns the force after a start at rest at `first[0]` and ticks at the positions first[0] to first[count - 1].
     template <class Structure>
     [[nodiscard]] double force(const Structure& structure, const double* first, int count) const {
         std::vector<double> read(first, first + count);
@@ -52,15 +52,16 @@ struct Sent {
     }
 };
 
-/// A grid on which the encoder reads the counts; `reading[i]` is what is read at node i.
+/// A grid of positions with the reading of the encoder at each node.
 struct ReadGrid {
     Grid grid;
     std::vector<double> reading;
-    std::vector<int> count;  ///< number of the reading
+    std::vector<int> count;  ///< index of the reading
     std::vector<double> of_count;
 };
 
-/// Equal steps, read exactly. The nodes of a turn must be a multiple of 2 reach + 1 unless all are in reach.
+/// Returns a grid of equal steps that are read exactly. The nodes of a turn must be a multiple of 2 reach + 1, unless
+/// all are in reach.
 [[nodiscard]] inline ReadGrid even_grid(double from, double step, int nodes, int reach,
                                         bool repeats = false) {
     ReadGrid result;
@@ -74,7 +75,8 @@ struct ReadGrid {
     return result;
 }
 
-/// Positions anywhere within the encoder's counts: both borders, where either count may be read, and `within` between.
+/// Returns positions within the encoder's counts: both borders, at which either count may be read, and `within`
+/// between.
 [[nodiscard]] inline ReadGrid encoder_grid(double from, double count_step, int counts, int within) {
     ReadGrid result;
     for (int c = 0; c < counts; ++c) {
@@ -90,7 +92,7 @@ struct ReadGrid {
     return result;
 }
 
-/// The table of a structure without a play, made by stepping it from rest through every window of positions.
+/// Returns the table of a structure without a play, by stepping it from rest through every window of positions.
 template <class Structure>
 [[nodiscard]] ForceTable table_of(const Structure& structure, const ReadGrid& read, int memory,
                                   const Sent& sent) {
@@ -104,7 +106,7 @@ template <class Structure>
         if (!windows.exists(w)) {
             continue;
         }
-        double turned = 0.0;  // positions that follow each other are within reach
+        double turned = 0.0;  // consecutive positions are within reach
         for (int k = 0; k <= memory; ++k) {
             const int moved = k == 0 ? 0 : w.node[k] - w.node[k - 1];
             if (read.grid.repeats()) {
@@ -120,7 +122,7 @@ template <class Structure>
     return table;
 }
 
-/// The table of a structure with a play of `radius` counts. The play rests on counts.
+/// Returns the table of a structure with a play of `radius` counts. The play rests on counts.
 template <class Structure>
 [[nodiscard]] ForceTable play_table_of(const Structure& structure, const ReadGrid& read, int radius,
                                        const Sent& sent) {
@@ -154,7 +156,7 @@ template <class Structure>
     return table;
 }
 
-/// S - S_min at the nodes: the integral of a static force over the positions from the first node to the last.
+/// Returns S - S_min at the nodes: the integral of a static force over the positions from the first node to the last.
 template <class Force>
 [[nodiscard]] std::vector<double> held_energy(const Grid& grid, const Force& at) {
     constexpr int parts = 64;
@@ -179,7 +181,7 @@ template <class Force>
     return energy;
 }
 
-/// A held force on a grid, with the cost of a device that has exactly what is needed.
+/// A held force on a grid, with the cost of a device that has exactly the need.
 struct HeldScene {
     ReadGrid read;
     ForceTable table;
@@ -194,7 +196,7 @@ struct HeldScene {
     }
 };
 
-/// The largest factor within [low, high] at which energy is taken out; 0 if there is none.
+/// Returns the largest factor within [low, high] at which energy is taken out; 0 if there is none.
 template <class Violated>
 [[nodiscard]] double largest_violating(const Violated& violated, double low, double high, double resolution) {
     if (!violated(low)) {

@@ -12,13 +12,13 @@
 
 namespace palpate::energy_search {
 
-/// What a certificate asks of the device.
+/// Damping and friction that a certificate requires of the device.
 struct Need {
     double damping = 0.0;   ///< b [N*s/m or N*m*s/rad]
     double friction = 0.0;  ///< f_c [N or N*m]
 };
 
-/// The least damping and friction that `certify` accepts. Nothing where it refuses whatever the device has.
+/// Returns the least damping and friction that `certify` accepts; nothing if it always refuses.
 template <class Certify>
 [[nodiscard]] std::optional<Need> certified_need(DeviceProfile device, const Certify& certify) {
     constexpr double any_damping = 1.2345e6;
@@ -40,7 +40,7 @@ template <class Certify>
     return need;
 }
 
-/// The same with a little less friction, where `certify` then knows another line that needs more damping.
+/// Returns the need with slightly less friction, if `certify` then has another line that needs more damping.
 template <class Certify>
 [[nodiscard]] std::optional<Need> need_at_less_friction(DeviceProfile device, const Need& need,
                                                         const Certify& certify) {
@@ -62,7 +62,7 @@ template <class Certify>
     return other;
 }
 
-/// A certified scene. `takes_energy` searches it on a device with the given multiples of what is needed.
+/// A certified scene. `takes_energy` searches it on a device with the given multiples of the need.
 struct Trial {
     std::function<bool(double damping, double friction)> takes_energy;
     Need need;
@@ -71,16 +71,16 @@ struct Trial {
 
 enum class Part { Damping, Friction };
 
-/// A line of the certificate and the scenes that try it.
+/// A line of the certificate and the scenes that test it.
 struct Line {
     std::string id;      ///< of the inequality
     std::string name;    ///< of the scenes
     double delay = 0.0;  ///< [samples]
     Part part = Part::Damping;
-    bool tight = false;  ///< some motion comes close to the bound in at least half of the scenes
+    bool tight = false;  ///< some motion is close to the bound in at least half of the scenes
     std::function<std::optional<Trial>(test::Random&)> draw;
 
-    /// True if energy is taken out with `factor` of what the line asks for and all of what the others ask for.
+    /// Returns true if energy is taken out with `factor` of the line's need and all of the other needs.
     [[nodiscard]] bool fails(const Trial& trial, double factor) const {
         constexpr double rounding = 1.0 + 1e-9;
         return part == Part::Damping ? trial.takes_energy(factor, rounding)

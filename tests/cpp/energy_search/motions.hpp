@@ -13,15 +13,15 @@
 
 namespace palpate::energy_search {
 
-/// A motion of the handle: from rest at `start` to `centre`, then a wave that repeats, either sample by sample or
-/// as a sum of sines.
+/// A motion of the handle: from rest at `start` to `centre`, then a repeated wave, sample by sample or as a sum of
+/// sines.
 struct Motion {
     double centre = 0.0;
     double size = 1.0;
-    double period = 2.0;  ///< [samples]; used by the sines
+    double period = 2.0;  ///< of the sines [samples]
     bool sines = false;
     std::vector<double> shape;   ///< samples of one period, or cosine and sine of each harmonic
-    std::vector<double> within;  ///< where within the encoder's count the handle is, from -1/2 to 1/2
+    std::vector<double> within;  ///< position within the encoder's count, from -1/2 to 1/2
 
     [[nodiscard]] double wave(std::size_t k) const noexcept {
         if (!sines) {
@@ -36,16 +36,16 @@ struct Motion {
     }
 };
 
-/// What a motion costs the hand besides the device's damping and friction.
+/// Energy that a motion costs the hand, without the damping and friction of the device.
 struct Account {
     double work = 0.0;    ///< sum of the mean force of a sample times d [J]
     double square = 0.0;  ///< sum d^2
     double length = 0.0;  ///< sum |d|
-    /// Sum tau (1 - tau) (change of the force within a sample)^2: an uneven path within the samples gains this over
-    /// 4 b / T.
+    /// Sum tau (1 - tau) (change of the force within a sample)^2. An uneven path within the samples gains this / (4
+    /// b / T).
     double spread = 0.0;
 
-    /// b / T below which the motion takes energy out of an object that held `held`.
+    /// Returns b / T below which the motion takes energy out of an object that stored `held`.
     [[nodiscard]] double damping(double held, double friction) const noexcept {
         if (!(square > 0.0)) {
             return 0.0;
@@ -54,17 +54,17 @@ struct Account {
         return 0.5 * (-paid + std::sqrt(paid * paid + square * spread)) / square;
     }
 
-    /// Energy taken out at a damping, over the length of the way.
+    /// Returns the energy taken out at a damping, divided by the length of the path.
     [[nodiscard]] double gain(double damping, double held, double friction) const noexcept {
         const double uneven = damping > 0.0 ? 0.25 * spread / damping : 0.0;
         return length > 0.0 ? (uneven - work - held - damping * square) / length - friction : 0.0;
     }
 };
 
-/// Where and how widely motions are tried.
+/// Range of the positions and sizes of the motions.
 struct Places {
-    double start = 0.0;  ///< at rest, where the object holds least
-    double held = 0.0;   ///< S_0 - S_min there [J]
+    double start = 0.0;  ///< at rest, at the least energy of the object
+    double held = 0.0;   ///< S_0 - S_min at the start [J]
     double low = 0.0;    ///< of the centres
     double high = 0.0;
     double finest = 0.0;  ///< of the sizes
@@ -74,15 +74,16 @@ struct Places {
     double late = 0.0;  ///< rest of the delay [samples]
 };
 
-/// Optimises motions of a structure. `Structure` must have `reset` and `step`; `limit` clips what is sent.
+/// Optimises motions of a structure. `Structure` must have `reset` and `step`; `limit` clips the force sent.
 template <class Structure>
 class MotionSearch {
   public:
     MotionSearch(Structure& structure, const Places& places, double limit)
         : structure_{structure}, places_{places}, limit_{limit} {}
 
-    /// Largest over motions and their lengths of `rate(account)`, e.g. the damping below which energy is taken out.
-    /// Half of the motions are optimised for that, which favours fast ones. The others are optimised for `gain`.
+    /// Returns the largest `rate(account)` over motions and their lengths, for example the damping below which energy
+    /// is taken out. Half of the motions are optimised for it, which favours fast ones; the others are optimised for
+    /// `gain`.
     template <class Rate, class Gain>
     [[nodiscard]] double most(test::Random& random, int starts, int steps, const Rate& rate,
                               const Gain& gain) {
@@ -111,7 +112,7 @@ class MotionSearch {
         return best;
     }
 
-    /// The largest over all lengths of one motion.
+    /// Largest values over all lengths of one motion.
     struct Found {
         double rate = 0.0;
         double gain = -std::numeric_limits<double>::infinity();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The damping that a held force needs, written from the proofs a second time: what the core certifies is compared
-// with it.
+// A second implementation of the damping that a held force needs, from the proofs. The tests compare the core's
+// certificates with it.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace palpate::energy_search {
 
-/// Need of a force with slopes in [-s, M] that is computed from x_k - q_k with |q| <= lambda |d|, over T.
+/// Returns the need, divided by T, of a force with slopes in [-s, M] computed at x_k - q_k with |q| <= lambda |d|.
 [[nodiscard]] inline double held_need(double M, double s, double lambda) {
     if (lambda * s <= (1.0 + lambda) * M) {
         return M * (0.5 + lambda);
@@ -23,9 +23,9 @@ namespace palpate::energy_search {
     return 0.5 * (M + M * M / (s - M) + lambda * lambda * (s - M));
 }
 
-/// Least a with h(rho) - l rho - g rho^2 <= a for all rho.
+/// Returns the least a with h(rho) - l rho - g rho^2 <= a for all rho.
 [[nodiscard]] inline double step_cost(double M, double s, double l, double g) {
-    // A quadratic c0 + c1 rho + c2 rho^2 on [low, high], either end possibly infinite.
+    // Maximum of the quadratic c0 + c1 rho + c2 rho^2 on [low, high]; either end may be infinite.
     const auto most = [](double c0, double c1, double c2, double low, double high) {
         const auto at = [&](double rho) { return c0 + (c1 + c2 * rho) * rho; };
         double best = -1e300;
@@ -47,7 +47,7 @@ namespace palpate::energy_search {
                      most(-0.5 * s, -s - l, -g, -infinite, -1.0)});
 }
 
-/// (W): least over l and g of step_cost + max over theta of l Re Q + g |Q|^2. `taps[j]` multiplies z^-(j+1).
+/// Returns (W): least over l and g of step_cost + max over theta of l Re Q + g |Q|^2. `taps[j]` multiplies z^-(j+1).
 [[nodiscard]] inline double filtered_need(double M, double s, const std::vector<double>& taps) {
     if (std::max(M, s) <= 0.0) {
         return 0.0;
@@ -108,10 +108,10 @@ namespace palpate::energy_search {
             step_g *= 0.5;
         }
     }
-    return best * (1.0 + 1e-4);  // between the angles
+    return best * (1.0 + 1e-4);  // for the angles between
 }
 
-/// Need at a delay of n + late samples.
+/// Returns the need at a delay of n + late samples.
 [[nodiscard]] inline double late_need(double M, double s, int n, double late) {
     if (std::max(M, s) <= 0.0) {
         return 0.0;
@@ -161,7 +161,7 @@ namespace palpate::energy_search {
     return std::min(best, least);
 }
 
-/// q of n whole samples of delay and of a prediction from m taps (0: none).
+/// Returns q of n whole samples of delay and of a prediction from m taps (0: no prediction).
 [[nodiscard]] inline std::vector<double> taps_of(int n, int m) {
     std::vector<double> taps(static_cast<std::size_t>(n + m), 0.0);
     for (int j = 1; j <= n; ++j) {

@@ -10,20 +10,20 @@
 
 namespace palpate::energy_search {
 
-/// The positions between which the handle moves. From node i it can reach the nodes i - reach to i + reach.
+/// Positions between which the handle moves. From node i it reaches the nodes i - reach to i + reach.
 struct Grid {
-    std::vector<double> position;  ///< not falling [m or rad]
+    std::vector<double> position;  ///< never decreasing [m or rad]
     int reach = 0;                 ///< longest move [nodes]
-    double turn = 0.0;             ///< length of one turn; 0 = the positions do not repeat [m or rad]
+    double turn = 0.0;             ///< length of one turn; 0 without repetition [m or rad]
 
     [[nodiscard]] int nodes() const noexcept { return static_cast<int>(position.size()); }
     [[nodiscard]] bool repeats() const noexcept { return turn > 0.0; }
-    /// Number of values of one remembered position: its index, or its index modulo 2 reach + 1.
+    /// Returns the number of values of one stored position: its index, or its index modulo 2 reach + 1.
     [[nodiscard]] int residues() const noexcept { return std::min(nodes(), 2 * reach + 1); }
 };
 
 /// Windows of `older` + 1 positions, newest first, numbered 0, 1, ... The newest is stored as its node, each older one
-/// as its residue, which the position after it makes unique.
+/// as its residue, which is unique given the next position.
 class Windows {
   public:
     struct Nodes {
@@ -60,12 +60,12 @@ class Windows {
         return result;
     }
 
-    /// False for a window that leaves the grid.
+    /// Returns false for a window that leaves the grid.
     [[nodiscard]] bool exists(const Nodes& w) const noexcept {
         return std::all_of(w.node, w.node + older_ + 1, [&](int node) { return node >= 0 && node < nodes_; });
     }
 
-    /// The number of the window that starts at place `first` of another one.
+    /// Returns the number of the window that starts at place `first` of another one.
     [[nodiscard]] std::size_t number(const Nodes& w, int first) const noexcept {
         auto window = static_cast<std::size_t>(w.node[first]);
         for (int k = 1; k <= older_; ++k) {
@@ -92,7 +92,7 @@ class Windows {
     }
 
   private:
-    /// The node within reach of `near` that has this residue.
+    /// Returns the node within reach of `near` that has this residue.
     [[nodiscard]] int resolved(int residue, int near) const noexcept {
         int offset = (residue - near) % residues_;
         offset = offset < 0 ? offset + residues_ : offset;
@@ -109,13 +109,13 @@ class Windows {
     std::size_t stride_ = 1;
 };
 
-/// The force that a structure computes from the last positions it read, as a table over the nodes. `of` has one
-/// value for each play state and each window (i_0, r_1, ..., r_memory), with i_0 the newest.
+/// Force that a structure computes from the last readings, as a table over the nodes. `of` has one value for each play
+/// state and each window (i_0, r_1, ..., r_memory), with i_0 the newest.
 struct ForceTable {
-    int memory = 0;              ///< positions before the newest that the force depends on
+    int memory = 0;              ///< number of older positions in the force
     int plays = 1;               ///< number of play states
     std::vector<double> of;      ///< [N or N*m]
-    std::vector<int> next_play;  ///< play state after node i was read: [play * nodes + i]
+    std::vector<int> next_play;  ///< play state after reading node i: [play * nodes + i]
     std::vector<int> rest_play;  ///< play state of a start at rest at node i
 
     [[nodiscard]] int play_after(int play, int node, int nodes) const noexcept {
@@ -123,15 +123,16 @@ struct ForceTable {
     }
 };
 
-/// What the hand pays for besides the force.
+/// Costs of the hand in addition to the force.
 struct Cost {
     double damping = 0.0;   ///< b / T [N/m or N*m/rad]
     double friction = 0.0;  ///< f_c [N or N*m]
     int delay = 0;          ///< n, whole samples
-    double late = 0.0;      ///< tau, the further part of a sample during which the last command still acts
+    double late = 0.0;      ///< tau, part of a sample in which the last command still acts
 
-    /// Least energy that the hand pays for a move d while the force changes from `old` to `now` after tau T.
-    /// Within each part the path is straight: an uneven one costs more. The first part stays within [down, up].
+    /// Returns the least energy that the hand pays for a move d while the force changes from `old` to `now` after tau
+    /// T. Within each part the path is straight, because an uneven one costs more. The first part stays within [down,
+    /// up].
     [[nodiscard]] double of_move(double d, double old, double now, double down, double up) const noexcept {
         if (late == 0.0) {
             return now * d + damping * d * d + friction * std::abs(d);
@@ -152,33 +153,33 @@ struct Cost {
     }
 };
 
-/// A device whose samples are taken at k period + u_k, u_k either 0 or jitter, and whose commands act `delay` after
-/// their own samples. Each position of its grid has two nodes in a row, one for each u.
+/// A device with samples at k period + u_k, u_k either 0 or jitter, and commands that act `delay` after their samples.
+/// Each position of its grid has two consecutive nodes, one for each u.
 struct Clock {
     double period = 1.0;   ///< [s]
     double jitter = 0.0;   ///< below the period [s]
     double delay = 0.0;    ///< [s]
     double damping = 0.0;  ///< b [N*s/m or N*m*s/rad]
 
-    /// Number of samples before the present one whose commands can still act.
+    /// Returns the number of earlier samples whose commands can still act.
     [[nodiscard]] int older() const noexcept {
         return std::max(1, static_cast<int>(std::ceil((delay + jitter) / period)));
     }
 };
 
-/// The most energy that a motion takes out, found by value iteration.
+/// Largest energy that a motion takes out, found by value iteration.
 struct Finding {
-    double taken = 0.0;      ///< largest of -E - (S_0 - S_min) over the starts at rest [J]
-    bool cycle = false;      ///< some motion takes energy out again and again
+    double taken = 0.0;      ///< largest -E - (S_0 - S_min) over starts at rest [J]
+    bool cycle = false;      ///< some motion takes out energy repeatedly
     bool converged = false;  ///< no motion on the grid takes more
-    double scale = 0.0;      ///< largest force times the way from end to end [J]
+    double scale = 0.0;      ///< largest force times the range of the grid [J]
 
     [[nodiscard]] bool violated() const noexcept { return cycle || taken > 1e-6 * scale; }
 };
 
-/// Shortest paths over all motions between the nodes. The state is the window of positions that the force still
-/// depends on; J(state) is the least energy that the hand pays from there on, for any number of samples. It falls
-/// without end where a motion can be repeated and takes energy out each time.
+/// Finds the best motions between the nodes as shortest paths. The state is the window of positions on which the force
+/// still depends. J(state) is the least energy that the hand pays from there, for any number of samples. It decreases
+/// without end if a motion can be repeated and takes energy out each time.
 class ValueIteration {
   public:
     ValueIteration(const Grid& grid, const ForceTable& table, const Cost& cost)
@@ -194,7 +195,7 @@ class ValueIteration {
         fill();
     }
 
-    /// The same with a clock: the table is that of a static force.
+    /// Makes the search with a clock; the table is that of a static force.
     ValueIteration(const Grid& grid, const ForceTable& table, const Clock& clock)
         : grid_{grid},
           table_{&table},
@@ -208,7 +209,7 @@ class ValueIteration {
         fill(clock);
     }
 
-    /// `held[i]` is S_0 - S_min at node i, at rest. Stops at the first motion that takes energy out.
+    /// Searches until the first motion takes energy out. `held[i]` is S_0 - S_min at node i, at rest.
     [[nodiscard]] Finding run(const std::vector<double>& held, int sweeps = 2000) {
         Finding finding;
         finding.scale =
@@ -228,15 +229,16 @@ class ValueIteration {
         return finding;
     }
 
-    /// Goes on with another force, kept from the first sample until the motion goes over to what was searched before.
+    /// Continues with another force, which acts from the first sample until the motion changes to the one searched
+    /// before.
     void precede(const ForceTable& table) {
         table_ = before_ = &table;
         std::fill(policy_.begin(), policy_.end(), none);
         fill();
     }
 
-    /// One sample before everything that was searched before. Its own command is of `table`, one that still acts from
-    /// the sample before is of `before`.
+    /// Adds one sample before all that was searched before. Its command is from `table`, a command that still acts from
+    /// the sample before is from `before`.
     void precede_once(const ForceTable& table, const ForceTable& before) {
         table_ = &table;
         before_ = &before;
@@ -251,7 +253,7 @@ class ValueIteration {
         }
     }
 
-    /// The most that is taken out by motions that start at rest.
+    /// Returns the largest energy taken out by motions that start at rest.
     [[nodiscard]] Finding found(const std::vector<double>& held) const {
         Finding finding;
         finding.scale =
@@ -267,7 +269,7 @@ class ValueIteration {
     void fill() {
         const bool late = cost_.late > 0.0;
         const int newest =
-            cost_.delay + (late ? 1 : 0);  // place of the position that the play state belongs to
+            cost_.delay + (late ? 1 : 0);  // index of the position to which the play state belongs
         const Windows read{grid_, table_->memory};
         now_.assign(value_.size(), 0.0);
         old_.assign(late ? value_.size() : 0, 0.0);
@@ -283,7 +285,7 @@ class ValueIteration {
                 const std::size_t state = window * plays_ + play;
                 const double force = table_->of[play * read.count() + read.number(w, newest)];
                 if (!std::isfinite(force)) {
-                    continue;  // a play state that the position cannot have
+                    continue;  // a play state that is impossible at the position
                 }
                 const int before = static_cast<int>(play);
                 const int later =
@@ -309,11 +311,11 @@ class ValueIteration {
         }
     }
 
-    /// What a sample from each state to each of both u costs.
+    /// Cost of a sample from each state to each of both u.
     struct Sample {
         double force = 0.0;    ///< mean over the sample
         double damping = 0.0;  ///< b over its length
-        double uneven = 0.0;   ///< gained by an uneven path while the force changes [J]
+        double uneven = 0.0;   ///< gain of an uneven path while the force changes [J]
     };
 
     void fill(const Clock& clock) {
@@ -356,7 +358,7 @@ class ValueIteration {
     [[nodiscard]] bool can_move(int from, int jump) const noexcept {
         return grid_.repeats() || (from + jump >= 0 && from + jump < nodes_);
     }
-    /// The way from a node to both ends of the grid.
+    /// Return the distances from a node to both ends of the grid.
     [[nodiscard]] double down(int from) const noexcept {
         return grid_.repeats() ? -HUGE_VAL
                                : grid_.position.front() - grid_.position[static_cast<std::size_t>(from)];
@@ -406,7 +408,7 @@ class ValueIteration {
                              up(place(state)));
     }
 
-    /// Improves every state once; the largest improvement.
+    /// Improves every state once; returns the largest improvement.
     [[nodiscard]] double sweep_once(bool upward, double least_gain) {
         double most = 0.0;
         const std::size_t states = value_.size();
@@ -444,7 +446,7 @@ class ValueIteration {
         return most;
     }
 
-    /// True if following the best moves from some state leads round a cycle that takes energy out.
+    /// Returns true if the best moves from some state lead around a cycle that takes energy out.
     [[nodiscard]] bool a_cycle_pays(double least) const {
         std::vector<std::uint32_t> seen(value_.size(), 0);
         std::uint32_t walk = 0;
@@ -483,7 +485,7 @@ class ValueIteration {
 
     const Grid& grid_;
     const ForceTable* table_;
-    const ForceTable* before_;  ///< of the command before
+    const ForceTable* before_;  ///< of the previous command
     Cost cost_;
     Windows windows_;
     int nodes_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The energy account with all guards: a handle whose true motion is prescribed keeps an account of its own, from the
-// force that acts, its true way, and what damping and friction take of it.
+// The energy account with all guards. A handle with a prescribed motion computes an independent account from the acting
+// force, its true motion, and the losses by damping and friction.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,7 +27,7 @@
 namespace palpate {
 namespace {
 
-/// Device whose handle goes where a test tells it to, evenly within each tick.
+/// A device whose handle follows positions given by the test, at constant speed within each tick.
 class GuidedHandle {
   public:
     GuidedHandle(DeviceProfile device, double start) : device_{std::move(device)}, at_{start}, to_{start} {}
@@ -58,7 +58,7 @@ class GuidedHandle {
                 Status::Ok};
     }
 
-    /// What the hand put in so far, and the least of it [J]
+    /// Return the energy that the hand put in, and its least value so far [J].
     [[nodiscard]] double energy() const noexcept { return motor_ + loss_; }
     [[nodiscard]] double least() const noexcept { return least_; }
     [[nodiscard]] double motor() const noexcept { return motor_; }
@@ -86,7 +86,7 @@ Scheme direct() {
     return scheme;
 }
 
-/// The bench knob of the package.
+/// Returns the bench knob of the package.
 DeviceProfile bench_knob() {
     DeviceProfile device;
     device.id = "bench-knob";
@@ -95,7 +95,7 @@ DeviceProfile bench_knob() {
     return device;
 }
 
-/// The knob of the README, as `palpate demo` and `palpate identify` make it.
+/// Returns the knob of the README, as `palpate demo` and `palpate identify` make it.
 ForceModel readme_knob() {
     NetworkParameters network;
     network.alpha = {14.065144146110542, 4.162057332442819, 5.888611543700749, 36.06654311080214,
@@ -110,7 +110,7 @@ ForceModel readme_knob() {
             {{-0.19999274522059046}, {0.46901462589603476}, Continuation::Linear, Continuation::Linear, {}}};
 }
 
-/// The guards of a run with a certificate, or without.
+/// Returns the guards of a run with a certificate, or without one.
 Guards certified_guards(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
                         bool certified = true) {
     GuardSettings settings;
@@ -181,7 +181,7 @@ TEST(GuardedAccount, SlowPressesOfTheReadmeKnobNeverDrainTheTankNorGiveEnergy) {
     EXPECT_GE(run.least, -held);
 }
 
-// A reading that flickers between two counts books L Delta^2 a cycle of the read motion, and nothing happens.
+// A reading that flickers between two counts adds L Delta^2 for a cycle of the read motion, and the tank does not act.
 TEST(GuardedAccount, AFlickeringCountDoesNotDrainTheTank) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
@@ -201,7 +201,7 @@ TEST(GuardedAccount, AFlickeringCountDoesNotDrainTheTank) {
     EXPECT_NEAR(controller.guards().observer.energy(), handle.motor(), 1e-4);
 }
 
-/// A motion that tries to drain the tank: from sample to sample.
+/// Motions from sample to sample that try to drain the tank.
 class Motions {
   public:
     Motions(test::Random& random, const test::Scene& scene)
@@ -225,7 +225,7 @@ class Motions {
                 return centre_ + reach_ * std::cos(angle_ * tick);
             case 3:
                 return centre_ + reach_ * test::uniform(random, -1.0, 1.0);
-            case 4:  // to and fro at an even speed
+            case 4:  // back and forth at constant speed
                 return centre_ + reach_ * (2.0 * std::abs(std::remainder(angle_ * tick, 2.0)) - 1.0);
             default:
                 walked_ = std::clamp(walked_ + 0.3 * reach_ * test::uniform(random, -1.0, 1.0), -1.0, 1.0);
@@ -240,7 +240,7 @@ class Motions {
     double walked_ = 0.0;
 };
 
-// On devices with exactly the damping and friction that a certificate asks for, in any motion.
+// Tests any motion on devices with exactly the damping and friction that a certificate requires.
 TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
     test::Random random{31};
     double most = 0.0;
@@ -249,7 +249,7 @@ TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
         test::Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
         scene.device.force_limit = std::exp(test::uniform(random, -2.0, 3.0));
         if (!certify(scene.model, scene.scheme, scene.device).certified()) {
-            continue;  // where the limit is not inside the proof
+            continue;  // the proof does not include the limit here
         }
         ++scenes[std::string(name_of(scene.scheme.structure))];
         Motions motion{random, scene};
@@ -270,14 +270,15 @@ TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
                            most = std::max(most, tank.most_given() / tank.stored().most());
                        });
     }
-    EXPECT_GT(most, 0.3);  // the bound of what is stored is not far from what is given
+    EXPECT_GT(most, 0.3);  // the bound of the stored energy is close to the energy given
     EXPECT_GE(scenes.size(), 2U);
     for (const auto& [structure, count] : scenes) {
         RecordProperty(structure, count);
     }
 }
 
-// A spring of exactly 2 b / T, moved to and fro at every sample, gives exactly what the damping takes.
+// A spring of exactly 2 b / T, moved back and forth at every sample, gives exactly the energy that the damping
+// dissipates.
 TEST(GuardedAccount, RubbingASpringAtItsBoundNeedsFullCredit) {
     DeviceProfile device;
     device.encoder_step = 0.0;
@@ -302,7 +303,7 @@ TEST(GuardedAccount, RubbingASpringAtItsBoundNeedsFullCredit) {
     EXPECT_GT(drained(false), 1000U);
 }
 
-// A hand may press an object farther than it was measured; what it stores there comes back.
+// A hand may press an object further than it was measured; the energy stored there is returned.
 TEST(GuardedAccount, PressesBeyondTheDomainDoNotDrainTheTank) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
@@ -320,7 +321,7 @@ TEST(GuardedAccount, PressesBeyondTheDomainDoNotDrainTheTank) {
     EXPECT_NEAR(stored.most() - stored.within(), 5.0 * (0.8 - model.domain().upper[0]), 0.01);
 }
 
-/// A wheel with one peak of 8 N*m and a pull all round that balances the peak clipped at 5 N*m.
+/// A wheel with one peak of 8 N*m and a constant that balances the peak clipped at 5 N*m.
 struct Wheel {
     using State = Stateless;
     double pull = 0.0;
@@ -351,7 +352,8 @@ Wheel balanced_wheel(double limit) {
     return {low};
 }
 
-// Softening scales a force that is balanced with its limit. Scaled before the limit, it would drive the wheel.
+// Softening scales a force that is balanced with its limit. If it were scaled before the limit, it would drive the
+// wheel.
 TEST(GuardedAccount, ASoftenedWheelWithAForceLimitIsNoMotor) {
     DeviceProfile device;
     device.encoder_step = device.viscous_damping = 0.0;
@@ -392,8 +394,8 @@ TEST(GuardedAccount, ALimitedForceIsScaledAfterItsLimit) {
     }
 }
 
-// While the forces come up a handle can be moved in against little and pushed out with more. The account of what the
-// rendering gives begins after that, and what was given before is told by itself.
+// While the forces increase, a handle can be moved in against a small force and pushed out with a larger one. The
+// account of the given energy starts after that, and the energy given before is stated separately.
 TEST(GuardedAccount, WhatARampGivesIsBookedByItself) {
     constexpr double stiffness = 20.0;
     constexpr double reach = 0.1;
@@ -419,7 +421,7 @@ TEST(GuardedAccount, WhatARampGivesIsBookedByItself) {
         const double in_ramp = -controller.guards().at_start.least();
         const double after = -controller.guards().observer.least();
         EXPECT_LT(in_ramp, stored);
-        EXPECT_LT(after, 1.2 * stored);  // without damping each sample of the way out gives K d^2 / 2 more
+        EXPECT_LT(after, 1.2 * stored);  // without damping each sample on the way out adds K d^2 / 2
         EXPECT_NEAR(-controller.guards().observer.energy(), after_ramp - handle.energy(), 1e-12);
         if (during) {
             EXPECT_GT(in_ramp, 0.5 * stored);
@@ -432,7 +434,7 @@ TEST(GuardedAccount, WhatARampGivesIsBookedByItself) {
     }
 }
 
-/// int c(f) over the domain from its least to its largest, by a fine sum, and what is stored by bending.
+/// Returns int c(f) over the domain from its least to its largest, by a fine sum, and the energy stored by bending.
 double stored_span(const ForceModel& model, double limit) {
     constexpr int cells = 200'000;
     const double lower = model.domain().lower[0];
@@ -481,7 +483,8 @@ TEST(MostEnergy, IsABoundOfTheEnergyOfTheClippedForce) {
     RecordProperty("largest over the sum", std::to_string(worst));
 }
 
-// The energy of a clipped force can span more than that of the force: what a peak gave back is cut off.
+// The energy of a clipped force can have a larger range than that of the force, because the energy of a peak is cut
+// off.
 TEST(MostEnergy, CanBeLargerThanThatOfTheForce) {
     NetworkParameters network;
     network.alpha = {6.0};

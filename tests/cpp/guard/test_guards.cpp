@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each guard does when something is wrong, and that it does nothing when nothing is.
+// Tests that each guard acts on a fault, and does not act without one.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -65,7 +65,7 @@ Scheme direct() {
     return scheme;
 }
 
-// The scene of spec section 6 as it stands, quantised and without friction: the guards cost nothing.
+// The scene of spec section 6, quantised and without friction: the guards do not change the force.
 TEST(Guards, TouchNoForceOfTheComparisonScene) {
     const test::ClickAndWall object;
     double held = 0.0;
@@ -132,7 +132,7 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
             settings.energy_tank = tank;
             const Guarded run = render(model, device, guards_of(settings, model, direct(), period),
                                        PassiveHand{15.0, 0.0, 0.0, 0.1}, 5000, 0.02);
-            // What the motor gave and the device's damping did not take back out of nine tenths of it.
+            // Energy that the motor gave, minus nine tenths of the losses of the device.
             return -(run.energy.motor + 0.9 * run.energy.loss);
         };
         EXPECT_LT(lost(true), 1.3 * held) << stiffness << " delay " << device.late_samples();
@@ -143,7 +143,7 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
 TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
     EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, 0.0, period}};
     double force = -2.0;
-    tank.book(-1.0, 1.0);  // what the object holds; the reserve of 0.25 is left
+    tank.book(-1.0, 1.0);  // the energy of the object; the reserve of 0.25 remains
     EXPECT_EQ(tank.apply(force), Status::Ok);
     tank.book(-0.15, 1.0);
     EXPECT_EQ(tank.apply(force), Status::Drained);
@@ -152,7 +152,7 @@ TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
     force = 2.0;
     EXPECT_EQ(tank.apply(force), Status::Drained);
     EXPECT_NEAR(force, 0.0, 1e-12);
-    tank.book(3.0, 1.0);  // no fuller than full
+    tank.book(3.0, 1.0);  // never more than full
     EXPECT_NEAR(tank.given(), 0.0, 1e-12);
     EXPECT_NEAR(tank.most_given(), 1.25, 1e-12);
 }
@@ -178,7 +178,7 @@ TEST(StoredEnergy, GrowsWithWhereItHasBeen) {
     stored.visit(-0.3, -0.2);
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3 + 0.5 * 0.02 * 660.0 * 660.0, 1e-6);
     stored = StoredEnergy{{.within = 1.0, .force_limit = 5.0, .stiffness = 50.0}};
-    stored.visit(0.0, 0.4);  // stretched by 0.3 more than the limit stretches it
+    stored.visit(0.0, 0.4);  // stretched by 0.3 more than at the limit
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3, 1e-12);
 }
 
@@ -230,7 +230,7 @@ TEST(EnergyTank, IsSizedByTheModelAndItsCoupling) {
     EXPECT_TRUE(std::isinf(most_energy(motor, direct(), 5.0)));
 }
 
-// The account of the observer is the account of the simulation, where the encoder has no steps.
+// The account of the observer equals that of the simulation if the encoder is without steps.
 TEST(PassivityObserver, SeesWhatTheMotorTook) {
     DeviceProfile device;
     device.encoder_step = 0.0;
@@ -278,7 +278,7 @@ TEST(LimitCycleDetector, LeavesAloneWhatIsNoBuzz) {
     Watched faint;
     faint.shake(100.0, 1e-4, 0.0, 4000);
     EXPECT_EQ(faint.detector.buzzes(), 0U);
-    Watched turning;  // detents pass by fast, but the knob never turns round
+    Watched turning;  // detents pass fast, but the knob never reverses
     turning.shake(100.0, 2e-3, 0.0, 4000, 2e-3);
     EXPECT_EQ(turning.detector.buzzes(), 0U);
 }

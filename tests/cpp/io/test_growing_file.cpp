@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording is locked while it grows and never replaces another file.
+// Tests that a recording is locked while it grows and never replaces another file.
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The corpus of tests/models.
+// Tests with the corpus of tests/models.
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -19,7 +19,7 @@ Json listed(const std::string& list) {
     return Json::parse(file);
 }
 
-/// The bytes of a text of which each character is one.
+/// Returns the bytes of a text in which each character represents one byte.
 std::string bytes(const std::string& text) {
     std::string result;
     for (std::size_t k = 0; k < text.size(); ++k) {
@@ -33,7 +33,7 @@ std::string bytes(const std::string& text) {
     return result;
 }
 
-/// The bad file of an entry.
+/// Returns the bad file of an entry.
 std::string text_of(const Json& entry) {
     if (entry.contains("text")) {
         return entry["text"];

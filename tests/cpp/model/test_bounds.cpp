@@ -23,7 +23,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// Huge weights that cancel: pairs of nearly coincident wavelets.
+/// Makes pairs of almost equal wavelets with large weights that cancel.
 void cancel(NetworkParameters& network, Random& random) {
     const std::size_t d = network.dimension;
     for (std::size_t i = 0; i + 1 < network.weight.size(); i += 2) {
@@ -36,7 +36,7 @@ void cancel(NetworkParameters& network, Random& random) {
     }
 }
 
-/// Random networks, every third of them with weights that cancel.
+/// Returns random networks, every third of them with weights that cancel.
 NetworkParameters difficult_network(Random& random, int kind) {
     NetworkParameters network = test::random_network(random, static_cast<std::size_t>(2 * (1 + kind % 32)));
     if (kind % 3 == 0) {
@@ -100,7 +100,7 @@ TEST(Bounds, SeeANarrowWaveletBetweenTheFirstCells) {
     EXPECT_GE(slope_bounds(spike, 0.0, 1.0).upper, 1.38e5);
 }
 
-// Two wavelets apart by a millionth of their width, weights of a million: the sum is of the size of one.
+// Two wavelets with a distance of a millionth of their width and weights of a million: the sum has the size of one.
 TEST(Bounds, AreTightWhereHugeWeightsCancel) {
     Random random{33};
     for (int k = 0; k < cases(20); ++k) {
@@ -129,7 +129,7 @@ Domain unit_box(std::size_t dimension) {
             Continuation::Linear, std::nullopt};
 }
 
-// Along a direction psi is a sum of two Hermite functions; at every distance all angles to it are tried.
+// Along a direction psi is a sum of two Hermite functions. All angles to it are tested at every distance.
 TEST(RadialBounds, RestOnBoundsOfHigherDerivatives) {
     for (std::size_t d = 1; d <= 5; ++d) {
         const double others = static_cast<double>(d) - 1.0;
@@ -156,7 +156,7 @@ TEST(RadialBounds, RestOnBoundsOfHigherDerivatives) {
     }
 }
 
-/// D^4 psi(t, t, t, t) of a wavelet at u, of |t|^4.
+/// Returns D^4 psi(t, t, t, t) of a wavelet at u, divided by |t|^4.
 double fourth_derivative(std::span<const double> u, std::span<const double> t) {
     double square = 0.0;
     double along = 0.0;
@@ -236,7 +236,8 @@ TEST(RadialBounds, AreTightWhereHugeWeightsCancel) {
     }
 }
 
-// Every instruction set that this machine has; in small boxes the rest is so small that each derivative is seen.
+// Every instruction set of this machine. In small boxes the remainder is small, so errors of each derivative are
+// visible.
 TEST(RadialBounds, TaylorsFormulaLeavesNoMoreThanItsRest) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{36};
@@ -289,7 +290,7 @@ TEST(RadialBounds, TaylorsFormulaLeavesNoMoreThanItsRest) {
     }
 }
 
-// Where every term of Taylor's formula may have its full size.
+// Boxes in which every term of Taylor's formula can have its full size.
 TEST(RadialBounds, HoldAtTheCornersOfAnyBox) {
     Random random{37};
     for (int k = 0; k < cases(500); ++k) {

@@ -16,7 +16,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// f^(n) in extended precision: psi^(n) = (-1)^n He_{n+2} E.
+/// Returns f^(n) in extended precision: psi^(n) = (-1)^n He_{n+2} E.
 long double exact(const NetworkParameters& network, double x, int order) {
     const long double c = network.linear[0];
     long double sum = order == 0 ? c * x + network.bias : order == 1 ? c : 0.0L;
@@ -67,7 +67,7 @@ TEST(DerivativeBounds, AreReachedAtTheCentreOfAWavelet) {
 }
 
 TEST(PiecewiseSeptic, IsExactForPolynomialsOfDegreeSeven) {
-    // x^7 + x^4 - x on cells of width 1/2, where the highest powers count.
+    // x^7 + x^4 - x on cells of width 1/2, in which the highest powers matter.
     const auto jet = [](double x) noexcept {
         return Jet{std::pow(x, 7) + std::pow(x, 4) - x, 7.0 * std::pow(x, 6) + 4.0 * std::pow(x, 3) - 1.0,
                    42.0 * std::pow(x, 5) + 12.0 * x * x, 210.0 * std::pow(x, 4) + 24.0 * x};
@@ -128,7 +128,7 @@ TEST(CompiledCurve, AsksForMoreCellsWhenMoreIsAsked) {
     EXPECT_GT(before, CompiledCurve(network.curve(), {1e-4}).cells());
 }
 
-// What cannot be certified is not compiled, and is then the network itself, bit by bit.
+// A curve that cannot be certified is not compiled; it returns the values of the network exactly.
 TEST(CompiledCurve, DoesNotPretend) {
     Random random{44};
     NetworkParameters cancelling = test::random_network(random, 8);
@@ -197,7 +197,7 @@ TEST(CompiledCurve, RepeatsAsTheNetworkDoes) {
         EXPECT_NEAR(curve.at(x).value, network.curve().at(x).value, 2e-12 * (1.0 + std::abs(x))) << x;
         EXPECT_NEAR(curve.at(x).integral, network.curve().at(x).integral, 1e-11) << x;
     }
-    // So far away that a position no longer knows its place in the period, the force is still one of f's.
+    // At distant positions the place in the period is lost to rounding; the force is still a value of f.
     const Interval bounds = network.curve().value_bounds();
     for (int k = 0; k < cases(2000); ++k) {
         const double x = uniform(random, -1.0, 1.0) * std::pow(10.0, uniform(random, 10.0, 300.0));

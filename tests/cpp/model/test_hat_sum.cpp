@@ -17,7 +17,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// The sums term by term with the library's exponential, and how large their terms are.
+/// The sums term by term with the library's exponential, and the sums of the absolute terms.
 struct Plain {
     Curve sum;
     Curve absolute;
@@ -37,7 +37,7 @@ Plain plain(const NetworkParameters& network, double x) {
         add(&Curve::slope, weight * alpha * psi.slope);
         add(&Curve::integral, weight / alpha * psi.integral);
         add(&Curve::double_integral, weight / alpha / alpha * psi.double_integral);
-        // Rounding of u moves a term even where it is zero.
+        // Rounding of u changes a term even if it is zero.
         result.absolute.value += std::abs(weight) * std::abs(psi.integral);
         result.absolute.slope += std::abs(weight) * alpha * psi.double_integral;
         result.absolute.integral += 1e-290;
@@ -46,7 +46,7 @@ Plain plain(const NetworkParameters& network, double x) {
     return result;
 }
 
-/// Positions from everywhere: inside, at the centres, far away, tiny, huge.
+/// Returns positions of all kinds: inside, at the centres, distant, tiny, huge.
 double position(Random& random, int k) {
     switch (k % 6) {
         case 0:
@@ -58,7 +58,7 @@ double position(Random& random, int k) {
     }
 }
 
-// Every instruction set that this machine has.
+// Every instruction set of this machine.
 TEST(HatSum, IsRightToThirteenDigitsOnEveryInstructionSet) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{71};
@@ -69,7 +69,7 @@ TEST(HatSum, IsRightToThirteenDigitsOnEveryInstructionSet) {
             const Plain expected = plain(network, x);
             Curve sum;
             hats.add(x, sum);
-            // The slope's terms are sums of products that may cancel: an error in u^2 counts u^2 times.
+            // The terms of the slope are sums of products that may cancel: an error in u^2 is multiplied by u^2.
             for (const auto member :
                  {&Curve::value, &Curve::slope, &Curve::integral, &Curve::double_integral}) {
                 ASSERT_NEAR(sum.*member, expected.sum.*member, 1e-13 * (expected.absolute.*member) + 1e-280)
@@ -90,7 +90,7 @@ TEST(HatSum, GivesTheSameInBatches) {
                 x[j] = position(random, static_cast<int>(j));
             }
             for (const auto quantity : {HatQuantity::Value, HatQuantity::Slope, HatQuantity::Integral}) {
-                std::vector<double> sums(x.size() + 1, 1.0);  // one more: nothing is written past the end
+                std::vector<double> sums(x.size() + 1, 1.0);  // one more element detects writes past the end
                 hats.add(quantity, x, std::span{sums}.first(x.size()));
                 EXPECT_EQ(sums.back(), 1.0);
                 for (std::size_t j = 0; j < x.size(); ++j) {

@@ -15,8 +15,8 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// A random g with an h >= 0: positive bumps are not available from a Mexican hat alone, so h is a constant
-/// larger than anything its wavelets take away.
+/// Returns a random g with an h >= 0. Mexican hats alone are not positive, so h includes a constant that is larger than
+/// the negative parts of its wavelets.
 HysteresisNetwork random_hysteresis(Random& random) {
     const std::size_t size = 1 + static_cast<std::size_t>(uniform(random, 0.0, 6.0));
     const NetworkParameters network = test::random_network(random, size);
@@ -34,8 +34,8 @@ HysteresisNetwork random_hysteresis(Random& random) {
     return {network, loss, test::unit_domain(side(), side()), std::exp(uniform(random, -6.0, -1.0))};
 }
 
-/// Work done on the object over a straight move, split where the play operator starts to slide and at the
-/// edges of the domain so that the midpoint rule sees smooth pieces.
+/// Returns the work done on the object over a straight move. The move is split where the play operator starts to slide
+/// and at the edges of the domain, so that the midpoint rule is applied to smooth pieces.
 double work(const HysteresisNetwork& object, HysteresisNetwork::State& state, double from, double to) {
     constexpr int pieces = 400;
     double sum = 0.0;
@@ -126,7 +126,7 @@ TEST(Hysteresis, SlopeBelongsToTheForceInStickAndSlide) {
 }
 
 TEST(Hysteresis, LossDiesOutWithTheForceWhereContactIsLost) {
-    // g(0) = 0.1 falls with max|g| / travel = 2.1 and is zero at -1/21; h goes with it.
+    // g(0) = 0.1 falls with max|g| / travel = 2.1 and is zero at -1/21; h decreases with it.
     const HysteresisNetwork object{
         {1, {}, {}, {}, {2.0}, 0.1}, {{}, 0.0, 0.05}, test::unit_domain(Continuation::Free), 0.01};
     EXPECT_NEAR(object.loss().at(-0.5 / 21.0).value, 0.025, 1e-12);

@@ -67,7 +67,7 @@ TEST(RadialNetwork, OfOneInputIsTheWaveletNetwork) {
     }
 }
 
-/// Eq. 4 and its gradient, term by term with the library's exponential.
+/// Returns eq. 4 and its gradient, term by term with the library's exponential.
 double plain(const NetworkParameters& network, std::span<const double> x, std::span<double> gradient) {
     const std::size_t d = network.dimension;
     double sum = network.bias;
@@ -91,7 +91,7 @@ double plain(const NetworkParameters& network, std::span<const double> x, std::s
     return sum;
 }
 
-// Every instruction set that this machine has.
+// Every instruction set of this machine.
 TEST(RadialNetwork, ValueAndGradientInOnePassAreEquation4) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{8};

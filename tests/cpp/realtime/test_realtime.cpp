@@ -44,7 +44,7 @@ TEST(RingBuffer, RefusesWhenFullAndLosesNothingThatItTook) {
     EXPECT_EQ(out[0], 3);
 }
 
-/// Two numbers that belong together: torn apart, they disagree.
+/// Two related numbers: a partly written pair is detected.
 struct Pair {
     std::uint64_t value = 0;
     std::uint64_t inverse = ~std::uint64_t{0};

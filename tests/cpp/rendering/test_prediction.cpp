@@ -62,7 +62,8 @@ TEST(Prediction, AdvanceIsTheMeanFormulaAndTheWeightedStepsFromTheFirstTick) {
     }
 }
 
-/// max over theta of -Re of sum v_j z^-j: what an advance adds to the damping that a spring needs, over K T.
+/// Returns max over theta of -Re of sum v_j z^-j: the damping that a prediction adds to a spring's need, divided by K
+/// T.
 double largest_advance(const std::vector<double>& v) {
     double largest = -1.0;
     for (int k = 0; k <= 2000; ++k) {
@@ -75,7 +76,7 @@ double largest_advance(const std::vector<double>& v) {
     return largest;
 }
 
-// With p_k = sum v_j d_{k-j} and sum v = 1/2, a spring needs K T (1/2 + max of -Re V): 1/(2 m) by Fejer.
+// With p_k = sum v_j d_{k-j} and sum v = 1/2, a spring needs K T (1/2 + max of -Re V). The minimum is 1/(2 m) by Fejer.
 TEST(Prediction, WeightsNeedTheLeastDampingAmongAllOfTheirNumber) {
     test::Random random{5};
     for (const int m : {1, 2, 4, 8}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The structures' time steps: what order each has, and what each keeps.
+// Tests of the order and of the conserved quantities of the structures' time steps.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -69,7 +69,7 @@ TEST(Steppers, TheSwitchNeverGivesEnergy) {
     EXPECT_LT(before, 0.5 * object.at(0.3, {}).energy);
 }
 
-/// The switched step f or D, in place of the solver, for a step from `from`.
+/// The switched step f or D, computed without the solver, for a step from `from`.
 struct SwitchedStep {
     const WaveletNetwork& object;
     double from;
@@ -88,7 +88,7 @@ struct SwitchedStep {
     }
     [[nodiscard]] double residual(double y) const { return generates(y) ? by_energy(y) : by_force(y); }
 
-    /// The first root of `function` from `from` to `to`, by short steps and bisection.
+    /// Returns the first root of `function` from `from` to `to`, by short steps and bisection.
     template <class F>
     [[nodiscard]] static double first_root(F function, double from, double to) {
         const double step = std::copysign(shortest, to - from);
@@ -116,14 +116,14 @@ struct SwitchedStep {
         }
         return count;
     }
-    /// The root that the rule of the class comment takes.
+    /// Returns the root that the rule in the class comment selects.
     [[nodiscard]] double expected(double far) const {
         const double root = first_root([&](double y) { return by_energy(y); }, from, far);
         return generates(root) ? root : first_root([&](double y) { return by_force(y); }, from, root);
     }
 };
 
-// Where s = 1.5 p the switched step has up to three roots.
+// With s = 1.5 p the switched step has up to three roots.
 TEST(Steppers, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
     test::Random random{91};
     int three = 0;
@@ -150,7 +150,7 @@ TEST(Steppers, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
             const double far = step.by_force(from) < 0.0 ? from + 2.0 : from - 2.0;
             const double expected = step.expected(far);
             if (std::abs(expected - from) < 1e-3) {
-                continue;  // the quotient above loses its digits
+                continue;  // the quotient above loses digits
             }
             ++tried;
             ASSERT_NEAR(rendered.environment_position, expected, 1e-9)

@@ -31,11 +31,11 @@ constexpr double period = 1e-3;
 constexpr VirtualCoupling coupling{100.0, 0.02};
 
 struct ForceError {
-    double at_end;      ///< of the tick that holds the force
-    double at_instant;  ///< of sampling
+    double at_end;      ///< at the end of the tick that holds the force
+    double at_instant;  ///< at the instant of the sample
 };
 
-/// RMS of F_k - f(handle) over 4000 ticks of the scene of spec section 6.
+/// Returns the RMS of F_k - f(handle) over 4000 ticks of the scene of spec section 6.
 template <class S>
 ForceError force_error(S structure) {
     SimulatedDevice device{DeviceProfile{}, Hand{}};
@@ -96,7 +96,7 @@ TEST(Scene, ExplicitDamped) {
                             0.2530, 0.2532);
 }
 
-/// Largest |y| in the last tenth of a free motion that began away from equilibrium, over the first tenth's.
+/// Returns the largest |y| in the last tenth of a free motion, divided by that in the first tenth.
 template <class S>
 double growth(S structure, int ticks) {
     structure.reset(0.0);
@@ -195,12 +195,12 @@ TEST(Massless, BalancesTheCouplingAtEveryTick) {
     }
 }
 
-/// Falls with slope -s within f_0 / s of 0, pushes away from 0 with f_0 beyond, and is closed in by a wall.
+/// Falls with slope -s within f_0 / s of 0, pushes away from 0 with f_0 outside, and ends at a wall.
 struct PushingOut {
     using State = Stateless;
     double push;     ///< f_0
     double falling;  ///< s
-    double wall;     ///< where a wall of slope 1 begins
+    double wall;     ///< start of a wall of slope 1
 
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
         const double width = push / falling;
@@ -217,7 +217,7 @@ struct PushingOut {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// Work of a hand, F d + A d^2 for every sample: against the clipped force and the damping of a device.
+/// Work of a hand for every sample, F d + A d^2, against the clipped force and the damping of a device.
 struct HandWork {
     double device_damping;  ///< A = b/T
     double limit;           ///< of the device
@@ -233,7 +233,7 @@ struct HandWork {
     }
 };
 
-/// Winds the coupling up quickly, lets the mass fly, and slows it down with a spring just below the limit.
+/// Stretches the coupling quickly, lets the mass fly, and slows it down with a spring just below the limit.
 template <class S>
 double work_of_a_throw(S structure, double limit) {
     constexpr double stiffness = 90.0;
@@ -284,7 +284,7 @@ TEST(ForceLimit, DoesNotKeepAFallingForceWithMassFromGivingEnergy) {
     const PushingOut object{1.0, 0.31, 7.5};
     const Inertia mass{7.0, 0.0};
     constexpr double limit = 1.34;
-    // The state on the cycle when the hand changes sides: position -0.0826, moved by 1.0850 in the last sample.
+    // State on the cycle when the hand reverses: position -0.0826, moved by 1.0850 in the last sample.
     constexpr double last = -0.08262168687;
     constexpr double before = -1.16758952181;
     Implicit<PushingOut> structure{object, mass, {1.0, 0.0}, 1.0, {}, limit, {}};
@@ -292,7 +292,7 @@ TEST(ForceLimit, DoesNotKeepAFallingForceWithMassFromGivingEnergy) {
     const double there =
         structure.drive(7.0 * (last - before) + object.at(last, {}).force).environment_position;
     ASSERT_NEAR(there, last, 1e-9);
-    const double side = limit + last + 1e-6;  // the coupling is at its limit all the time
+    const double side = limit + last + 1e-6;  // the coupling is always at its limit
     HandWork hand{0.5, limit, side, limit};
     double force = limit;
     double moved = 0.0;
@@ -311,7 +311,7 @@ TEST(ForceLimit, DoesNotKeepAFallingForceWithMassFromGivingEnergy) {
     EXPECT_LT(hand.work, -0.41);
 }
 
-/// Checks each step of a structure with mass: `residual(y, G)` is the object's side of the step less G.
+/// Checks each step of a structure with mass; `residual(y, G)` is the object's side of the step minus G.
 template <class S, class Residual>
 int limited_steps(S structure, double limit, VirtualCoupling spring, test::Random& random,
                   Residual residual) {
@@ -444,7 +444,7 @@ ForceModel spring_model(double stiffness) {
     return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
 }
 
-/// f = 5 x + 0.2 v.
+/// Returns the model f = 5 x + 0.2 v.
 ForceModel dashpot_model() {
     return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
 }
@@ -518,7 +518,7 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     scheme.structure = StructureKind::Implicit;
     EXPECT_NO_THROW(validate(scheme, spring_model(1e6), period));
 
-    // The door of every way to render is closed, not only that of the name.
+    // Every way to render must check it, not only the name.
     scheme.structure = StructureKind::Explicit;
     EXPECT_THROW((void)simulate(spring_model(2861.0), scheme, {}, {}, 10), std::invalid_argument);
     EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, period), std::invalid_argument);

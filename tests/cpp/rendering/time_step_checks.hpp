@@ -10,7 +10,7 @@
 #include "palpate/model/environment.hpp"
 #include "palpate/rendering/structure.hpp"
 
-// Checks that every time step with a mass behind a coupling has to pass.
+// Checks that every time step with a mass behind a coupling must pass.
 namespace palpate::test {
 
 /// A hardening spring with its energy. It is smooth, so the order of a time step can be measured.
@@ -28,7 +28,7 @@ struct Hardening {
 inline constexpr VirtualCoupling coupling{100.0, 0.02};
 inline constexpr Inertia inertia{0.05, 0.3};
 
-/// Position after `duration` from rest at 0.3 under a constant force.
+/// Returns the position after `duration` from rest at 0.3 under a constant force.
 template <class S>
 double driven(S structure, double duration, double period) {
     structure.reset(0.3);
@@ -40,7 +40,8 @@ double driven(S structure, double duration, double period) {
     return rendered.environment_position;
 }
 
-/// Returns the order of a time step from its errors at T and T/2. The truth is the fourth-order Runge-Kutta solution.
+/// Returns the order of a time step from its errors at T and T/2. The reference is the fourth-order Runge-Kutta
+/// solution.
 template <class Make>
 double order(Make make) {
     constexpr double duration = 0.256;

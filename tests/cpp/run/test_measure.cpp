@@ -15,7 +15,7 @@ namespace {
 
 constexpr double period = 1e-3;
 
-/// A detent: f = 2 x + 0.6 exp(-((x - 0.15)/0.03)^2), whose slope falls to -15.
+/// Returns the force of a detent, f = 2 x + 0.6 exp(-((x - 0.15)/0.03)^2), whose slope falls to -15.
 double detent(double x) {
     const double u = (x - 0.15) / 0.03;
     return 2.0 * x + 0.6 * std::exp(-u * u);
@@ -115,7 +115,7 @@ TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
             tick.applied = reading.applied;
             worst = std::max(worst, std::abs(object_force(tick) - 3.0 * reading.position));
         }
-        // The encoder's step, against the friction of the device at the sweep's speed and its turns.
+        // Tolerance for the encoder step, or for the friction of the device at the sweep's speed and reversals.
         EXPECT_LT(worst, transducer ? 2e-4 : 0.05);
     }
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inside the loop nothing allocates, locks, throws or calls the system, but for the clock: enforced from outside.
+// Tests from outside that the loop does not allocate, lock, throw or make a system call, except for the clock.
 //
-// Allocations, locks and exceptions are counted by functions of this program that stand before those of the
-// libraries. System calls are forbidden to the loop's thread by a filter of the kernel, whose SIGSYS tells the
-// number of the call. Each watchdog is shown to bark.
+// Functions of this program replace those of the libraries and count allocations, locks and exceptions. A filter of the
+// kernel forbids system calls to the loop's thread; its SIGSYS states the number of the call. Each check is tested with
+// a violation.
 #include <dlfcn.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
@@ -43,14 +43,14 @@
 
 namespace {
 
-/// Set in the loop's thread while it ticks.
+/// True in the loop's thread while it ticks.
 thread_local bool watched = false;
 
 std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<int> exceptions{0};
 
-// Unused under sanitizers, which bring interposers of their own.
+// Unused under sanitizers, which have their interposers.
 [[maybe_unused]] void count_if_watched(std::atomic<int>& counter) {
     if (watched) {
         counter.fetch_add(1, std::memory_order_relaxed);
@@ -109,7 +109,7 @@ namespace {
 std::mutex a_mutex;
 std::atomic<void*> somewhere{nullptr};
 
-/// A simulated device that does one thing that it must not, in its fifth exchange.
+/// A simulated device that does one forbidden action, in its fifth exchange.
 template <class Sin>
 class Sinful {
   public:
@@ -144,7 +144,7 @@ constexpr auto throws = [] {
 };
 constexpr auto calls_the_system = [] { (void)syscall(SYS_getppid); };
 
-/// Hands each record on to the real sinks, and lets the watch begin with the first tick.
+/// Passes each record to the real sinks, and starts the observation with the first tick.
 template <class Recorder>
 struct WatchedSink {
     Recorder& recorder;
@@ -179,8 +179,8 @@ ForceModel velocity_model() {
                                    {{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt});
 }
 
-/// The real loop at 10 kHz with its real recorder behind it; `before` runs in the loop's thread before it begins,
-/// `after` in that thread when it is over.
+/// Runs the real loop at 10 kHz with its real recorder. `before` runs in the loop's thread before it starts, `after` in
+/// that thread after its end.
 template <class Sin, class Before, class After>
 Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Before before, After after,
                    int predict = 0) {
@@ -224,7 +224,7 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
             if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
                 loop.join();
             } else {
-                _exit(counts.ticks > 0 ? 0 : 1);  // the filtered thread cannot even end
+                _exit(counts.ticks > 0 ? 0 : 1);  // the filtered thread cannot end in another way
             }
         });
     return counts;
@@ -266,7 +266,7 @@ TEST(RealTimePath, TheWatchdogsBark) {
     EXPECT_GE(counted(throws).exceptions, 1);
 }
 
-/// Where a filtered child leaves the number of the call that it was killed for.
+/// Shared memory in which a filtered child stores the number of the system call that killed it.
 int* shared_number() {
     static auto* const number = static_cast<int*>(
         mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
@@ -278,7 +278,7 @@ void tell_and_die(int /*signal*/, siginfo_t* info, void* /*context*/) {
     _exit(99);
 }
 
-/// From now on this thread may sleep until a deadline, read the clock and end the process, nothing else.
+/// Restricts this thread to sleeping until a deadline, reading the clock and ending the process.
 void forbid_system_calls() {
     struct sigaction action{};
     action.sa_sigaction = tell_and_die;
@@ -312,7 +312,7 @@ void sleep_for_ever() {
     }
 }
 
-/// The number of the system call that the loop was caught at; 0: it ran to its end.
+/// Returns the number of the system call at which the loop was killed; 0 if it ran to its end.
 template <class Sin>
 int system_call_in_the_loop(Sin sin, StructureKind kind, const ForceModel& rendered) {
     *shared_number() = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every way in which a session can be less than good is found, and named with its cure.
+// Tests that every defect of a session is found and stated with its cure.
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -13,9 +13,10 @@
 namespace palpate {
 namespace {
 
-/// A session of 1000 punctual ticks that covered its whole domain.
+/// A session of 1000 punctual ticks over its whole domain.
 struct Judged {
-    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // large: not on the stack
+    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // on the heap, because it is
+                                                                                // large
     LoopSettings settings;
     RecordSinks sinks;
     SessionExpectation expected{false, 1e-3, {0.0, 1.0}, "rad", {}};
@@ -110,7 +111,7 @@ TEST(SessionVerdict, RefusesASessionWithoutForce) {
 
 TEST(SessionVerdict, RefusesARecordingWithoutMotion) {
     Judged still;
-    still.sinks.positions = {0.5, 0.5015};  // less than two steps of the encoder
+    still.sinks.positions = {0.5, 0.5015};  // fewer than two encoder steps
     expect(still, "usable: the handle covered 0.0015 rad", "move it over the whole object");
     still.expected.recorded = true;
     expect(still, "no: ", "so no force over position is known");

@@ -29,7 +29,7 @@ DeviceProfile random_device(test::Random& random) {
     return device;
 }
 
-/// What the account is off by, over what went to and fro.
+/// Returns the error of the account, divided by the throughput.
 double open_balance(const DeviceProfile& device, double start_velocity, const ClosedLoopEnd& end) {
     const double kinetic =
         0.5 * device.inertia * (end.handle.velocity * end.handle.velocity - start_velocity * start_velocity);
@@ -37,8 +37,8 @@ double open_balance(const DeviceProfile& device, double start_velocity, const Cl
     return std::abs(off) / (end.energy.throughput + std::abs(kinetic));
 }
 
-// spec section 7, "energy account": the hand's work is what the motor took, what was lost, and what the handle's
-// inertia holds more than at the start
+// spec section 7, "energy account": the work of the hand equals the energy of the motor, the losses, and the increase
+// of the handle's kinetic energy.
 TEST(EnergyAccount, ClosesToRoundingForEveryHand) {
     test::Random random{11};
     double worst = 0.0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scripted faults in random order, in virtual time: what the loop sends, how it ends, what it leaves behind.
+// Scripted faults in random order, in virtual time: tests of the forces, of the exit, and of the files.
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,13 +29,13 @@ namespace {
 
 constexpr double period_s = 1e-3;
 
-/// A tick that comes late by so much; all others are punctual.
+/// One late tick; all others are punctual.
 struct LateTick {
     std::uint64_t tick = 0;
     Nanoseconds by = 0;
 };
 
-/// Deadlines that are met but for one, as fast as it goes.
+/// A clock whose deadlines are all met except one, without waiting.
 class VirtualClock {
   public:
     explicit VirtualClock(LateTick late) : late_{late} {}
@@ -51,7 +51,7 @@ class VirtualClock {
     Nanoseconds now_ = 0;
 };
 
-/// Remembers what the device was sent last, and whether it was let go.
+/// Stores the forces sent to the device, and its closing.
 struct Observed {
     std::vector<double> forces;
     bool closed = false;
@@ -94,7 +94,7 @@ struct Rendering {
     GuardSettings guards;
 };
 
-/// A spring of 8 N*m/rad over half a turn of the knob: forces up to 4 N*m.
+/// Returns a spring of 8 N*m/rad over half a turn of the knob: forces up to 4 N*m.
 ForceModel spring() {
     NetworkParameters network;
     network.linear = {8.0};
@@ -133,7 +133,7 @@ Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingF
     return render(faults, settings, file);
 }
 
-/// What holds whatever goes wrong.
+/// Checks the properties that hold after any fault.
 void expect_safe(const Rendering& run) {
     const double step = slew_limit(run.guards, period_s).largest_step;
     double last = 0.0;
@@ -147,7 +147,7 @@ void expect_safe(const Rendering& run) {
         }
         last = tick.force;
     }
-    ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);  // the first sample, and the last zero
+    ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);  // with the first sample, and the last zero
     for (std::size_t k = 0; k < run.ticks.size(); ++k) {
         ASSERT_EQ(run.observed.forces[k + 1], run.ticks[k].force);
     }
@@ -168,7 +168,7 @@ TEST(Faults, ARunWithoutThemIsOrderly) {
     EXPECT_GT(largest->force, 2.0);
 }
 
-// A force that stood longer than its certificate allows for has left it, whatever comes next.
+// A force that was held longer than certified is outside the certificate, for any later motion.
 TEST(Faults, ATickLaterThanCertifiedEndsTheRunWithZeroForceAndSaysSo) {
     LoopSettings settings;
     settings.duration_s = 1.0;
@@ -193,7 +193,7 @@ struct Expected {
 };
 
 TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
-    // 0.4 s: the hand is on its way, the force far from zero.
+    // At 0.4 s the hand is moving and the force is far from zero.
     for (const Expected& expected :
          std::vector<Expected>{{FaultKind::Late, Status::Timeout, ExitReason::TimeUp},
                                {FaultKind::Lost, Status::Lost, ExitReason::TimeUp},
@@ -251,7 +251,7 @@ TEST(Faults, LostAndRepeatedSamplesAreCounted) {
     EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Timeout)], 2U);
 }
 
-/// A folder of its own that is gone afterwards.
+/// A temporary folder that is removed at the end.
 class Scratch {
   public:
     Scratch()

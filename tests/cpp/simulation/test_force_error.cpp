@@ -16,7 +16,7 @@ namespace {
 
 constexpr double period = 1e-3;
 
-/// f = 10 x^2.
+/// Returns f = 10 x^2.
 std::vector<double> square_law(std::span<const double> motion, double /*step_s*/) {
     std::vector<double> force;
     for (const double x : motion) {
@@ -42,7 +42,7 @@ struct Motions {
     [[nodiscard]] HeldForces held() const noexcept { return {start, middle, end, applied, applied}; }
 };
 
-// Held from the start of the tick at velocity v: short by f' v T / 2 on the mean, by f' v T at the end.
+// Held from the start of the tick at velocity v: too small by f' v T / 2 on average, by f' v T at the end.
 TEST(ForceError, HoldIsLateByHalfASampleOnTheMeanAndByAWholeOneAtTheEnd) {
     constexpr double v = 0.5;
     const Motions motions{2000, 0.0, [&](double t) { return 1.0 + v * t; }};
@@ -81,7 +81,7 @@ TEST(ForceError, FollowsACurvedMotionWithinTheTick) {
     constexpr double a = 2e5;
     const Motions motions{1, 0.0, [&](double t) { return a * t * t; }};
     const ForceError error = force_error(motions.held(), period, square_law);
-    // Four parts are 5 % off for this motion, which turns as it goes; two ends alone would be off by half.
+    // Four parts have an error of 5 % for this motion, which reverses; two ends alone would have an error of 50 %.
     EXPECT_NEAR(error.mean, 10.0 * a * a * std::pow(period, 4) / 5.0, 0.08 * 0.08);
     EXPECT_NEAR(error.work, -10.0 * std::pow(a * period * period, 3) / 3.0, 0.08 * 0.0267);
 }
@@ -131,7 +131,7 @@ TEST(ForceError, TraceHoldsTheMiddleOfEachTickAndTheMeanOfADelayedForce) {
     line.bias = -0.1;
     Hand nobody;
     nobody.stiffness = nobody.damping = 0.0;
-    // A constant force: the handle is off the straight line by a T^2 / 8 in the middle of each tick.
+    // A constant force: in the middle of each tick the handle is a T^2 / 8 away from the straight line.
     const Domain domain{{-1.0}, {1.0}, {}, {}, std::nullopt};
     const Trace thrown = simulate({line, domain}, scheme, device, nobody, 50);
     const double sag = 0.1 / device.inertia * 1e-6 / 8.0;

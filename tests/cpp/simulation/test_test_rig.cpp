@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated rig: how large its numbers are beside a model, and which of them somebody chose.
+// Tests of the simulated rig: its numbers relative to a model, and the choices of the user.
 #include "palpate/simulation/test_rig.hpp"
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-/// A switch that gives back 0.1 N less on the way out, over `travel` metres.
+/// Returns a switch whose release force is 0.1 N smaller, over `travel` metres.
 ForceModel keyswitch(double travel, std::optional<double> play_radius = {}) {
     const Domain domain{{0.0}, {travel}, Continuation::Linear, Continuation::Linear, std::nullopt};
     return {NetworkParameters{1, {}, {}, {}, {0.8 / travel}, 0.1}, {{}, 0.0, 0.05}, domain, play_radius};
@@ -40,7 +40,7 @@ TEST(TestRig, SwitchesHysteresisByTheHandAndNotByTheEncoder) {
     EXPECT_NEAR(rig.scheme(keyswitch(0.004)).play_radius, 4e-5, 1e-15);
     rig.device.encoder_step = 1e-4;
     EXPECT_NEAR(rig.scheme(keyswitch(0.004)).play_radius, 4e-4, 1e-15);
-    EXPECT_EQ(rig.scheme(keyswitch(0.004, 1e-5)).play_radius, 0.0);  // the model has its own
+    EXPECT_EQ(rig.scheme(keyswitch(0.004, 1e-5)).play_radius, 0.0);  // the model defines one
 }
 
 TEST(TestRig, TakesWhatWasChosenAsItIsAndScalesTheRest) {

@@ -25,7 +25,7 @@ using test::uniform;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// The one root of c(f(y)) + p y = q by bisection.
+/// Finds the only root of c(f(y)) + p y = q by bisection.
 template <class E>
 double bisected(const LimitedEnvironment<E>& object, const typename E::State& state, LoadLine line) {
     double low = (line.intercept - object.force_limit()) / line.slope;
@@ -37,7 +37,7 @@ double bisected(const LimitedEnvironment<E>& object, const typename E::State& st
     return 0.5 * (low + high);
 }
 
-/// A motion of random jumps; counts the steps at which the limit acts.
+/// Checks a motion of random jumps and returns the number of steps at which the limit is active.
 template <class E, class Solver>
 int expect_the_bisected_root(Random& random, const LimitedEnvironment<E>& object,
                              const LimitedResolvent<Solver>& solver, double p) {

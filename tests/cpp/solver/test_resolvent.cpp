@@ -28,7 +28,7 @@ WaveletNetwork random_scene(Random& random, std::size_t wavelets,
     return {test::random_network(random, wavelets), test::unit_domain(continuation, continuation)};
 }
 
-/// A p for which p + f' > 0 everywhere, by little or by much.
+/// Returns a p for which p + f' > 0 everywhere, with a small or large margin.
 double unique_slope(Random& random, const WaveletNetwork& network) {
     const double edges =
         std::min(network.curve().below().at_edge.slope, network.curve().above().at_edge.slope);
@@ -37,7 +37,7 @@ double unique_slope(Random& random, const WaveletNetwork& network) {
            (slope.upper - slope.lower) * std::exp(uniform(random, -2.5, 4.0));
 }
 
-/// f in extended precision, inside the domain.
+/// Returns f in extended precision, inside the domain.
 long double exact(const NetworkParameters& network, long double x) {
     long double sum = static_cast<long double>(network.linear[0]) * x + network.bias;
     for (std::size_t i = 0; i < network.weight.size(); ++i) {
@@ -47,7 +47,7 @@ long double exact(const NetworkParameters& network, long double x) {
     return sum;
 }
 
-/// The solution inside the domain in extended precision, by bisection of a bracket.
+/// Returns the solution inside the domain in extended precision, by bisection.
 long double exact_solution(const NetworkParameters& network, long double p, long double q) {
     long double low = 0.0L;
     long double high = 1.0L;
@@ -58,7 +58,7 @@ long double exact_solution(const NetworkParameters& network, long double p, long
     return 0.5L * (low + high);
 }
 
-/// Soft, a click that falls with slope -15, and a wall: 10 wavelets over [0, 0.6] rad.
+/// Returns a soft spring, a click that falls with slope -15, and a wall: 10 wavelets over [0, 0.6] rad.
 WaveletNetwork switch_and_wall() {
     NetworkParameters network{1, {}, {}, {}, {12.0}, 0.0};
     const auto add = [&](double alpha, double beta, double weight) {
@@ -144,7 +144,8 @@ TEST(Resolvent, AtTheEdgesIsTheEdge) {
 TEST(Resolvent, DoesNotPretend) {
     Random random{64};
     const WaveletNetwork network = random_scene(random, 8);
-    // Not a number, more exact than doubles are, too small a table, another load line's slope: Newton's answer.
+    // NaN, an accuracy beyond double precision, too small a table, the slope of another load line: Newton's method
+    // solves.
     EXPECT_FALSE((Resolvent{network.curve(), std::nan("")}).tabulated());
     EXPECT_FALSE((Resolvent{network.curve(), 2000.0, {1e-18}}).tabulated());
     EXPECT_FALSE((Resolvent{network.curve(), 2000.0, {1e-12, 100}}).tabulated());
@@ -172,7 +173,7 @@ TEST(Resolvent, PromisesOnlyWhatWasAsked) {
     EXPECT_LE(tabulated, 36) << "a few units in the last place are out of reach";
 }
 
-/// A hand that presses and lets go, 1 kHz.
+/// Returns the position of a hand that presses and releases, at 1 kHz.
 double hand(int tick) {
     const double time = 1e-3 * tick;
     return 0.25 - 0.24 * std::cos(std::numbers::pi * time) + 0.01 * std::sin(14.0 * std::numbers::pi * time);
@@ -206,7 +207,7 @@ TEST(Resolvent, RendersWhatNewtonRenders) {
     }
 }
 
-/// A click that falls with slope -15, a second one beyond it, and a wall: 8 wavelets over [0, 0.6] rad.
+/// Returns a click that falls with slope -15, a second one after it, and a wall: 8 wavelets over [0, 0.6] rad.
 WaveletNetwork two_clicks() {
     NetworkParameters network = switch_and_wall().parameters();
     network.alpha.insert(network.alpha.end(), {45.0, 38.0});
@@ -274,7 +275,7 @@ TEST(Resolvent, KeepsItsCertifiedErrorOnEveryBranch) {
     EXPECT_GT(tabulated, 0.95 * range);
 }
 
-// spec section 5: "from the previous solution, the first root met in the direction of -residual"; 401 x 401 pairs
+// spec section 5: "from the previous solution, the first root met in the direction of -residual". Tests 401 x 401 pairs
 // of start and right-hand side, for load lines that fold once, twice and in the steep wall of a knob's detent.
 TEST(Resolvent, ObeysTheBranchRuleAtEveryFold) {
     const WaveletNetwork network = two_clicks();
@@ -304,8 +305,8 @@ TEST(Resolvent, ObeysTheBranchRuleAtEveryFold) {
         for (int i = 0; i <= 400; ++i) {
             const double start = place(i * (fine / 400));
             const double at_start = total[static_cast<std::size_t>(i * (fine / 400))];
-            // The right-hand sides sorted, those above the start upward and those below it downward: then the
-            // first root moves outward only.
+            // The right-hand sides are sorted, those above the start upward and those below it downward. The first root
+            // then moves only outward.
             for (const int direction : {1, -1}) {
                 int k = i * (fine / 400);
                 const double highest = *std::max_element(folds.begin(), folds.end()) + 2.0;
@@ -380,7 +381,7 @@ TEST(Resolvent, TurnsWithAKnob) {
             const auto residual = [&](double y) { return network.at(y, {}).force + p * y - q; };
             ASSERT_NEAR(residual(solution.position), 0.0, 1e-11 * (p + fall) * (1.0 + std::abs(x)))
                 << k << " " << j;
-            // No root on the way: 1 / 500 of a turn at a time.
+            // No root may lie between; tested in steps of 1 / 500 of a turn.
             const double direction = residual(before) < 0.0 ? 1.0 : -1.0;
             const double distance = direction * (solution.position - before);
             ASSERT_GE(distance, -1e-9) << k << " " << j;
@@ -427,7 +428,7 @@ TEST(CertifiedSolver, IsNotFooledByTheKinksAtTheEdges) {
         ASSERT_TRUE(solver.unique(p));
         for (int j = 0; j < 100; ++j) {
             const double edge = j % 2 == 0 ? 0.0 : 1.0;
-            // The tangent of a step from a little farther away may end on the wrong side of the edge.
+            // The tangent of a step from a slightly larger distance may end on the wrong side of the edge.
             const auto beside = [&](double from, double to) {
                 return edge +
                        (uniform(random, -1.0, 1.0) < 0.0 ? -1.0 : 1.0) * std::exp(uniform(random, from, to));
@@ -444,7 +445,7 @@ TEST(CertifiedSolver, IsNotFooledByTheKinksAtTheEdges) {
     }
 }
 
-// 401 x 401 pairs of the last and the new right-hand side, for load lines from just unique to steep.
+// Tests 401 x 401 pairs of the last and the new right-hand side, for load lines from just unique to steep.
 TEST(CertifiedSolver, EndsWithinFourEvaluationsAfterEveryJump) {
     const WaveletNetwork network = switch_and_wall();
     const double fall = test::steepest_fall(piecewise(network.curve()));
@@ -478,7 +479,7 @@ TEST(CertifiedSolver, EndsWithinFourEvaluationsAfterEveryJump) {
     }
 }
 
-// Where a fold is so near that a thousandth less p would make it: 10^6 steps in the full tier.
+// A fold is so near that a p smaller by a thousandth would create it. The full tier tests 10^6 steps.
 TEST(CertifiedSolver, EndsWithinFourEvaluationsNearAFold) {
     Random random{70};
     long steps = 0;
@@ -497,7 +498,7 @@ TEST(CertifiedSolver, EndsWithinFourEvaluationsNearAFold) {
             continue;
         }
         const double p = fall * (1.0 + std::exp(uniform(random, std::log(1e-4), 0.0)));
-        // The tables and the cells beside them, and the cells alone.
+        // The tables with the cells between them, and the cells alone.
         const Resolvent resolvent{network.curve(), p};
         const CertifiedSolver& solver = resolvent.solver();
         ASSERT_TRUE(resolvent.unique(p)) << k << " p / fall = " << p / fall;

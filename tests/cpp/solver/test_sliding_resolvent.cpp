@@ -22,7 +22,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// A random pair over [0, 1] whose loss is a bump or two above a floor.
+/// Returns a random pair over [0, 1] whose loss is one or two bumps above a constant.
 HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_radius,
                               Continuation continuation = Continuation::Free) {
     const NetworkParameters network = test::random_network(random, wavelets);
@@ -33,7 +33,7 @@ HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_
     return {network, loss, test::unit_domain(continuation, continuation), play_radius};
 }
 
-/// A p for which every slide is unique, by little or by much.
+/// Returns a p for which every slide is unique, with a small or large margin.
 double unique_slope(Random& random, const HysteresisNetwork& pair) {
     const double common = pair.force().slope_bounds().lower;
     const double loss = pair.loss().slope_bounds().largest();
@@ -42,7 +42,7 @@ double unique_slope(Random& random, const HysteresisNetwork& pair) {
     return std::max(loss - common, edges) * std::exp(uniform(random, 0.1, 2.0));
 }
 
-// A motion that presses, lets go and turns anywhere, through sticking and sliding and past both edges.
+// A motion that presses, releases and reverses anywhere, through sticking and sliding and past both edges.
 TEST(SlidingResolvent, SolvesWhatNewtonSolves) {
     Random random{71};
     int steps = 0;
@@ -101,7 +101,7 @@ TEST(SlidingResolvent, NeedsTwoEvaluationsOrFewerWhereItSticks) {
     EXPECT_GT(evaluations, 0);
 }
 
-/// Rounding of f, and of s = (y - play) / r.
+/// Returns the rounding error of f, and of s = (y - play) / r.
 double rounding_of(const HysteresisNetwork& pair, double x) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const double loss = pair.loss().value_bounds().largest();
@@ -109,7 +109,7 @@ double rounding_of(const HysteresisNetwork& pair, double x) {
            8.0 * epsilon * (std::abs(x) + 1.0) * loss / pair.play_radius();
 }
 
-// Random jumps of q and of the play, for load lines that are unique by 1e-4 to 1: 10^6 steps in the full tier.
+// Random jumps of q and of the play, for load lines that are unique by 1e-4 to 1. The full tier tests 10^6 steps.
 TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     Random random{76};
@@ -124,7 +124,7 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
             domain = {{0.1}, {1.1}, Continuation::Linear, Continuation::Linear, 1.0};
         }
         const auto wavelets = static_cast<std::size_t>(1 + k % 12);
-        // Every seventh loss falls below zero, which a model may but a passive object cannot.
+        // Every seventh loss falls below zero, which is valid for a model but impossible for a passive object.
         LossParameters loss{std::vector<double>(wavelets), 0.0,
                             uniform(random, k % 7 == 6 ? -0.1 : 0.3, k % 7 == 6 ? 0.1 : 1.0)};
         for (double& weight : loss.weight) {
@@ -147,7 +147,8 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
         CertifiedSolver::Memory alone{0.5};
         auto state = pair.start(0.5);
         for (int j = 0; j < 500; ++j) {
-            // A jump of the play too; or to either side of where it begins to slide; or a short way.
+            // A jump of the play as well, or to either side of the position where it starts to slide, or a short
+            // distance.
             if (j % 3 == 0) {
                 state = pair.start(uniform(random, -0.3, 1.4));
             }
@@ -201,7 +202,7 @@ TEST(SlidingResolvent, LeavesToNewtonWhatIsNotUnique) {
     EXPECT_EQ(memory.newton.position, before.newton.position);
 }
 
-/// Steps both structures along one motion.
+/// Moves both structures along one motion.
 template <class S, class T>
 void expect_same_rendering(Random& random, S structure, T reference, double tolerance) {
     structure.reset(0.4);

@@ -62,7 +62,7 @@ TEST(LoadLineSolver, SaysWhyItStopped) {
 }
 
 TEST(LoadLineSolver, SaysWhenItStandsWhereTheEnvironmentFallsFaster) {
-    // f(y) + p y rises by -2 + 1 a unit: 0 is a solution, but no motion would rest there.
+    // f(y) + p y has the slope -2 + 1: 0 is a solution, but no motion would stop there.
     const Solution solution = LoadLineSolver{}.solve(test::Spring{-2.0}, {}, {1.0, 0.0}, 0.0);
     EXPECT_EQ(solution.status, Status::NotUnique);
 }

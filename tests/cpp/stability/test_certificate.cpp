@@ -10,12 +10,13 @@
 #include <gtest/gtest.h>
 
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/renderable_slopes.hpp"
 #include "support.hpp"
 
 namespace palpate {
 namespace {
 
-/// The bounds of a static force whose slope lies between two numbers.
+/// Returns the bounds of a static force whose slope lies between two numbers.
 ForceBounds slopes(double lower, double upper) {
     ForceBounds bounds;
     bounds.slope = {lower, upper};
@@ -23,7 +24,7 @@ ForceBounds slopes(double lower, double upper) {
     return bounds;
 }
 
-/// A device whose encoder and command have no steps.
+/// Returns a device whose encoder and command are without steps.
 DeviceProfile smooth(double viscous_damping, int delay_samples = 0) {
     DeviceProfile device;
     device.viscous_damping = viscous_damping;
@@ -44,7 +45,7 @@ constexpr std::array<StructureKind, 3> coupled{StructureKind::Massless, Structur
                                                StructureKind::EnergyConsistent};
 
 TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
-    // 62 N*m/rad at 1 ms needs 0.031, and 0.062 more for a sample of delay; slopes of -15 cost nothing.
+    // 62 N*m/rad at 1 ms needs 0.031, and 0.062 more for a sample of delay. Slopes of -15 add nothing.
     EXPECT_TRUE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.031)).certified());
     EXPECT_FALSE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0309)).certified());
     EXPECT_TRUE(
@@ -53,7 +54,7 @@ TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
         certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0929, 1)).certified());
 }
 
-/// Damping over T M that direct rendering with a prediction needs, M = 62 N*m/rad.
+/// Returns the damping divided by T M that direct rendering with a prediction needs, M = 62 N*m/rad.
 double predicted_share(double falling, int predict, double delay_samples = 0.0) {
     Scheme scheme = scheme_of(StructureKind::Direct);
     scheme.predict = predict;
@@ -78,11 +79,11 @@ TEST(Certificate, PredictionNeedsLessDampingTheMoreSamplesItTakes) {
 }
 
 TEST(Certificate, PredictionOfALateForceCanNeedLessThanNone) {
-    // Q = z^-1 - z^-2 / 2: a spring needs 1.25 T K in place of 1.5 T K.
+    // Q = z^-1 - z^-2 / 2: a spring needs 1.25 T K instead of 1.5 T K.
     EXPECT_NEAR(predicted_share(0.0, 1, 1.0), 1.299, 0.001);
     EXPECT_NEAR(predicted_share(1.0, 1, 1.0), 1.414, 0.001);
     EXPECT_NEAR(predicted_share(0.0, 1, 2.0), 2.000, 0.001);
-    // A fraction of a sample lies between.
+    // The need for a fraction of a sample lies between.
     for (const int predict : {1, 4}) {
         double before = predicted_share(0.0, predict, 1.0);
         for (const double delay : {1.02, 1.25, 1.5, 1.75, 1.98, 2.0}) {
@@ -143,7 +144,7 @@ TEST(Certificate, PredictionWithHysteresisNeedsHalfOfTheSteepestSlopeMore) {
     EXPECT_FALSE(certify(play, scheme, smooth(0.06199)).certified());
     scheme.predict = 16;
     EXPECT_FALSE(certify(play, scheme, smooth(0.06199)).certified()) << "the same for every m";
-    // The play is wrong by one reading, x_hat by (m + 3) / (m + 1).
+    // The play has the error of one reading, x_hat of (m + 3) / (m + 1) readings.
     scheme.predict = 1;
     DeviceProfile device = smooth(1.0);
     device.encoder_step = 1e-3;
@@ -166,7 +167,7 @@ TEST(Certificate, PredictionOfAForceOfVelocityIsRefused) {
 
 TEST(Certificate, AFallingForceNeedsDampingOnlyWithDelay) {
     EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0)).certified());
-    // A sample late, half a period of the slope.
+    // A sample of delay needs half a period of the slope.
     EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0311, 1)).certified());
     EXPECT_FALSE(
         certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0309, 1)).certified());
@@ -197,7 +198,7 @@ TEST(Certificate, MasslessWithoutDampingIsAStaticForceOfTheFeltSlope) {
     const Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
     EXPECT_TRUE(certify(slopes(0.0, 300.0), scheme, smooth(0.0376)).certified());
     EXPECT_FALSE(certify(slopes(0.0, 300.0), scheme, smooth(0.0374)).certified());
-    // Falling parts become steeper: -50 is felt as -100, which needs half a period of it with a sample of delay.
+    // Falling parts become steeper: -50 is felt as -100. With a sample of delay this needs half a period of the slope.
     EXPECT_TRUE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0501, 1)).certified());
     EXPECT_FALSE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0499, 1)).certified());
     EXPECT_FALSE(certify(slopes(-100.0, 0.0), scheme, smooth(10.0)).certified());
@@ -223,8 +224,8 @@ TEST(Certificate, AForceMayFallAsSteeplyAsCouplingAndDampingAllow) {
     const Scheme massless = scheme_of(StructureKind::Massless, {100.0, 0.02});
     EXPECT_TRUE(certify(slopes(-119.9, 5.0), massless, smooth(1.0)).certified());
     EXPECT_FALSE(certify(slopes(-120.1, 5.0), massless, smooth(1.0)).certified());
-    // With mass and a force limit: s_ <= 2 B_o / T = 400, whatever coupling and mass; the energy-consistent step takes
-    // any slope.
+    // With mass and a force limit: s_ <= 2 B_o / T = 400, for any coupling and mass. The energy-consistent step is
+    // certified for any slope.
     for (const double mass : {0.01, 1.0}) {
         const Scheme implicit = scheme_of(StructureKind::Implicit, {100.0, 0.02}, {mass, 0.2});
         EXPECT_TRUE(certify(slopes(-399.9, 5.0), implicit, smooth(1.0)).certified());
@@ -239,8 +240,8 @@ TEST(Certificate, AForceMayFallAsSteeplyAsCouplingAndDampingAllow) {
     EXPECT_TRUE(certify(slopes(-5000.0, 5.0), consistent, smooth(1.0)).certified());
 }
 
-// spec of the certificate: "Falling slopes with mass and limit fail", s = 0.31 K_c, m = 7 K_c T^2, B_o = 0; the motion
-// is ForceLimit.DoesNotKeepAFallingForceWithMassFromGivingEnergy.
+// spec of the certificate: "Falling slopes with mass and limit fail", s = 0.31 K_c, m = 7 K_c T^2, B_o = 0. The motion
+// is in ForceLimit.DoesNotKeepAFallingForceWithMassFromGivingEnergy.
 TEST(Certificate, RefusesTheFallingObjectThatGivesEnergyAtAForceLimit) {
     const Scheme scheme = scheme_of(StructureKind::Implicit, {100.0, 0.0}, {7.0 * 100.0 * 1e-6, 0.0});
     EXPECT_EQ(certify(slopes(-31.0, 0.0), scheme, smooth(1.0)).verdict, Verdict::Refused);
@@ -256,8 +257,8 @@ TEST(Certificate, WithoutAForceLimitAMassMayFallAsSteeplyAsTheCouplingAllows) {
 }
 
 TEST(Certificate, AStepThatMayHaveNoSolutionIsRefused) {
-    // At the limit the object moves alone: m/T^2 + B_o/T > s_ for one solution; 2 m/T^2 + B_o/T > s_/2 for one at
-    // least.
+    // At the limit the object moves alone. m/T^2 + B_o/T > s_ gives one solution; 2 m/T^2 + B_o/T > s_/2 gives at least
+    // one.
     const Scheme implicit = scheme_of(StructureKind::Implicit, {1e4, 0.0}, {1e-4, 0.2});
     EXPECT_TRUE(certify(slopes(-299.0, 5.0), implicit, smooth(10.0)).certified());
     EXPECT_FALSE(certify(slopes(-301.0, 5.0), implicit, smooth(10.0)).certified());
@@ -295,8 +296,10 @@ TEST(Certificate, TheGainOfTheEncoderIsTheLargestOfBothEnds) {
     EXPECT_NEAR(massless_gain(slopes(-80.0, 300.0), {100.0, 0.02}, 1e-3), 400.0, 1e-9);
 }
 
-/// Least B at one frequency for which A |u|^2 - Re[(H_n (d - a)* + H_{n+1} a*) u] + B (|a|^2 / tau
-/// + |d - a|^2 / (1 - tau)) is never negative, a the motion in the first part of a sample, tau of it.
+/// Returns the least B at one frequency for which this form is never negative, with a the motion in the first part of a
+/// sample, tau of it:
+///
+///     A |u|^2 - Re[(H_n (d - a)* + H_{n+1} a*) u] + B (|a|^2 / tau + |d - a|^2 / (1 - tau)).
 double need_at(double theta, VirtualCoupling coupling, int whole, double fraction) {
     const std::complex<double> late = std::polar(1.0, -theta);
     const double damping = coupling.damping / 1e-3;
@@ -331,7 +334,7 @@ TEST(Certificate, TheDelayedNeedIsThatOfAFineScanAndNeverBelow) {
     }
 }
 
-// B >= s/2 + |H - s|^2 / (4 (A - s/2)): the form A |u|^2 - Re(H u d*) - (s/2) |d - u|^2 + B |d|^2 is never negative.
+// B >= s/2 + |H - s|^2 / (4 (A - s/2)). The form A |u|^2 - Re(H u d*) - (s/2) |d - u|^2 + B |d|^2 is never negative.
 TEST(Certificate, TheNeedOfAFallingForceMakesTheFormOfEachFrequencyNonNegative) {
     test::Random random{17};
     for (int draw = 0; draw < test::cases(300); ++draw) {
@@ -378,6 +381,38 @@ TEST(Certificate, TheStiffestCouplingIsTheOneThatIsStillCertified) {
         }
     }
     EXPECT_EQ(stiffest_coupling(1.0, 0.0, smooth(0.1), 0.9), 0.0) << "its damping alone is too much";
+}
+
+TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
+    const auto holds = [](const ForceBounds& bounds, Scheme scheme, VirtualCoupling coupling,
+                          const DeviceProfile& device) {
+        scheme.coupling = coupling;
+        return all_hold(inequalities_of(bounds, scheme, device));
+    };
+    test::Random random{23};
+    int stable = 0;
+    for (int draw = 0; draw < test::cases(50); ++draw) {
+        const ForceBounds bounds =
+            slopes(-test::uniform(random, 0.0, 5.0), std::exp(test::uniform(random, 0.0, 5.0)));
+        const DeviceProfile device = smooth(std::exp(test::uniform(random, -4.0, 0.0)));
+        const Scheme chosen = explicit_scheme(bounds, device, {});
+        if (!holds(bounds, chosen, chosen.coupling, device)) {
+            continue;  // none of those tried is stable
+        }
+        ++stable;
+        EXPECT_LE(chosen.coupling.stiffness, 0.9 * stiffest_coupling(0.0, 0.0, device));
+        SchemeChoices given;
+        given.coupling_stiffness = chosen.coupling.stiffness;
+        given.mass = chosen.inertia.mass;
+        const Scheme again = explicit_scheme(bounds, device, given);
+        EXPECT_EQ(again.coupling.stiffness, chosen.coupling.stiffness);
+        EXPECT_EQ(again.inertia.mass, chosen.inertia.mass);
+        EXPECT_TRUE(holds(bounds, again, again.coupling, device));
+        EXPECT_LE(again.inertia.damping, chosen.inertia.damping * (1.0 + 1e-12));
+        given.damping = 0.9 * again.inertia.damping;
+        EXPECT_EQ(explicit_scheme(bounds, device, given).inertia.damping, *given.damping);
+    }
+    EXPECT_GT(stable, 5);
 }
 
 // spec of the certificate, section 5: f_c >= ||g||_1 Delta / 2, "300 objects, bound over sum 1.000 to 1.009"
@@ -439,7 +474,7 @@ TEST(Certificate, TheExplicitNeedIsThatOfTheOracle) {
 
 TEST(Certificate, TheExplicitStructureIsAtMostStable) {
     const Scheme scheme = scheme_of(StructureKind::Explicit, {100.0, 0.02}, {0.001, 0.5});
-    // (4 m - 2 (B_o + B_c) T) / T^2 = 2960, of which the coupling takes 100.
+    // (4 m - 2 (B_o + B_c) T) / T^2 = 2960, of which the coupling uses 100.
     const Certificate below = certify(slopes(2.0, 2800.0), scheme, smooth(0.24));
     EXPECT_EQ(below.verdict, Verdict::StableLocally) << below.why;
     for (const Inequality& line : below.inequalities) {
@@ -576,7 +611,7 @@ TEST(ForceBounds, HoldEverySlopeOfAForceOfVelocityContinuationIncluded) {
     test::Random random{8};
     for (int draw = 0; draw < test::cases(20); ++draw) {
         const NetworkParameters network = test::random_network(random, draw % 8, 2);
-        const double slowest = draw % 3 == 0 ? 0.2 : -1.0;  // data that never rested
+        const double slowest = draw % 3 == 0 ? 0.2 : -1.0;  // data without rest
         const ForceModel model =
             ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, 1.0}, {}, {}, std::nullopt});
         const ForceBounds bounds = force_bounds(model);
@@ -633,7 +668,7 @@ TEST(ForceBounds, AModelThatRepeatsOwesFrictionToItsMeanForce) {
 }
 
 TEST(ForceBounds, AMassBehindACouplingCountsTheMeanOfTheUnlimitedForce) {
-    // A narrow peak on a constant: its mean is 0, and that of the limited force is not.
+    // A narrow peak on a constant: its mean is 0, the mean of the limited force is not 0.
     NetworkParameters peak;
     peak.alpha = {12.0};
     peak.beta = {0.5};
@@ -649,7 +684,7 @@ TEST(ForceBounds, AMassBehindACouplingCountsTheMeanOfTheUnlimitedForce) {
     EXPECT_GT(mean(StructureKind::Direct), 1e-3);
     EXPECT_EQ(mean(StructureKind::Massless), mean(StructureKind::Direct));
     EXPECT_EQ(mean(StructureKind::Implicit), 0.0);
-    // A loss takes what the mean gives, but not in the energy-consistent step.
+    // A loss dissipates the energy that the mean force gives, but not in the energy-consistent step.
     peak.bias += 0.01;
     const ForceModel pair{peak, {{0.0}, 0.0, 0.05}, turn, 0.01};
     const auto of_pair = [&](StructureKind kind) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a certificate that stood in a file is believed: nothing, and bounds that are wider than necessary.
+// Tests of stored certificates: every number is recomputed, and only bounds that are wider than necessary are accepted.
 #include <functional>
 #include <limits>
 #include <string>
@@ -29,7 +29,7 @@ Scheme direct() {
     return scheme;
 }
 
-/// Enough of everything for any of the models here.
+/// Returns a device that is strong enough for all models here.
 DeviceProfile strong() {
     DeviceProfile device;
     device.viscous_damping = 1e4;
@@ -38,7 +38,7 @@ DeviceProfile strong() {
     return device;
 }
 
-/// The message of the check; empty if the certificate is accepted.
+/// Returns the message of the check; empty if the certificate is accepted.
 std::string disagreement(const Certificate& stored, const ForceModel& model) {
     try {
         (void)checked(stored, model);
@@ -48,7 +48,7 @@ std::string disagreement(const Certificate& stored, const ForceModel& model) {
     }
 }
 
-/// What would stand in a file if the bounds had been these: every line follows from them.
+/// Returns the certificate that follows from other bounds.
 Certificate with_bounds(const Certificate& certificate, const std::function<void(ForceBounds&)>& change) {
     ForceBounds bounds = certificate.bounds;
     change(bounds);
@@ -74,7 +74,7 @@ TEST(CertificateCheck, BelievesWhatItWouldSayItself) {
     EXPECT_EQ(disagreement(certify(model, direct(), strong()), model), "");
 }
 
-// An older release bounded less sharply: what it proved is still true.
+// An older release used wider bounds; its proofs remain valid.
 TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter) {
     const ForceModel model = hysteretic();
     const Certificate certificate = certify(model, direct(), strong());
@@ -84,7 +84,7 @@ TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter)
             return [&widen, amount](ForceBounds& bounds) { widen(bounds, amount); };
         };
         EXPECT_EQ(disagreement(with_bounds(certificate, by(1e-3)), model), "") << name;
-        if (name != "mean_force") {  // of which there is none to understate
+        if (name != "mean_force") {  // it is 0 here and cannot be smaller
             const std::string wrong = disagreement(with_bounds(certificate, by(-1e-3)), model);
             EXPECT_EQ(wrong.rfind("certificate.bounds." + name + " is ", 0), 0U) << name << ": " << wrong;
         }
@@ -106,7 +106,7 @@ TEST(CertificateCheck, TakesNoBoundThatIsNotANumber) {
     EXPECT_FALSE(agree(std::numeric_limits<double>::quiet_NaN(), 1.0));
 }
 
-// Wider bounds, and the lines of the tighter ones: the lines are what is proved, and they follow from the bounds.
+// Wider bounds with the lines of the narrower ones. The lines must follow from the bounds.
 TEST(CertificateCheck, RefusesLinesThatAreNotThoseOfTheStoredBounds) {
     const ForceModel model = hysteretic();
     Certificate certificate = certify(model, direct(), strong());

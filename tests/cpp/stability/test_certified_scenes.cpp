@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether certified scenes keep what their certificates say: hands from limp to stiff and hands that are after
-// energy, on devices with exactly the damping and friction that was asked for.
+// Tests that certified scenes satisfy their certificates, with weak to stiff hands and hands that try to take energy
+// out, on devices with exactly the required damping and friction.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -24,7 +24,8 @@ constexpr int substeps = 8;
 constexpr auto to_the_end = [](const Tick& /*tick*/, const Motion& /*handle*/,
                                const EnergyAccount& /*account*/) { return true; };
 
-/// What the hand got out beyond what the object held, over what may be rounding; above 1 is a generator.
+/// Returns the energy that the hand took out in excess of the stored energy, divided by the rounding error. A value
+/// above 1 is a violation.
 double generated(const Scene& scene, const ClosedLoopEnd& end) {
     const double rounding = 1e-13 * scene.largest + 1e-15;
     return -(end.energy.least + scene.held) / rounding;
@@ -84,7 +85,7 @@ TEST(CertifiedScenes, NeverGiveMoreThanTheObjectHeld) {
     EXPECT_GE(tried.size(), 21U) << "structures, kinds of model and delays that were met";
 }
 
-// "No growing oscillation follows for passive hands only": what moves is never more than what was stored at first.
+// "No growing oscillation follows for passive hands only": kinetic energy never exceeds the energy stored at the start.
 TEST(CertifiedScenes, DoNotSwingUpWithPassiveHands) {
     test::Random random{21};
     for (int k = 0; k < test::cases(300); ++k) {
@@ -110,7 +111,7 @@ TEST(CertifiedScenes, DoNotSwingUpWithPassiveHands) {
     }
 }
 
-/// A scene of a random network over position and velocity, on a device with exactly what its certificate asks for.
+/// Returns a scene of a random network of position and velocity, on a device with exactly the need of its certificate.
 Scene random_scene_of_velocity(test::Random& random) {
     NetworkParameters network = test::random_network(random, random() % 7, 2);
     const double fastest = test::uniform(random, 0.2, 5.0);
@@ -118,7 +119,8 @@ Scene random_scene_of_velocity(test::Random& random) {
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 2.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    network.linear[1] = test::uniform(random, -0.2, 0.2);  // an object may push: the bound takes the size
+    network.linear[1] = test::uniform(random, -0.2, 0.2);  // an object may push, because the bound uses the
+                                                           // absolute value
     const double slowest = random() % 4 == 0 ? test::uniform(random, 0.0, 0.1) : -fastest;
     Scene scene{
         ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}), {}, {}};
@@ -126,7 +128,7 @@ Scene random_scene_of_velocity(test::Random& random) {
     return scene;
 }
 
-/// What the object holds at rest at x above what it holds at its lower edge.
+/// Returns the energy of the object at rest at x above that at its lower edge [J].
 double resting_energy(const VelocityNetwork& force, double x) {
     constexpr int cells = 200;  // over a quarter of the travel at most
     const double step = (x - force.lower()) / cells;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines of the certificate behind a coupling against optimised motions, with an energy account of its own: force times
-// motion, plus damping, sample by sample. Nothing of the simulated devices takes part.
+// Tests lines of the certificate behind a coupling with optimised motions and an independent energy account: force
+// times motion, plus damping, sample by sample. The simulated devices are not used.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -45,7 +45,7 @@ struct Bumps {
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 
-    /// Slopes, with a margin for what lies between the places looked at.
+    /// Returns the slopes, with a margin for positions between the samples.
     [[nodiscard]] Interval slopes() const {
         Interval found{stiffness, stiffness};
         for (double x = -6.0; x <= 6.0; x += 0.002) {
@@ -55,7 +55,7 @@ struct Bumps {
         return {found.lower - margin, found.upper + margin};
     }
 
-    /// Energy at a place above the least, of the force clipped to a limit.
+    /// Returns the energy at a position above the least, of the force clipped to a limit.
     [[nodiscard]] double held(double place, double limit) const {
         constexpr double step = 1e-3;
         double energy = 0.0;
@@ -73,7 +73,7 @@ struct Bumps {
     }
 };
 
-/// Period 1 and coupling stiffness 1.
+/// A scene with period 1 and coupling stiffness 1.
 struct CoupledScene {
     Bumps object;
     Scheme scheme;
@@ -92,8 +92,8 @@ std::ostream& operator<<(std::ostream& out, const CoupledScene& scene) {
                << ", b = " << scene.device.viscous_damping;
 }
 
-/// The least energy that a hand has put in after any sample, that after the last one, and the throughput. `parts` holds, for each sample, the
-/// motion before the command changes and the motion after it.
+/// Returns the least energy that a hand has put in after any sample, that after the last sample, and the throughput.
+/// `parts` contains, for each sample, the motion before the command changes and the motion after it.
 struct Account {
     double least = 0.0;
     double last = 0.0;  ///< after the last sample
@@ -147,7 +147,7 @@ Account account_of(const CoupledScene& scene, const Parts& parts) {
     }
 }
 
-/// Sets exactly the damping that the certificate needs, times `share`. False if no damping is enough.
+/// Sets exactly the damping that the certificate requires, times `share`. Returns false if no damping is sufficient.
 bool set_damping(CoupledScene& scene, double share) {
     ForceBounds bounds;
     bounds.slope = scene.slopes;
@@ -184,7 +184,7 @@ CoupledScene random_scene(test::Random& random, bool linear) {
         scene.device.delay_s += test::uniform(random, 0.1, 0.9);
     }
     scene.device.force_limit = random() % 4 == 0 ? 1e9 : std::exp(test::uniform(random, -3.0, 1.0));
-    // From rest: the nearest place without force.
+    // Starts at rest at the nearest position without force.
     for (int k = 0; k < 300 && !linear; ++k) {
         const double force = scene.object.at(scene.start, {}).force;
         scene.start -= std::clamp(force / scene.slopes.largest(), -0.1, 0.1);
@@ -197,8 +197,8 @@ CoupledScene random_scene(test::Random& random, bool linear) {
     return scene;
 }
 
-/// The least energy that optimised motions leave, over their throughput: swings of many frequencies, sizes and
-/// lengths, strokes with rests between, then random changes of the best one, kept where they give more.
+/// Returns the least energy that optimised motions leave, divided by their throughput. Tries swings of many
+/// frequencies, sizes and lengths, strokes with rests between, then random changes of the best motion.
 double optimised(test::Random& random, const CoupledScene& scene, int trials) {
     const std::size_t samples = 60 + random() % 120;
     const double share = scene.device.delay_fraction();
@@ -229,7 +229,7 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
             const double first = share > 0.0 ? test::uniform(random, 0.0, 1.2) : 0.0;
             const std::size_t end = samples / 2 + random() % (samples / 2);
             parts.assign(samples, {0.0, 0.0});
-            const bool strokes = random() % 2 == 0;  // at an even speed, with rests between
+            const bool strokes = random() % 2 == 0;  // at constant speed, with rests between
             double speed = 0.0;
             for (std::size_t k = 0; k < end; ++k) {
                 if (random() % 12 == 0) {
@@ -276,7 +276,7 @@ TEST(CoupledAccount, OptimisedMotionsGetNoEnergyOutOfCertifiedScenes) {
     }
 }
 
-// The same search is able to find energy: the held coupling is exact where its object is a wall, or a spring that
+// The same search finds energy below the bound: the held coupling is exact if its object is a wall, or a spring that
 // resonates with it.
 TEST(CoupledAccount, OptimisedMotionsFindEnergyBelowTheBoundOfTheHeldCoupling) {
     test::Random random{42};

@@ -35,7 +35,7 @@ TEST(DirectLines, JitterCostsTheLongerPeriodAndTheSamplesThatComeCloser) {
     late.jitter_s = 1e-9;
     EXPECT_NEAR(device_need(late, {1.0, 1.0}), steady, 1e-5);
     late.jitter_s = 1e-4;
-    // Windows of 1 ms; a neighbour before or after shares at most 0.1 ms: Lambda^2 = 1.1 / 1.1.
+    // Windows of 1 ms; a neighbour before or after overlaps at most 0.1 ms: Lambda^2 = 1.1 / 1.1.
     EXPECT_NEAR(device_need(late, {1.0, 1.0}), 1.5, 1e-9);
     late.delay_s = 2e-3;  // Lambda^2 = (2 + 1.1 + 1 + 0.1) / 1.1
     EXPECT_NEAR(device_need(late, {1.0, 1.0}), 0.5 + std::sqrt(4.2 / 1.1), 1e-9);
@@ -133,7 +133,7 @@ TEST(DirectLines, NarrowestPlayIsJustCertified) {
     EXPECT_TRUE(std::isinf(narrowest_play(sliding, device(0.0), 0.0, 1.0)));
 }
 
-/// Without delay the play of the reading counts as exact: h / r enters the friction once.
+/// Without delay the play of the reading is treated as exact: h / r adds to the friction once.
 TEST(DirectLines, EncoderOfHysteresisCountsTheStickOnce) {
     ForceBounds bounds;
     bounds.hysteresis = true;
@@ -154,13 +154,13 @@ TEST(DirectLines, EncoderOfHysteresisCountsTheStickOnce) {
     EXPECT_TRUE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction *= 0.99;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
-    bounds.loss_per_play = bounds.loss.upper / 0.4e-3;  // a play of less than half a step
+    bounds.loss_per_play = bounds.loss.upper / 0.4e-3;  // a play smaller than half a step
     profile.coulomb_friction = (20.0 + 1.5 * bounds.loss_per_play) * 0.5e-3;
     profile.viscous_damping = 10.0;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
 }
 
-/// g and h made of straight pieces of equal width that repeat, rendered with the play of the reading.
+/// g and h of periodic straight pieces of equal width, rendered with the play of the reading.
 struct Pieces {
     std::vector<double> at_corner;
 
@@ -176,7 +176,8 @@ struct Pieces {
     }
 };
 
-/// What a hand puts in for the second turn of a closed motion, over what friction and damping take.
+/// Returns the energy that a hand puts in during the second turn of a closed motion, divided by the losses of friction
+/// and damping.
 double share_put_in(const Pieces& g, const Pieces& h, double r, const std::vector<double>& positions,
                     double B, double friction) {
     double work = 0.0;
@@ -223,7 +224,7 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
             bounds.sliding = std::max(bounds.sliding, std::abs(g.slope(k)) + steep);
         }
         DeviceProfile profile = device(0.0, 1.0);
-        profile.coulomb_friction = 0.0;  // the line that counts h / r once
+        profile.coulomb_friction = 0.0;  // of the line that counts h / r once
         const std::vector<Inequality> lines = hysteresis_inequalities(bounds, profile);
         const double B = lines[1].right / profile.period_s;
         for (const double share : {1.0, 0.5}) {
@@ -241,7 +242,7 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
                         static_cast<std::size_t>(unit(random) * static_cast<double>(next.size()));
                     for (std::size_t k = 0; k < next.size(); ++k) {
                         next[k] += k == one || trial % 5 == 0 ? change * normal(random) : 0.0;
-                        if (k == one && trial % 3 == 0) {  // beside the edge of a count
+                        if (k == one && trial % 3 == 0) {  // near the edge of a count
                             next[k] = std::floor(next[k]) + 0.5 + (unit(random) < 0.5 ? -1e-6 : 1e-6);
                         }
                     }
@@ -263,7 +264,7 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
             }
         }
     }
-    EXPECT_GE(found, 8);  // the search finds what is there
+    EXPECT_GE(found, 8);  // the search finds violations
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A search for motions that take energy out of certified scenes. Its account, its motions and the stored energy are
-// written apart from the core's: sum F d + (b/T) d^2 + f_c |d| >= -(S_0 - S_min) for every motion of every length.
+// Searches motions that take energy out of certified scenes. Its account, its motions and the stored energy are
+// independent of the core: sum F d + (b/T) d^2 + f_c |d| >= -(S_0 - S_min) for every motion of every length.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -45,7 +45,7 @@ TEST(EnergySearch, FindsFailuresAt95PercentOfTightBounds) {
     }
 }
 
-/// A spring of stiffness 1 on a line of nodes of distance 1, as the value iteration sees it.
+/// Returns the need of a spring of stiffness 1 on a line of nodes of distance 1, from the value iteration.
 double spring_need(int nodes, int reach, int delay, double late) {
     HeldScene scene;
     scene.read = even_grid(0.0, 1.0, nodes, reach);
@@ -79,7 +79,7 @@ TEST(EnergySearch, FindsEnergyWhereAFractionalDelayIsCountedWithItsShareOfASampl
     EXPECT_GT(spring_need(200, 4, 0, 0.25), 0.5 + 0.25 + 0.03);
 }
 
-/// True if turning a wheel without friction takes energy out; `command` is the force that is sent for f(x).
+/// Returns true if turning a wheel without friction takes energy out; `command` is the force that is sent for f(x).
 template <class Command>
 bool wheel_gives_energy(const std::vector<double>& forces, const Command& command) {
     const Pieces wheel{0.0, 1.0 / static_cast<double>(forces.size()), forces, true};
@@ -94,7 +94,7 @@ bool wheel_gives_energy(const std::vector<double>& forces, const Command& comman
     return scene.search(1.0 + 1e-9, 1.0).violated();
 }
 
-// A peak of 8 N m on a device that makes 5: its mean is 0, that of the clipped force is not.
+// A peak of 8 N m on a device that makes 5: its mean is 0, the mean of the clipped force is not 0.
 TEST(EnergySearch, FindsTheMotorThatAForceLimitMakes) {
     std::vector<double> forces(10, -8.0 / 9.0);
     forces[3] = 8.0;
@@ -112,7 +112,7 @@ TEST(EnergySearch, FindsTheMotorThatAForceLimitMakes) {
         << "softening before the limit";
 }
 
-/// Damping below which energy is taken out of a mass of 0.05 kg behind 90 N/m on a device that makes 5 N.
+/// Returns the damping below which energy is taken out of a mass of 0.05 kg behind 90 N/m on a device that makes 5 N.
 double thrown_mass_need(double limit_inside) {
     constexpr double period = 1e-3;
     Implicit structure{test::Spring{0.0}, {0.05, 0.0}, {90.0, 0.0}, period, LoadLineSolver{}, limit_inside};

@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// Prediction over m samples: x + (x - mean of the m readings before) / (m + 1), as a filter of the steps.
+/// Returns the prediction over m samples as a filter of the steps: x + (x - mean of the m readings before) / (m + 1).
 std::vector<double> prediction(int m) {
     std::vector<double> taps;
     for (int j = 1; j <= m; ++j) {
@@ -22,9 +22,9 @@ std::vector<double> prediction(int m) {
     return taps;
 }
 
-/// A force made of straight pieces of equal width that repeats, and its energy above its least.
+/// A periodic force of straight pieces of equal width, and its energy above its least.
 struct Zigzag {
-    std::vector<double> force;  ///< at 0, 1, 2, ...; the first again after the last
+    std::vector<double> force;  ///< at 0, 1, 2, ...; then periodic
 
     [[nodiscard]] double at(double x) const {
         const auto pieces = static_cast<double>(force.size());
@@ -76,7 +76,7 @@ TEST(HeldForce, FallingSlopesCostLessThanRisingOnesWithDelay) {
     EXPECT_NEAR(delayed_need(1, 0.0, {0.0, 1.0}), 0.50, 0.005);
     EXPECT_NEAR(delayed_need(2, 0.0, {0.0, 1.0}), 0.82, 0.005);
     EXPECT_NEAR(delayed_need(3, 0.0, {0.0, 1.0}), 1.15, 0.005);
-    // With one sample of delay they cost nothing up to twice the rising slope.
+    // With one sample of delay they add nothing up to twice the rising slope.
     EXPECT_NEAR(delayed_need(1, 0.0, {1.0, 2.0}), 1.5, 1e-12);
     EXPECT_GT(delayed_need(1, 0.0, {1.0, 2.2}), 1.505);
 }
@@ -157,27 +157,27 @@ TEST(HeldForce, WithoutAFilterBothLinesOfAFractionAreClose) {
     }
 }
 
-/// How commands are computed and when they act, in nominal periods.
+/// Times and filter of the commands, in nominal periods.
 struct Timing {
     std::vector<double> taps;  ///< the command of sample k is f(x_k - sum of taps[j - 1] d_{k-j})
     double delay = 0.0;        ///< from a sample to its command
     double jitter = 0.0;       ///< samples are taken at k + u_k, 0 <= u_k <= jitter
 };
 
-/// A motion that repeats after as many samples as there are `late`.
+/// A motion that repeats after as many samples as `late` has elements.
 struct Cycle {
     double start = 0.0;
     std::vector<double> late;   ///< u_k
-    std::vector<double> moved;  ///< between two events, samples and commands, in the order of time
+    std::vector<double> moved;  ///< between two events (samples and commands), in order of time
 };
 
-/// What a hand must put in for one turn of a cycle, over what the damping b takes.
+/// Returns the energy that a hand must put in for one turn of a cycle, divided by the loss of the damping b.
 double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing, double b) {
     const auto count = static_cast<int>(cycle.late.size());
     struct Event {
         double time;
         int sample;    ///< taken here, or -1
-        int takes_on;  ///< command that begins here, or -1
+        int takes_on;  ///< command that starts here, or -1
     };
     std::vector<Event> events;
     for (int k = 0; k < count; ++k) {
@@ -188,7 +188,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     }
     std::stable_sort(events.begin(), events.end(),
                      [](const Event& one, const Event& other) { return one.time < other.time; });
-    // Nothing moves in a part of no length; the rest of the turn is taken off in proportion to time.
+    // The handle rests in a part of length 0; the rest of the turn is reduced in proportion to time.
     std::vector<double> time(events.size());
     std::vector<double> moved(events.size());
     double turn = 0.0;
@@ -205,7 +205,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
         if (events[e].sample >= 0) {
             position[static_cast<std::size_t>(events[e].sample)] = x;
         } else {
-            acting = events[e].takes_on;  // the last of the turn is the one with which it begins
+            acting = events[e].takes_on;  // the last command of the turn acts at its start
         }
         moved[e] -= time[e] > 1e-9 ? turn * time[e] / count : 0.0;
         x += moved[e];
@@ -232,7 +232,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     return lost > 0.0 ? work / lost + 1.0 : 1.0;
 }
 
-/// The least share found by hill descent over closed cycles.
+/// Returns the least share found by hill descent over closed cycles.
 double worst_share(const Zigzag& law, const Timing& timing, double b, std::mt19937& random) {
     std::uniform_real_distribution<double> unit{0.0, 1.0};
     std::normal_distribution<double> normal;
@@ -292,7 +292,7 @@ Scene random_scene(std::size_t pieces, std::mt19937& random) {
     return scene;
 }
 
-/// Scenes in which a motion gives energy at `share` of the need; none may at the whole of it.
+/// Returns the number of scenes in which a motion gives energy at `share` of the need. It must be 0 at the full need.
 template <class Need>
 int violated(double share, int scenes, Need need) {
     std::mt19937 random{7};
@@ -314,7 +314,7 @@ TEST(HeldForce, NoMotionTakesEnergyOutOfADelayedForce) {
         return delayed_need(k % 3, tau, slopes);
     };
     EXPECT_EQ(violated(1.0, 40, need), 0);
-    EXPECT_GE(violated(0.6, 40, need), 10);  // the search finds what is there
+    EXPECT_GE(violated(0.6, 40, need), 10);  // the search finds violations
 }
 
 TEST(HeldForce, NoMotionTakesEnergyOutWithJitter) {

@@ -20,7 +20,7 @@ Domain wheel() {
     return {{0.0}, {turn}, Continuation::Linear, Continuation::Linear, turn};
 }
 
-/// A wheel with one peak of 8 N*m whose force has no mean.
+/// Returns a wheel with one peak of 8 N*m and mean force 0.
 NetworkParameters peak() {
     NetworkParameters network;
     network.alpha = {8.0, 0.6, 0.6};
@@ -35,7 +35,7 @@ NetworkParameters balanced(NetworkParameters network, double force_limit) {
     return network;
 }
 
-/// The energy that a hand gets from one slow turn: the limited force summed over fine steps.
+/// Returns the energy that a hand takes out in one slow turn: the limited force summed over fine steps.
 double given_in_a_turn(const ForceModel& model, double force_limit, double side = 0.0) {
     constexpr int steps = 200'000;
     double given = 0.0;
@@ -54,7 +54,7 @@ TEST(LimitedMean, ABalancedWheelWithAPeakAboveTheLimitIsAMotor) {
     EXPECT_GT(force_bounds(model).slope.upper, 0.0);
     EXPECT_EQ(force_bounds(model).mean_force, 0.0);
     const double given = std::abs(given_in_a_turn(model, 5.0));
-    EXPECT_GT(given, 0.2);  // J per turn
+    EXPECT_GT(given, 0.2);  // [J per turn]
     EXPECT_NEAR(force_bounds(model, 0.0, 5.0).mean_force, given / turn, 1e-8);
 }
 

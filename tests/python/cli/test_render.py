@@ -85,7 +85,7 @@ def test_what_is_wrong_is_refused(words: dict[str, object], sentence: str) -> No
 def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
     out.write_text("precious", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"felt.csv exists already; choose another name, or .*force=True"):
+    with pytest.raises(ValueError, match=r"felt.csv exists already; .* set force to replace it"):
         render(Scheme(), duration_s=0.3, record=str(out))
     words = [*COMMAND, "--duration-s", "0.8", "--record", str(out), *PATIENT]
     refused = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -20,7 +20,7 @@ import pytest
 import palpate
 from palpate.cli.main import main
 from palpate.errors import InputError
-from palpate.identification.data.large_files import MOST_CELLS, Summary, merged, summarise
+from palpate.identification.identify_files import MOST_CELLS, Summary, merged, summarise
 from palpate.recording.reading import open_long_recording
 
 SCALE = float(os.environ.get("PALPATE_TEST_SCALE", "1"))

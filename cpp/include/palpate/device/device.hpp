@@ -10,31 +10,31 @@
 
 namespace palpate {
 
-/// What is sent to a device: the force of the virtual object against the handle. A force > 0 pushes the
-/// handle towards smaller positions, out of the object.
+/// Command to a device: the force of the virtual object against the handle. A force > 0 pushes the handle towards
+/// smaller positions, out of the object.
 struct Command {
     double force = 0.0;  ///< [N or N*m]
 };
 
-/// What a device answers.
+/// One sample of a device.
 struct Reading {
-    double position = 0.0;                                       ///< measured [m or rad]
-    double velocity = 0.0;                                       ///< measured or differenced
-    double applied = 0.0;                                        ///< the force acting now, in Command's sign
-    double measured = std::numeric_limits<double>::quiet_NaN();  ///< force transducer; NaN without one
-    double device_time = 0.0;                                    ///< the device's own clock [s]
-    std::uint64_t sequence = 0;                                  ///< counts the device's samples
+    double position = 0.0;  ///< measured [m or rad]
+    double velocity = 0.0;  ///< measured, or a difference quotient
+    double applied = 0.0;   ///< current force, with the sign of `Command`
+    double measured = std::numeric_limits<double>::quiet_NaN();  ///< of the force transducer; NaN without one
+    double device_time = 0.0;                                    ///< clock of the device [s]
+    std::uint64_t sequence = 0;                                  ///< number of the device's sample
     Status status = Status::Ok;
 };
 
-/// How opening a device ended: `reason` is empty when it is open, else one sentence with the likely cure.
+/// Result of opening a device: `reason` is empty if it is open, otherwise one sentence with the likely cure.
 struct Opened {
     std::string reason;
     [[nodiscard]] explicit operator bool() const noexcept { return reason.empty(); }
 };
 
-/// A haptic device of one degree of freedom. `exchange` sends the command and returns the next sample: it
-/// fits a device that paces the host (it waits) and one that the host paces (it answers at once).
+/// A haptic device of one degree of freedom. `exchange` sends the command and returns the next sample. It waits if the
+/// device paces the host, and returns at once if the host paces the device.
 template <class D>
 concept Device = requires(D& device, const Command& command) {
     { device.open() } -> std::same_as<Opened>;
@@ -42,8 +42,8 @@ concept Device = requires(D& device, const Command& command) {
     { device.close() } noexcept;
 };
 
-/// Whether a device paces the host: its exchange waits for the next sample of the device's own clock. Such a device
-/// says so by a member of this name; the others answer at once, and the host's clock paces both.
+/// True if a device paces the host: its exchange waits for the next sample of the device's clock. Such a device has a
+/// member of this name. Other devices return at once, and the host's clock paces both.
 template <Device D>
 inline constexpr bool paces_host = [] {
     if constexpr (requires { D::paces_host; }) {

@@ -13,16 +13,16 @@
 
 namespace palpate {
 
-/// Longest delay between a sample and its force, in samples.
+/// Longest delay between a sample and its force [samples].
 inline constexpr int longest_delay_samples = 16;
 
-/// The same at a period [s], with room for rounding.
+/// Returns the longest delay at a period [s], with a margin for rounding.
 [[nodiscard]] constexpr double longest_delay_s(double period_s) noexcept {
     return longest_delay_samples * period_s * (1.0 + 1e-9);
 }
 
-/// What is known of a haptic device; `fields_of` says what each number means. The default is a direct-drive knob with a
-/// 16-bit encoder.
+/// Properties of a haptic device; `fields_of` states the meaning of each number. The default is a direct-drive knob
+/// with a 16-bit encoder.
 struct DeviceProfile {
     std::string id = "simulated-knob";
     std::string position_unit = "rad";
@@ -36,24 +36,24 @@ struct DeviceProfile {
     double force_limit = 5.0;
     double jitter_s = 0.0;
 
-    /// What a certificate has to hold for.
+    /// Returns the longest time between two samples, for which a certificate must hold [s].
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
 
-    /// n: number of whole samples in the delay. Rounding of a period's 1e-9 counts as none.
+    /// Returns n, the number of whole samples in the delay. A rest below 1e-9 of a period is rounding.
     [[nodiscard]] int whole_delay_samples() const noexcept {
         return static_cast<int>(std::floor(delay_s / period_s + 1e-9));
     }
-    /// tau: rest of the delay, 0 <= tau < 1 [samples].
+    /// Returns tau, the rest of the delay, 0 <= tau < 1 [samples].
     [[nodiscard]] double delay_fraction() const noexcept {
         const double rest = delay_s / period_s - whole_delay_samples();
         return rest > 1e-9 ? rest : 0.0;
     }
-    /// Smallest number of whole samples that is not shorter than the delay.
+    /// Returns the smallest number of whole samples that is not shorter than the delay.
     [[nodiscard]] int late_samples() const noexcept {
         return whole_delay_samples() + (delay_fraction() > 0.0 ? 1 : 0);
     }
 
-    /// True if the device can make this force. Less than a force step is rounding.
+    /// Returns true if the device can make this force. An excess below a force step is rounding.
     [[nodiscard]] bool makes(double force) const noexcept {
         return force <= force_limit * (1.0 + 1e-9) + force_step;
     }
@@ -88,6 +88,12 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     Field<&DeviceProfile::force_limit>{"force_limit", "Largest force [N or N*m].", Rule::Positive},
     Field<&DeviceProfile::jitter_s>{
         "jitter_s", "How much longer than T the time between two samples can get [s].", Rule::NotNegative}};
+
+/// The profile without damping and friction: nobody measured them, so nothing may count on them.
+[[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {
+    profile.viscous_damping = profile.coulomb_friction = 0.0;
+    return profile;
+}
 
 /// Throws std::invalid_argument naming the field, its value and what would be right.
 inline void validate(const DeviceProfile& profile) {

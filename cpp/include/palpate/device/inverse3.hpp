@@ -25,45 +25,47 @@
 
 namespace palpate {
 
-/// Where an Inverse3 is found, and which of its directions is the handle's.
+/// Address of an Inverse3, and the direction that is used as handle.
 struct Inverse3Settings {
     std::string host = "127.0.0.1";
     std::uint16_t port = 10001;
     int axis = 2;                                    ///< 0 = x, 1 = y, 2 = z
-    double direction = 1.0;                          ///< +1 or -1: the way that goes into the object
-    std::chrono::milliseconds connect_within{2000};  ///< each step of opening
+    double direction = 1.0;                          ///< +1 or -1: sign of the direction into the object
+    std::chrono::milliseconds connect_within{2000};  ///< for each step of opening
     std::chrono::milliseconds answer_within{20};     ///< then the exchange is a Timeout
 };
 
-/// What the service said of the device when it was opened.
+/// Properties of the device that the service stated on opening.
 struct Inverse3Info {
     std::string id;           ///< short identifier, such as 049D
     std::string type;         ///< inverse3, inverse3x, minverse
-    double force_gate = 0.0;  ///< the service's own weakening of forces where it sees oscillation: gain [-]
-    double damping = 0.0;     ///< the service's own added damping: scalar
+    double force_gate = 0.0;  ///< service's reduction of forces during oscillation: gain [-]
+    double damping = 0.0;     ///< damping that the service adds: scalar
 };
 
-/// One direction of a Haply Inverse3, Inverse3x or Minverse, through the Inverse Service of its maker: JSON over
-/// a local WebSocket. Never tried on hardware; tested against a server that speaks these messages.
+/// One direction of a Haply Inverse3, Inverse3x or Minverse, through the Inverse Service of its maker: JSON over a
+/// local WebSocket. It was never tried on hardware; a test server that uses these messages replaces the service.
 ///
-/// What the documentation of version 3.5 fixes (docs.haply.co/inverseSDK/service: "WebSocket Protocol",
-/// "Control Commands", "Common Types", "JSON Conventions", "Filters", tutorials 01 and 05):
-/// - ws://localhost:10001; on connection the service sends every device with config, state and status; from
-///   then on exactly one message of states for each message that it receives, so that the host paces;
-/// - inverse3[].device_id; state.cursor_position in m, cursor_velocity in m/s, current_cursor_force in N, each
-///   {x, y, z} of a right-handed frame; status.calibrated;
-/// - inverse3[].commands.set_cursor_force.vector in N, applied once and forgotten: who falls silent gets an idle
-///   device; session.configure.profile.name in the first message only;
-/// - config.filters.force_gate.gain and .damping.scalar: forces pass both, and a global scale, on their way.
-/// Older versions call the vector `values` and ignore what they do not know. So a force of which the state never
-/// shows anything ends in a Fault: it would be rendered to nobody.
+/// The documentation of version 3.5 defines (docs.haply.co/inverseSDK/service: "WebSocket Protocol", "Control
+/// Commands", "Common Types", "JSON Conventions", "Filters", tutorials 01 and 05):
+/// - ws://localhost:10001. On connection the service sends every device with config, state and status. After that it
+///   sends one message of states for each message that it receives, so the host paces the device.
+/// - inverse3[].device_id; state.cursor_position in m, cursor_velocity in m/s, current_cursor_force in N, each {x, y,
+///   z} of a right-handed frame; status.calibrated.
+/// - inverse3[].commands.set_cursor_force.vector in N. It acts once, so a silent host gets an idle device.
+///   session.configure.profile.name is in the first message only.
+/// - config.filters.force_gate.gain and .damping.scalar. Forces pass both filters and a global scale.
 ///
-/// Position 0 is where the handle is when it is opened. The service tells no time: device_time is the host's, at
-/// the answer. An exchange parses JSON, and so allocates: that is the price of this service.
+/// Older versions name the vector `values` and ignore unknown keys. If the state never shows an effect of a force, the
+/// exchange therefore ends in a Fault.
+///
+/// Position 0 is the position of the handle on opening. The service does not send its time, so device_time is the
+/// host's time at the answer. An exchange parses JSON and therefore allocates memory.
 class Inverse3Device {
   public:
     explicit Inverse3Device(Inverse3Settings settings = {}) : settings_{std::move(settings)} {}
 
+    /// Connects to the service, chooses the device and reads its position.
     Opened open() {
         link_ = std::make_unique<Link>();
         const std::string service = settings_.host + ":" + std::to_string(settings_.port);
@@ -82,8 +84,8 @@ class Inverse3Device {
         return {};
     }
 
-    /// Sends the command and waits for the state that answers it. An answer that comes too late is taken by the
-    /// next exchange, together with its own.
+    /// Sends the command and waits for the state that answers it. A late answer is read by the next exchange, together
+    /// with the next one.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (!link_ || link_->gone) {
             last_.status = Status::Fault;
@@ -112,7 +114,7 @@ class Inverse3Device {
             }
         } catch (const std::exception&) {
             link_->gone =
-                true;  // what matters was sent before: a service that hears nothing idles the device
+                true;  // the force command ended before: the service sets a device without messages to idle
         }
         link_.reset();
     }
@@ -124,26 +126,26 @@ class Inverse3Device {
     using Json = nlohmann::json;
     using Error = boost::system::error_code;
 
-    /// A connection and what is on its way. Its address must not change: handlers hold it.
+    /// A connection and its pending operations. Its address must not change, because handlers store it.
     struct Link {
         boost::asio::io_context context;
         boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
         boost::beast::flat_buffer buffer;
-        std::string message;       ///< being sent
-        std::string command_head;  ///< of every message but the first, up to the numbers
+        std::string message;       ///< in transmission
+        std::string command_head;  ///< of every message after the first, up to the numbers
         bool sending = false;
         bool reading = false;
         bool gone = false;
-        int unanswered = 0;     ///< messages whose state has not come
-        double position = 0.0;  ///< of the axis, as the service tells it [m]
+        int unanswered = 0;     ///< messages without a state so far
+        double position = 0.0;  ///< of the axis, as the service states it [m]
         double origin = 0.0;
         double velocity = 0.0;
-        double echoed = 0.0;  ///< the service's current force along the axis [N]
+        double echoed = 0.0;  ///< current force along the axis, as the service states it [N]
         std::uint64_t sequence = 0;
-        int unheeded = 0;  ///< states in a row without a trace of the force that was sent
+        int unheeded = 0;  ///< consecutive states without an effect of the force
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 
-        /// Handlers run here and nowhere else. Whether `done` came true in time.
+        /// Runs handlers, which run only here. Returns true if `done` became true in time.
         template <class Done>
         bool run(std::chrono::milliseconds within, Done done) {
             const auto until = std::chrono::steady_clock::now() + within;
@@ -154,7 +156,7 @@ class Inverse3Device {
         }
     };
 
-    static constexpr double noticed_force = 0.05;  ///< a service that heeds this shows something of it [N]
+    static constexpr double noticed_force = 0.05;  ///< least force whose effect the state must show [N]
     static constexpr int most_unheeded = 200;
 
     void connect(const std::string& service) {
@@ -190,7 +192,7 @@ class Inverse3Device {
         await();
     }
 
-    /// The next message, while opening.
+    /// Returns the next message during opening.
     [[nodiscard]] std::string received(const std::string& service, const char* otherwise) {
         bool done = false;
         Error error;
@@ -229,7 +231,8 @@ class Inverse3Device {
                               R"(,"commands":{"set_cursor_force":{"vector":{)";
     }
 
-    /// The first message names the program and sends no force; its answer tells where the handle is.
+    /// Sends the first message, which names the program and has zero force. Its answer contains the position of the
+    /// handle.
     void begin_session(const std::string& service) {
         write_message(0.0, R"({"session":{"configure":{"profile":{"name":"palpate"}}},)");
         Error error;
@@ -256,7 +259,7 @@ class Inverse3Device {
 
     [[nodiscard]] Status exchanged(double force) {
         Link& link = *link_;
-        if (!link.sending) {  // at most one command on its way
+        if (!link.sending) {  // at most one command in transmission
             write_message(force, "{");
             link.sending = true;
             ++link.unanswered;
@@ -305,7 +308,7 @@ class Inverse3Device {
         });
     }
 
-    /// Throws where the message is not what the documentation says, or speaks of our device no longer.
+    /// Reads a state. Throws if the message differs from the documentation, or does not contain this device.
     void take_state(const std::string& text) {
         const Json message = Json::parse(text);
         for (const Json& device : message.at("inverse3")) {
@@ -333,8 +336,8 @@ class Inverse3Device {
 
 static_assert(Device<Inverse3Device>);
 
-/// Reads the part after "inverse3" of a device's name: nothing, or ":AXIS", or ":AXIS@PORT", with AXIS one of
-/// x, y, z, -x, -y, -z. Throws std::invalid_argument with what would be right.
+/// Reads the part after "inverse3" of a device's name: empty, ":AXIS" or ":AXIS@PORT", with AXIS one of x, y, z, -x,
+/// -y, -z. Throws std::invalid_argument with the valid form.
 [[nodiscard]] inline Inverse3Settings inverse3_settings(const std::string& text) {
     Inverse3Settings settings;
     const std::size_t at = text.find('@');

@@ -14,33 +14,34 @@
 
 namespace palpate {
 
-/// How well a stream of packets goes, counted since it was opened.
+/// Counters of a stream of packets since it was opened.
 struct StreamHealth {
-    std::uint64_t packets = 0;         ///< that were understood
-    std::uint64_t lost = 0;            ///< samples of the device that nobody saw
-    std::uint64_t repeated = 0;        ///< samples that came again, or from before
-    std::uint64_t malformed = 0;       ///< of the wrong size, magic or version
-    std::uint64_t late_echoes = 0;     ///< of an OUT packet from before the last one echoed
-    std::uint64_t watchdog_trips = 0;  ///< times that the device's watchdog ended a torque
+    std::uint64_t packets = 0;         ///< valid
+    std::uint64_t lost = 0;            ///< samples of the device that did not arrive
+    std::uint64_t repeated = 0;        ///< samples that came again or late
+    std::uint64_t malformed = 0;       ///< wrong size, magic or version
+    std::uint64_t late_echoes = 0;     ///< of earlier OUT packets
+    std::uint64_t watchdog_trips = 0;  ///< torques that it ended
+
     std::uint64_t refused_commands =
-        0;  ///< packets that told of an OUT packet that the device did not understand
-    std::uint64_t late_commands = 0;  ///< that took longer to the device than they may
-    DurationHistogram round_trip;     ///< from an OUT packet's way out to its echo's arrival, host clock [ns]
-    DurationHistogram delay;          ///< from a sample to the force computed from it, device clock [ns]
+        0;  ///< packets with the message that the device did not understand an OUT packet
+    std::uint64_t late_commands = 0;  ///< that took longer than allowed
+    DurationHistogram round_trip;     ///< from an OUT packet to its echo, host clock [ns]
+    DurationHistogram delay;          ///< from a sample to its force, device clock [ns]
 };
 
-/// Makes readings of the packets of one device: counters that wrap become ones that do not, counts become SI, status
-/// bits become a Status, the echo of a command tells how long it was on its way.
+/// Converts the packets of one device to readings: counters become unwrapped, counts become SI units, status bits
+/// become a Status, and echoes give the delay of commands.
 ///
-/// The delay needs no clock but the device's: a command that was computed from the sample latched at t_k and is
-/// echoed by a packet latched at t_m, `out_age` after it was accepted, came t_m - out_age - t_k after its sample.
+/// The delay needs only the clock of the device. A command computed from the sample latched at t_k is echoed by a
+/// packet latched at t_m, `out_age` after it was accepted. It came t_m - out_age - t_k after its sample.
 class PacketStream {
   public:
     PacketStream() = default;
     explicit PacketStream(const wire::Info& info, Nanoseconds longest_delay) noexcept
         : info_{info}, longest_delay_{longest_delay} {}
 
-    /// A packet that arrived at `now`, of the host's clock. False: not a packet of this protocol.
+    /// Takes a packet that arrived at `now` of the host's clock. Returns false if it is not a packet of this protocol.
     [[nodiscard]] bool take(std::span<const std::uint8_t> bytes, Nanoseconds now) noexcept {
         wire::InPacket packet;
         if (!wire::decode(bytes, packet)) {
@@ -66,17 +67,18 @@ class PacketStream {
         return true;
     }
 
-    /// Packets were thrown away: the next one does not follow the last, and what is sent before it is no answer.
+    /// Marks that packets were discarded: the next packet does not follow the last, and commands before it have no
+    /// sample.
     void pause() noexcept { follows_ = false; }
     [[nodiscard]] bool follows() const noexcept { return follows_; }
 
-    /// The next command on its way out at `now`.
+    /// Returns the next command, to be sent at `now`.
     [[nodiscard]] wire::OutPacket next_command(double force, std::uint16_t time_to_live_ms,
                                                Nanoseconds now) const noexcept {
         return {static_cast<std::uint16_t>(sent_ + 1), wire::torque_of(force, info_.max_torque_uNm),
                 time_to_live_ms, static_cast<std::uint32_t>(now / 1000)};
     }
-    /// It went out.
+    /// Stores a command that was sent.
     void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
         has_sent_ = true;
         sent_ = command.sequence;
@@ -85,7 +87,7 @@ class PacketStream {
 
     [[nodiscard]] const Reading& reading() const noexcept { return reading_; }
     [[nodiscard]] const StreamHealth& health() const noexcept { return health_; }
-    /// Of the last packet.
+    /// Returns the status bits of the last packet.
     [[nodiscard]] std::uint16_t status_bits() const noexcept { return status_bits_; }
 
   private:
@@ -93,10 +95,11 @@ class PacketStream {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
         std::int64_t sample_us =
-            std::numeric_limits<std::int64_t>::min();  ///< device clock; least: no flight
+            std::numeric_limits<std::int64_t>::min();  ///< device clock; least value: no flight
     };
 
-    /// Commands are numbered on from the echo before the first of them, so that an echo is of this session or none.
+    /// Matches an echo with its command. The numbers of commands start after the first echo, so that an echo of an
+    /// earlier session is recognised.
     void follow_echo(const wire::InPacket& packet, Nanoseconds now) noexcept {
         const auto ahead = static_cast<std::int16_t>(packet.out_sequence - echoed_);
         const auto unsent = static_cast<std::int16_t>(packet.out_sequence - sent_);
@@ -147,8 +150,9 @@ class PacketStream {
         return follows ? (now.position - reading_.position) / passed : first ? 0.0 : reading_.velocity;
     }
 
-    /// The watchdog counts once this session's commands have reached the device: what tripped before is past. Once
-    /// the torque was on, it is off only where the device lost its mind.
+    /// Returns the status of a packet. The watchdog counts only after this session's commands have reached the device,
+    /// because earlier trips belong to earlier sessions. If the torque is disabled after it was enabled, the device has
+    /// restarted.
     [[nodiscard]] Status status_of(std::uint16_t bits) noexcept {
         const bool tripped = (bits & wire::watchdog_tripped) != 0 && is_acknowledged_;
         const bool refused = (bits & wire::bad_packet) != 0 && is_acknowledged_;
@@ -177,9 +181,9 @@ class PacketStream {
     std::uint16_t sent_ = 0;
     std::uint16_t echoed_ = 0;
     bool is_acknowledged_ = false;
-    bool is_late_ = false;  ///< the command that the last packet echoed
+    bool is_late_ = false;  ///< of the command that the last packet echoed
     bool was_enabled_ = false;
-    bool follows_ = false;  ///< the next packet, the last one that was taken
+    bool follows_ = false;  ///< true if the next packet follows the last one taken
     std::uint16_t status_bits_ = 0;
     std::array<Flight, 64> flights_{};
     Reading reading_;

@@ -18,40 +18,43 @@
 
 namespace palpate {
 
-/// How a USB device is found and spoken to.
+/// Settings of the connection to a USB device.
 struct UsbOptions {
-    std::string serial;                     ///< empty: the only one there is
-    std::chrono::microseconds wait{5'000};  ///< how long an exchange waits for the device's next packet
-    std::uint16_t time_to_live_ms = 10;     ///< how long a torque outlives its packet
+    std::string serial;                     ///< empty: the only device
+    std::chrono::microseconds wait{5'000};  ///< longest wait of an exchange for a packet
+    std::uint16_t time_to_live_ms = 10;     ///< time after which a torque ends without a new packet
     double longest_delay_s = std::numeric_limits<double>::infinity();  ///< from a sample to its force [s]
-    bool makes_force = true;  ///< else it is listened to: it is never enabled
+    bool makes_force = true;  ///< false: the device is never enabled, only read
 };
 
-/// What happened on the wire, packets and transfers.
+/// Counters of packets and transfers.
 struct UsbHealth {
     StreamHealth stream;
     std::uint64_t skipped_commands =
-        0;  ///< not sent: the last one was still on its way, or a newer sample there
+        0;  ///< not sent, because the last one was in flight or a newer sample had arrived
     std::uint64_t lost_commands = 0;  ///< that did not arrive
-    std::uint64_t timeouts = 0;       ///< exchanges in which no packet came
-    std::uint64_t discarded = 0;      ///< packets that nobody had taken for too long
+    std::uint64_t timeouts = 0;       ///< exchanges without a packet
+    std::uint64_t discarded = 0;      ///< packets that waited too long
     std::uint64_t stalls = 0;         ///< endpoints that halted and were cleared
     std::uint64_t bus_errors = 0;     ///< transfers that failed on the bus
 };
 
-/// A haptic device of one degree of freedom over USB; packets and signs: device/wire.hpp.
+/// A haptic device of one degree of freedom over USB; device/wire.hpp defines packets and signs.
 ///
-/// The device paces the host: an exchange sends its command at once and waits for the next packet, in the order in
-/// which they were sampled, but no longer than `UsbOptions::wait`. A host that falls behind by a packet or two
-/// catches up without losing one, and sends the command of the last one only; what waited longer is discarded. A
-/// stream that begins, or begins anew, is behind: its first exchange only listens, so that every command follows a
-/// packet at once. In the exchange nothing is allocated or thrown; libusb takes its own locks, and the wait is a
-/// futex.
+/// The device paces the host. An exchange sends its command at once and waits for the next packet, in the order of the
+/// samples, at most `UsbOptions::wait`. A host that is late by one or two packets processes them without a loss, and
+/// sends only the command of the last one. Packets that waited longer are discarded. The first exchange of a new or
+/// restarted stream only reads, so that every command follows a packet at once. The exchange neither allocates nor
+/// throws; libusb uses its locks, and the wait is a futex.
 ///
-/// Reading::status: Timeout when no packet came, the device's watchdog had ended the torque, or a command took longer
-/// to the device than `UsbOptions::longest_delay_s`; Fault when the device reports one, was disabled or is gone, and
-/// then for good; Lost when a command did not arrive or was not understood; Limited when it clipped one. Lost and
-/// repeated samples speak through Reading::sequence.
+/// Reading::status:
+/// - Timeout: no packet came, the device's watchdog ended the torque, or a command took longer than
+///   `UsbOptions::longest_delay_s`.
+/// - Fault: the device reported one, was disabled or is gone. It is permanent.
+/// - Lost: a command did not arrive or was not understood.
+/// - Limited: the device clipped a command.
+///
+/// Lost and repeated samples are visible in Reading::sequence.
 class UsbDevice {
   public:
     static constexpr bool paces_host = true;
@@ -61,7 +64,7 @@ class UsbDevice {
     UsbDevice& operator=(UsbDevice&&) = delete;
     ~UsbDevice() { close(); }
 
-    /// Finds the device, starts its packets and, if it is to make force, lets it; the torque is zero until the first
+    /// Finds the device, starts its packets and enables it if it makes force. The torque is zero until the first
     /// exchange.
     Opened open() {
         close();
@@ -81,13 +84,14 @@ class UsbDevice {
         return {reason};
     }
 
-    /// Sends the command, waits for the next sample.
+    /// Sends the command and waits for the next sample.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (open_ == nullptr) {
             return failed(Status::Fault);
         }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
-        // Nothing follows from a stream that has just begun; but a device may keep silent until it is spoken to.
+        // A restarted stream is not a reference for a command. The exchange still sends one if no packet comes, because
+        // a device may be silent until the first command.
         const bool listened = begins_anew() && next_packet(monotonic_now() + 2 * open_->frame);
         if (!listened) {
             answer(command.force, deadline);
@@ -105,7 +109,8 @@ class UsbDevice {
         return failed(Status::Timeout);
     }
 
-    /// Zero torque, disabled, nothing in flight, let go: in this order, as far as the device still takes part.
+    /// Sends zero torque, disables the device, ends all transfers and releases it, in this order, as far as the device
+    /// responds.
     void close() noexcept {
         if (open_ == nullptr) {
             return;
@@ -122,7 +127,7 @@ class UsbDevice {
         open_.reset();
     }
 
-    // The three below tell of the device that is open, or of the last one that was.
+    // The next three functions describe the open device, or the last one that was open.
     [[nodiscard]] const UsbName& name() const noexcept {
         return open_ == nullptr ? last_name_ : open_->connection.name();
     }
@@ -145,25 +150,26 @@ class UsbDevice {
         }
         return health;
     }
-    /// Transfers that the system has and has not given back.
+    /// Returns the number of transfers that the system has not returned.
     [[nodiscard]] int in_flight() const noexcept {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
-    /// What the device says of itself as a profile; its mechanics are nobody's to ask it, and stay `otherwise`.
-    [[nodiscard]] DeviceProfile profile(DeviceProfile otherwise = {}) const {
-        otherwise.id = name().serial.empty() ? name().product : name().serial;
-        otherwise.period_s = 1.0 / info().rate_hz;
-        otherwise.encoder_step = wire::position_of(1, info().counts_per_rev);
-        otherwise.force_step = 1e-6;
-        otherwise.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 rounds twice
-        return otherwise;
+    /// What the device says of itself as a profile. It does not say what its mechanics are.
+    [[nodiscard]] DeviceProfile profile() const {
+        DeviceProfile profile = unmeasured({});
+        profile.id = name().serial.empty() ? name().product : name().serial;
+        profile.period_s = 1.0 / info().rate_hz;
+        profile.encoder_step = wire::position_of(1, info().counts_per_rev);
+        profile.force_step = 1e-6;
+        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 rounds twice
+        return profile;
     }
 
   private:
-    static constexpr std::size_t most_waiting = 4;  ///< packets: a host that is later than this begins anew
+    static constexpr std::size_t most_waiting = 4;  ///< packets; a later host restarts the stream
     static constexpr int most_held =
-        2;  ///< packets that a device may have kept from before: of another time and state
+        2;  ///< packets that a device may have kept from an earlier session, with another state
     static constexpr Nanoseconds first_packet = nanoseconds_a_second;
     static constexpr Nanoseconds one_write = nanoseconds_a_second / 50;
 
@@ -174,17 +180,17 @@ class UsbDevice {
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
         Nanoseconds frame = 0;
-        Nanoseconds arrived = 0;  ///< the last packet
+        Nanoseconds arrived = 0;  ///< time of the last packet
         bool catches_up = false;
         bool sent_last = true;
-        bool sound = true;  ///< the last reading
+        bool sound = true;  ///< true if the last reading was valid
         std::uint64_t skipped_commands = 0;
         std::uint64_t lost_commands = 0;
         std::uint64_t timeouts = 0;
         std::uint64_t discarded = 0;
     };
 
-    /// Empty, or what the device does not do, and what helps.
+    /// Starts the stream. Returns "" or a sentence with the missing response and the cure.
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
         open_->stream = PacketStream{connection.info(), longest_delay()};
@@ -256,7 +262,7 @@ class UsbDevice {
         return true;
     }
 
-    /// Whether nothing can follow from the last packet: there was none, or too many wait, which are thrown away.
+    /// Returns true if the stream restarts: a packet was missing, or too many wait and are discarded.
     [[nodiscard]] bool begins_anew() noexcept {
         if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
             return false;
@@ -270,8 +276,8 @@ class UsbDevice {
         return true;
     }
 
-    /// Sends the command that follows from the last packet, unless the host is behind: then it takes what waits, and
-    /// sends what follows from that at once afterwards; but not twice, and nothing that ends a force waits for that.
+    /// Sends the command for the last packet. A late host skips it, takes the waiting packet first, and sends the next
+    /// one. It does not skip twice in a row, and never after a reading without force.
     void answer(double force, Nanoseconds deadline) noexcept {
         const bool ended = last_has_ended(deadline);
         const bool behind = !ended || (open_->sound && open_->transfers->arrived() > 0);
@@ -284,9 +290,9 @@ class UsbDevice {
         }
     }
 
-    /// The end of a command and the packet that wakes a host come in the same frame, in any order. A command that ends
-    /// much later than that packet has missed its frame, and ends in the next one: close to a newer packet, which is
-    /// waited for, since else that command and all that follow were a frame late.
+    /// Waits for the end of the last command. Its end and the packet that wakes the host come in the same frame, in any
+    /// order. A command that ends much later has missed its frame and ends in the next one, close to a newer packet.
+    /// Waiting for that packet keeps this and all later commands from being a frame late.
     [[nodiscard]] bool last_has_ended(Nanoseconds deadline) noexcept {
         detail::UsbTransfers& transfers = *open_->transfers;
         if (!transfers.writes()) {
@@ -316,10 +322,11 @@ class UsbDevice {
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
         send(0.0);
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
-        (void)open_->transfers->request(wire::Request::Enable, 0);  // where it fails the watchdog is left
+        (void)open_->transfers->request(wire::Request::Enable, 0);  // after a failure the watchdog ends the
+                                                                    // torque
     }
 
-    /// Where a command did not go out, or was lost on its way, an older force acts.
+    /// Sets the status Lost if a command was not sent or was lost, because an older force acts then.
     [[nodiscard]] Reading judged(Reading reading) noexcept {
         const std::uint64_t lost = open_->transfers->lost_writes();
         const bool arrived = std::exchange(open_->lost_commands, lost) == lost && open_->sent_last;
@@ -329,7 +336,7 @@ class UsbDevice {
         return reading;
     }
 
-    /// The last reading again, of no use but for its position.
+    /// Returns the last reading with this status. Only its position is valid.
     [[nodiscard]] Reading failed(Status status) const noexcept {
         Reading reading = open_ == nullptr ? Reading{} : open_->stream.reading();
         reading.status = status;

@@ -11,14 +11,15 @@
 #include <numbers>
 #include <span>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
-/// What a USB device and its host say to each other, version 1: packets of fixed size, little endian, packed. A wrong
-/// size, magic or version is an error, never a guess.
+/// Packets between a USB device and its host, version 1: fixed size, little endian, packed. A wrong size, magic or
+/// version is an error.
 ///
-/// Signs: position = 2 pi count / counts_per_rev; a torque > 0 on the wire accelerates the handle towards growing
-/// count. A force of this library is that of the object against the handle, so it is -1e-6 times the torque.
+/// Signs: position = 2 pi count / counts_per_rev; a torque > 0 in a packet accelerates the handle towards larger
+/// counts. A force of this library is that of the object against the handle, so it is -1e-6 times the torque.
 namespace palpate::wire {
 
 inline constexpr std::uint16_t vendor_id = 0x1209;
@@ -35,6 +36,31 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 /// bRequest of a control transfer.
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
+/// Cause and cure for an error code of libusb; empty for a code that states no cause.
+[[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
+    switch (code) {
+        case -1:  // LIBUSB_ERROR_IO
+            return "the transfer failed on the bus; try another cable or port";
+        case -3:  // LIBUSB_ERROR_ACCESS
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
+                   "again";
+        case -4:  // LIBUSB_ERROR_NO_DEVICE
+        case -5:  // LIBUSB_ERROR_NOT_FOUND
+            return "it was unplugged meanwhile; plug it in and try again";
+        case -6:  // LIBUSB_ERROR_BUSY
+            return "another program uses it; end that program, then try again";
+        case -7:  // LIBUSB_ERROR_TIMEOUT
+            return "it does not answer; unplug it and plug it in again";
+        case -9:  // LIBUSB_ERROR_PIPE
+            return "it refused a request; its firmware may be of another version";
+        case -11:  // LIBUSB_ERROR_NO_MEM
+            return "the system has no memory left for USB; see "
+                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
+        default:
+            return "";
+    }
+}
+
 /// Bits of InPacket::status.
 inline constexpr unsigned enabled = 1;
 inline constexpr unsigned watchdog_tripped = 2;
@@ -43,45 +69,46 @@ inline constexpr unsigned bad_packet = 8;
 inline constexpr unsigned encoder_fault = 16;
 inline constexpr unsigned over_temperature = 32;
 inline constexpr unsigned emergency_stop = 64;
-/// The bits after which nothing that the device says or does is to be relied on.
+/// Bits after which the device and its packets are not reliable.
 inline constexpr unsigned fault_bits = encoder_fault | over_temperature | emergency_stop;
 
 /// Bits of Info::capabilities.
 inline constexpr std::uint32_t has_transducer = 1;
 inline constexpr std::uint32_t measures_velocity = 2;
 
-/// Range of the time for which the device makes force without a command.
+/// Range of the time for which the device makes force without a command [ms].
 inline constexpr int shortest_watchdog_ms = 2;
 inline constexpr int longest_watchdog_ms = 1000;
 
-inline constexpr std::size_t largest_packet = 64;  ///< what a full-speed interrupt endpoint can send
+inline constexpr std::size_t largest_packet = 64;  ///< largest packet of a full-speed interrupt endpoint
+                                                   ///< [bytes]
 inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
 inline constexpr std::size_t info_size = 32;
 
-/// From the device, once every frame.
+/// Packet from the device, once every frame.
 struct InPacket {
     std::uint16_t sequence = 0;
-    std::uint32_t clock_us = 0;  ///< the device's, at the encoder latch; wraps after 71 minutes
+    std::uint32_t clock_us = 0;  ///< of the device at the encoder latch; wraps after 71 minutes
     std::int32_t count = 0;
-    std::int32_t velocity_cps = 0;  ///< counts a second; 0 where it is not measured
-    std::int32_t torque_uNm = 0;    ///< applied
+    std::int32_t velocity_cps = 0;  ///< counts a second; 0 if it is not measured
+    std::int32_t torque_uNm = 0;    ///< applied torque
     std::uint16_t status = 0;
-    std::uint16_t out_sequence = 0;  ///< of the last OUT packet that was accepted
+    std::uint16_t out_sequence = 0;  ///< of the last accepted OUT packet
     std::uint16_t out_age_us = 0;    ///< since it was accepted; saturates
     std::uint16_t temperature_dC = 0;
-    std::int32_t sensor_uNm = 0;  ///< force transducer; 0 without one
+    std::int32_t sensor_uNm = 0;  ///< of the force transducer; 0 without one
 };
 
-/// To the device.
+/// Packet to the device.
 struct OutPacket {
     std::uint16_t sequence = 0;
     std::int32_t torque_uNm = 0;
-    std::uint16_t time_to_live_ms = 10;  ///< the torque ends when no other packet came for so long
+    std::uint16_t time_to_live_ms = 10;  ///< the torque ends after this time without a packet
     std::uint32_t host_us = 0;
 };
 
-/// What a device says of itself.
+/// Properties that a device reports.
 struct Info {
     std::uint16_t firmware = 0;
     std::uint32_t counts_per_rev = 0;
@@ -94,7 +121,7 @@ struct Info {
 
 namespace detail {
 
-/// Integers taken from bytes, least byte first, one after the other.
+/// Reads integers from bytes, least byte first, one after the other.
 class Taking {
   public:
     explicit Taking(std::span<const std::uint8_t> bytes) noexcept : bytes_{bytes} {}
@@ -118,7 +145,7 @@ class Taking {
     std::size_t at_ = 0;
 };
 
-/// The same the other way round.
+/// Writes integers to bytes, least byte first, one after the other.
 class Putting {
   public:
     explicit Putting(std::span<std::uint8_t> bytes) noexcept : bytes_{bytes} {}
@@ -143,7 +170,7 @@ class Putting {
 
 }  // namespace detail
 
-/// Reads a packet; false if the bytes are not one of this protocol.
+/// Reads a packet. Returns false if the bytes are not a packet of this protocol.
 [[nodiscard]] inline bool decode(std::span<const std::uint8_t> bytes, InPacket& packet) noexcept {
     if (bytes.size() != in_size || bytes[0] != 'H' || bytes[1] != protocol_version) {
         return false;
@@ -154,7 +181,7 @@ class Putting {
     return true;
 }
 
-/// Reads the answer to GET_INFO. Returns why it is refused, with the field, its value and the right one; else "".
+/// Reads the answer to GET_INFO. Returns "", or a sentence with the invalid field, its value and the right one.
 [[nodiscard]] inline std::string decode(std::span<const std::uint8_t> bytes, Info& info) {
     using Number = std::int64_t;
     const std::string answer = "the answer to GET_INFO";
@@ -202,6 +229,7 @@ class Putting {
     return "";
 }
 
+/// Returns the bytes of a packet.
 [[nodiscard]] inline std::array<std::uint8_t, out_size> encode(const OutPacket& packet) noexcept {
     constexpr std::uint16_t flags = 0;
     std::array<std::uint8_t, out_size> bytes{};
@@ -210,17 +238,17 @@ class Putting {
     return bytes;
 }
 
-/// [rad]
+/// Returns the position of a count [rad].
 [[nodiscard]] inline double position_of(std::int64_t count, std::uint32_t counts_per_rev) noexcept {
     return 2.0 * std::numbers::pi * static_cast<double>(count) / static_cast<double>(counts_per_rev);
 }
 
-/// The force of the object against the handle [N*m] that a torque on the wire is.
+/// Returns the force of the object against the handle for a torque of a packet [N*m].
 [[nodiscard]] inline double force_of(std::int32_t torque_uNm) noexcept {
     return 0.0 - 1e-6 * static_cast<double>(torque_uNm);
 }
 
-/// The torque that is such a force, at most the device's largest; a force that is not a number is none.
+/// Returns the torque of a packet for a force, limited to the device's largest; 0 for NaN.
 [[nodiscard]] inline std::int32_t torque_of(double force, std::int32_t max_torque_uNm) noexcept {
     if (std::isnan(force)) {
         return 0;
@@ -229,11 +257,11 @@ class Putting {
     return static_cast<std::int32_t>(std::lround(std::clamp(-1e6 * force, -largest, largest)));
 }
 
-/// A counter that wraps around, made one that does not. What is less than half a turn behind is before.
+/// Extends a counter that wraps to one that does not. A step of more than half the range counts as negative.
 template <std::integral Counter>
 class Unwrapped {
   public:
-    /// Takes the next reading; returns how far it is from the last one, 0 for the first.
+    /// Takes the next reading. Returns the step from the last one, 0 for the first.
     std::int64_t follow(Counter reading) noexcept {
         using Unsigned = std::make_unsigned_t<Counter>;
         const auto ahead =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -14,31 +15,33 @@
 
 #include "palpate/fields/readable.hpp"
 
-// One table for each struct: the name, place, meaning and rule of every field. It drives the checks, the files, the
-// fingerprints, the comparisons and the Python classes.
+// One table for each struct with name, member, meaning and rule of every field. Checks, files, fingerprints,
+// comparisons and Python classes use it.
 namespace palpate {
 
-/// What a number may be.
+/// Rule for a number.
 enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 
+/// Returns the rule in words.
 [[nodiscard]] constexpr const char* text(Rule rule) noexcept {
     constexpr const char* texts[]{"a number", "a finite number", ">= 0", "> 0"};
     return texts[static_cast<std::size_t>(rule)];
 }
 
+/// Returns true if a value satisfies a rule.
 [[nodiscard]] inline bool obeys(double value, Rule rule) noexcept {
     return rule == Rule::Any || (std::isfinite(value) && (rule == Rule::Finite || value > 0.0 ||
                                                           (rule == Rule::NotNegative && value == 0.0)));
 }
 
-/// A field that is reached by a path of members.
+/// A field at the end of a path of members.
 template <auto... path>
 struct Field {
     const char* name = "";
     const char* doc = "";  ///< meaning and unit
     Rule rule = Rule::Any;
-    bool stored = true;  ///< false: not written to a file, because it can be computed
-    std::span<const std::string_view> words = {};  ///< the values of a text; empty = any
+    bool stored = true;  ///< false: not written to files, because it can be computed
+    std::span<const std::string_view> words = {};  ///< allowed texts; empty = any
 
     template <class S>
     [[nodiscard]] static constexpr auto& of(S& object) noexcept {
@@ -46,10 +49,17 @@ struct Field {
     }
 };
 
-/// The same field inside a struct that holds it as `outer`.
+/// Returns the same field of a struct that contains it as `outer`.
 template <auto outer, auto... path>
 [[nodiscard]] constexpr Field<outer, path...> within(const Field<path...>& field, const char* name) noexcept {
     return {name, field.doc, field.rule, field.stored, field.words};
+}
+
+/// All fields of a table inside a struct that holds theirs as `outer`.
+template <auto outer, class... Fields>
+[[nodiscard]] constexpr auto all_within(const std::tuple<Fields...>& fields) noexcept {
+    return std::apply([](const auto&... field) { return std::tuple{within<outer>(field, field.name)...}; },
+                      fields);
 }
 
 /// A field that need not be given: a file may leave it out.
@@ -62,27 +72,31 @@ inline constexpr bool is_optional<std::optional<V>> = true;
 template <class S>
 inline constexpr auto fields_of = nullptr;
 
+/// True for a struct with a table of fields.
 template <class S>
 concept HasFields = !std::is_null_pointer_v<std::remove_cv_t<decltype(fields_of<S>)>>;
 
+/// Calls `visit` with every field of a struct.
 template <HasFields S, class Visit>
 constexpr void for_each_field(Visit visit) {
     std::apply([&](const auto&... field) { (visit(field), ...); }, fields_of<S>);
 }
 
-/// The words of an enumeration in the order of its values, to be specialised for each.
+/// Words of an enumeration in the order of its values; each enumeration specialises it.
 template <class Enum>
 inline constexpr auto words_of = nullptr;
 
+/// True for an enumeration with words.
 template <class Enum>
 concept HasWords = !std::is_null_pointer_v<std::remove_cv_t<decltype(words_of<Enum>)>>;
 
+/// Returns the word of a value.
 template <HasWords Enum>
 [[nodiscard]] constexpr std::string_view name_of(Enum value) noexcept {
     return words_of<Enum>[static_cast<std::size_t>(value)];
 }
 
-/// "direct, massless or implicit"
+/// Returns a text such as "direct, massless or implicit".
 [[nodiscard]] inline std::string either(std::span<const std::string_view> words) {
     std::string text;
     for (std::size_t k = 0; k < words.size(); ++k) {
@@ -91,7 +105,7 @@ template <HasWords Enum>
     return text;
 }
 
-/// The value of a word. Throws std::invalid_argument with the name of the field.
+/// Returns the value of a word. Throws std::invalid_argument with the name of the field.
 template <HasWords Enum>
 [[nodiscard]] Enum named(std::string_view word, const char* field) {
     for (std::size_t k = 0; k < words_of<Enum>.size(); ++k) {
@@ -103,6 +117,13 @@ template <HasWords Enum>
                                 either(words_of<Enum>));
 }
 
+/// Throws std::invalid_argument unless `holds`: the field, its value, what would be right.
+inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
+    if (!holds) {
+        throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);
+    }
+}
+
 /// Checks a number or a word by the rule of its field; other values pass.
 template <class F, class V>
 void check_value(const F& field, const V& value, const std::string& prefix) {
@@ -111,18 +132,13 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
             check_value(field, *value, prefix);
         }
     } else if constexpr (std::is_arithmetic_v<V>) {
-        if (!obeys(static_cast<double>(value), field.rule)) {
-            throw std::invalid_argument(prefix + field.name + " is " + readable(static_cast<double>(value)) +
-                                        ", must be " + text(field.rule));
-        }
+        const auto number = static_cast<double>(value);
+        require_field(obeys(number, field.rule), prefix + field.name, number, text(field.rule));
     } else if constexpr (std::is_same_v<V, std::string>) {
-        bool known = field.words.empty();
-        for (const std::string_view word : field.words) {
-            known = known || value == word;
-        }
-        if (!known) {
+        const auto& words = field.words;
+        if (!words.empty() && std::find(words.begin(), words.end(), value) == words.end()) {
             throw std::invalid_argument(prefix + field.name + " is '" + value + "', must be " +
-                                        either(field.words));
+                                        either(words));
         }
     }
 }

@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// A number as a person reads it: four significant digits, and no exponent where whole digits say it better.
+/// Returns a number as text with four significant digits, and without an exponent if digits are shorter.
 [[nodiscard]] inline std::string readable(double value) {
     std::array<char, 32> digits{};
     char* const first = digits.data();

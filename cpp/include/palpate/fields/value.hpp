@@ -12,7 +12,8 @@ namespace palpate {
 struct NamedValue;
 using NamedValues = std::vector<NamedValue>;
 
-/// A value of a report, which becomes JSON or a Python object. An empty one and a number that is not finite are null.
+/// Value of a report, which becomes JSON or a Python object. An empty value and a number that is not finite become
+/// null.
 using Value = std::variant<std::monostate, bool, std::uint64_t, double, std::string, std::vector<double>,
                            std::vector<std::string>, NamedValues, std::vector<NamedValues>>;
 
@@ -22,7 +23,7 @@ struct NamedValue {
     Value value;
 };
 
-/// Lines of a report for a person: title and text.
+/// Lines of a report for the terminal: title and text.
 using Lines = std::vector<std::pair<std::string, std::string>>;
 
 }  // namespace palpate

@@ -39,8 +39,8 @@ struct Guards {
 /// The device receives the clipped force c(f). Its object stores C = int c(f) dx, with hysteresis at most r max h / 2
 /// more (`energy_range`). The coupling stores P = K_c e^2 / 2 at a stretch e <= F / K_c, where F is the largest clipped
 /// force. Its force is c(f), and K_c e_k + (B_c/T) (e_k - e_{k-1}) = c(f) with e_0 = 0 gives |e_k| <= F / K_c for every
-/// k. A compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its minimum can be lower by F^2
-/// / 2 K_c. `StoredEnergy` adds positions and speeds outside this range when they occur.
+/// k. A compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its minimum can be lower by
+/// F^2 / 2 K_c. `StoredEnergy` adds positions and speeds outside this range when they occur.
 [[nodiscard]] inline double most_energy(const ForceModel& given, const Scheme& scheme, double force_limit) {
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const double held = energy_range(model, force_limit).span();

@@ -20,7 +20,7 @@ namespace palpate {
 
 namespace detail {
 
-/// Renames a file unless the new name is taken (EEXIST). Returns 0 or an errno.
+/// Renames a file unless the new name exists (EEXIST). Returns 0 or an errno.
 [[nodiscard]] inline int rename_to_free_name(const std::string& from, const std::string& to) noexcept {
     if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) {
         return 0;
@@ -28,14 +28,14 @@ namespace detail {
     if (errno != EINVAL && errno != ENOSYS) {
         return errno;
     }
-    // File systems without RENAME_NOREPLACE, such as NFS.
+    // For file systems without RENAME_NOREPLACE, such as NFS.
     if (::link(from.c_str(), to.c_str()) != 0) {
         return errno;
     }
     return ::unlink(from.c_str()) == 0 ? 0 : errno;
 }
 
-/// True if the path names the open file.
+/// Returns true if the path is that of the open file.
 [[nodiscard]] inline bool names(const std::string& path, int descriptor) noexcept {
     struct stat named{};
     struct stat open{};
@@ -43,17 +43,18 @@ namespace detail {
            named.st_dev == open.st_dev && named.st_ino == open.st_ino;
 }
 
+/// Returns the text of an errno.
 [[nodiscard]] inline std::string reason_of(int error) {
     return std::generic_category().message(error);
 }
 
 }  // namespace detail
 
-/// Text file that grows as NAME.part, whole lines at a time, and is renamed to NAME when it is finished.
+/// A text file that grows as NAME.part, whole lines at a time, and is renamed to NAME when it is finished.
 ///
-/// The writer holds a lock on NAME.part; a second writer of the same name is refused. No existing file is replaced
-/// without `force`. What was written stays readable whatever happens to the program. When the disk is full, the
-/// file is cut back to its last whole line and nothing more is written; the reason is kept.
+/// The writer holds a lock on NAME.part; a second writer of the same name is refused. Without `force` an existing file
+/// is not replaced. Written lines stay readable even if the program ends abnormally. If the disk is full, the file is
+/// cut back to its last whole line, writing stops, and the reason is stored.
 class GrowingFile {
   public:
     GrowingFile() = default;
@@ -61,9 +62,9 @@ class GrowingFile {
     GrowingFile(const GrowingFile&) = delete;
     GrowingFile& operator=(const GrowingFile&) = delete;
 
-    /// Opens NAME.part; returns the reason where that is not possible. A NAME.part without a writer is the only copy
-    /// of a recording that was cut off: it is moved to the first free name of NAME.1.part, NAME.2.part, ...
-    /// With `force` an existing NAME is replaced at the end; a symbolic link keeps its place, its target is replaced.
+    /// Opens NAME.part. Returns the reason if that is not possible. A NAME.part without a writer is the only copy of an
+    /// interrupted recording; it is renamed to the first free name of NAME.1.part, NAME.2.part, ... With `force` an
+    /// existing NAME is replaced at the end; of a symbolic link the target is replaced.
     [[nodiscard]] std::string open(const std::string& name, bool force = false) {
         force_ = force;
         name_ = name;
@@ -77,7 +78,7 @@ class GrowingFile {
         if (std::string reason = taken(); !reason.empty()) {
             return reason;
         }
-        // A recording that another run finishes meanwhile makes room for the second try.
+        // If another run finishes its recording meanwhile, the second try succeeds.
         for (int tries = 2; descriptor_ < 0; --tries) {
             descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
             if (descriptor_ < 0 && (errno != EEXIST || tries == 0)) {
@@ -89,8 +90,8 @@ class GrowingFile {
                 }
             }
         }
-        // Waits at most for another program that just looks at the new file. Without locks (some network file
-        // systems) the recording is still its writer's alone, because O_EXCL created it.
+        // Waits at most for a program that only reads the new file. Without locks (some network file systems) no other
+        // program writes the recording, because O_EXCL created it.
         (void)::flock(descriptor_, LOCK_EX);
         std::string reason = taken();
         if (!reason.empty()) {
@@ -100,15 +101,15 @@ class GrowingFile {
     }
 
     [[nodiscard]] bool is_open() const noexcept { return descriptor_ >= 0; }
+    /// Returns NAME.part.
     [[nodiscard]] std::string part() const { return name_ + ".part"; }
-    /// Where a recording that was cut off earlier was moved to; empty if there was none.
+    /// Returns the new name of an interrupted recording; empty without one.
     [[nodiscard]] const std::string& set_aside_as() const noexcept { return set_aside_as_; }
-    /// 0, or the errno of the write after which nothing was written any longer.
-    /// From any thread.
+    /// Returns 0, or the errno of the write after which writing stopped. Any thread may call it.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_relaxed); }
 
-    /// Appends whole lines. Returns how much of them is in the file: less than all means that the disk is full,
-    /// or worse, and that nothing will be written any longer.
+    /// Appends whole lines. Returns the number of bytes in the file. Fewer than all means that the disk is full or
+    /// failed, and that writing has stopped.
     std::size_t append(std::string_view lines) noexcept {
         if (descriptor_ < 0 || error() != 0) {
             return 0;
@@ -132,16 +133,16 @@ class GrowingFile {
         return done;
     }
 
-    /// Replaces text within the file by text of the same length.
+    /// Replaces text in the file by text of the same length.
     void overwrite(off_t place, std::string_view text) noexcept {
         if (descriptor_ >= 0 && place + static_cast<off_t>(text.size()) <= size_) {
-            // A failure leaves the old text, which is as readable.
+            // A failure keeps the old text, which is equally readable.
             (void)!::pwrite(descriptor_, text.data(), text.size(), place);
         }
     }
 
-    /// Writes everything to the disk and renames NAME.part to NAME. Returns a sentence where that is not possible;
-    /// the recording then keeps the name NAME.part.
+    /// Writes all data to the disk and renames NAME.part to NAME. Returns a sentence if that is not possible; the
+    /// recording then keeps the name NAME.part.
     [[nodiscard]] std::string finish() {
         (void)::fsync(descriptor_);
         std::string reason;
@@ -155,7 +156,7 @@ class GrowingFile {
         } else {
             sync_folder();
         }
-        close();  // last: the lock must hold until the file has its name
+        close();  // at the end, because the lock must hold until the file has its name
         return reason;
     }
 
@@ -191,7 +192,7 @@ class GrowingFile {
         }
     }
 
-    /// The reason why NAME may not be used; empty if it may.
+    /// Returns the reason why NAME must not be used; empty if it may.
     [[nodiscard]] std::string taken() const {
         struct stat there{};
         if (::lstat(name_.c_str(), &there) != 0) {
@@ -200,10 +201,7 @@ class GrowingFile {
         if (!S_ISREG(there.st_mode) && !S_ISLNK(there.st_mode)) {
             return name_ + " cannot be written: it is not an ordinary file";
         }
-        return force_ ? ""
-                      : name_ +
-                            " exists already; choose another name, or replace it with --force (Python: "
-                            "force=True)";
+        return force_ ? "" : name_ + " exists already; choose another name, or set force to replace it";
     }
 
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {
@@ -211,7 +209,7 @@ class GrowingFile {
         return end == std::string_view::npos ? 0 : end + 1;
     }
 
-    /// Moves a NAME.part without a writer to a free name; returns the reason where it may not or cannot be moved.
+    /// Renames a NAME.part without a writer to a free name. Returns the reason if that is not allowed or not possible.
     [[nodiscard]] std::string set_aside() {
         const int there = ::open(part().c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
         if (there < 0) {

@@ -18,25 +18,28 @@
 
 namespace palpate::detail {
 
-/// A value of a JSON file together with its path: it answers with what was asked for, or throws
-/// std::invalid_argument with path, value and what would be right.
+/// A value of a JSON file with its path. It returns the requested type, or throws std::invalid_argument with path,
+/// value and rule.
 class JsonField {
   public:
     JsonField(const Json& value, std::string path) : value_{value}, path_{std::move(path)} {}
 
+    /// Throws std::invalid_argument with path, value and rule.
     [[noreturn]] void refuse(const std::string& right) const {
         std::string shown = value_.is_number_float() && !std::isfinite(value_.get<double>())
-                                ? readable(value_.get<double>())  // no JSON
+                                ? readable(value_.get<double>())  // not valid JSON
                                 : value_.dump();
         shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
         throw std::invalid_argument((path_.empty() ? "the file holds " : path_ + " is ") + shown +
                                     ": must be " + right);
     }
+    /// Throws unless the condition holds.
     void require(bool holds, const std::string& right) const {
         if (!holds) {
             refuse(right);
         }
     }
+    /// Throws unless the value is a list of this length.
     void require_length(std::size_t length, const char* meaning) const {
         if (value_.size() != length) {
             throw std::invalid_argument(path_ + " has " + std::to_string(value_.size()) +
@@ -46,7 +49,7 @@ class JsonField {
 
     [[nodiscard]] bool is_null() const { return value_.is_null(); }
 
-    /// A member of an object.
+    /// Returns a member of an object.
     [[nodiscard]] JsonField operator[](const char* key) const {
         const std::string path = path_.empty() ? key : path_ + "." + key;
         require(value_.is_object(), "an object");
@@ -68,6 +71,7 @@ class JsonField {
             }
         }
     }
+    /// Returns the elements of a list.
     [[nodiscard]] std::vector<JsonField> items() const {
         require(value_.is_array(), "a list");
         std::vector<JsonField> fields;
@@ -78,6 +82,7 @@ class JsonField {
         return fields;
     }
 
+    /// Returns a number that satisfies a rule.
     [[nodiscard]] double number(Rule rule = Rule::Finite) const {
         require(value_.is_number(), "a number");
         const auto number = value_.get<double>();
@@ -87,20 +92,23 @@ class JsonField {
     }
     [[nodiscard]] double positive() const { return number(Rule::Positive); }
     [[nodiscard]] double not_negative() const { return number(Rule::NotNegative); }
+    /// Returns an integer of at least `least`.
     [[nodiscard]] std::uint64_t count(std::uint64_t least) const {
         require(value_.is_number_integer(), "a whole number");
         require(number() >= static_cast<double>(least), ">= " + std::to_string(least));
         return value_.get<std::uint64_t>();
     }
+    /// Returns a boolean.
     [[nodiscard]] bool flag() const {
         require(value_.is_boolean(), "true or false");
         return value_.get<bool>();
     }
+    /// Returns a text.
     [[nodiscard]] std::string words() const {
         require(value_.is_string(), "text");
         return value_.get<std::string>();
     }
-    /// The index of a text among `choices`.
+    /// Returns the index of a text among `choices`.
     [[nodiscard]] std::size_t one_of(std::span<const std::string_view> choices) const {
         std::string right;
         for (std::size_t k = 0; k < choices.size(); ++k) {
@@ -114,9 +122,11 @@ class JsonField {
         }
         refuse(right);
     }
+    /// Returns a text among `choices`.
     [[nodiscard]] std::string one_of(const std::vector<std::string_view>& choices) const {
         return std::string(choices[one_of(std::span{choices})]);
     }
+    /// Returns a list of finite numbers.
     [[nodiscard]] std::vector<double> numbers() const {
         std::vector<double> values;
         for (const JsonField& item : items()) {
@@ -124,10 +134,11 @@ class JsonField {
         }
         return values;
     }
+    /// Throws unless the value is an object.
     void require_object() const { require(value_.is_object(), "an object"); }
     [[nodiscard]] const Json& value() const { return value_; }
 
-    /// Free content may hold anything but numbers that are not finite, which no JSON file can hold.
+    /// Throws if free content contains a number that is not finite, because JSON cannot store it.
     void require_finite() const {
         if (value_.is_object()) {
             for (const auto& item : value_.items()) {

@@ -18,11 +18,11 @@ namespace palpate {
 
 using Json = nlohmann::ordered_json;
 
-inline constexpr int deepest_json = 100;  ///< lists and objects inside each other
+inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects
 
-/// Parses JSON as RFC 8259 asks for, and refuses what readers of other languages read differently: a byte order mark,
-/// NUL bytes, repeated keys, unpaired surrogates, numbers that no double holds, more than `deepest_json` levels.
-/// Throws std::invalid_argument with one sentence.
+/// Parses JSON by RFC 8259, and refuses content that other readers interpret differently: a byte order mark, NUL bytes,
+/// repeated keys, unpaired surrogates, numbers too large for a double, more than `deepest_json` levels. Throws
+/// std::invalid_argument with one sentence.
 [[nodiscard]] inline Json parse_json(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) {
         throw std::invalid_argument("the file begins with a byte order mark: save it as UTF-8 without one");
@@ -54,14 +54,14 @@ inline constexpr int deepest_json = 100;  ///< lists and objects inside each oth
     } catch (const Json::exception& error) {
         const std::string reason = error.what();
         const std::size_t begin = reason.find("] ") + 2;
-        // What follows quotes raw bytes of the file, which must not reach a terminal.
+        // The rest of the message quotes raw bytes of the file, which must not reach a terminal.
         throw std::invalid_argument(
             "this is not JSON: " + reason.substr(begin, reason.find("; last read") - begin) +
             "; a model is a .json file that palpate identify writes");
     }
 }
 
-/// Reads a JSON file. Throws std::invalid_argument: one sentence that begins with the file's name.
+/// Reads a JSON file. Throws std::invalid_argument with one sentence that begins with the name of the file.
 [[nodiscard]] inline Json read_json(const std::string& path) {
     std::error_code none;
     std::ifstream stream;

@@ -16,25 +16,23 @@
 
 namespace palpate {
 
-/// What a rendering needs of a model file.
+/// Content of a model file that a rendering uses.
 struct ModelFile {
-    ForceModel model;  ///< as it was identified
-    std::string kind;
+    ForceModel model;                        ///< as it was identified
     std::string position_unit;               ///< rad, m, count or "" (unstated)
     std::string force_unit;                  ///< N*m, N, A or ""
     std::vector<std::string> inputs;         ///< one name for each input
-    std::string data_sha256;                 ///< of the recordings it was identified on
     std::optional<Scheme> plan;              ///< how it is to be rendered
     std::optional<ForceModel> limited;       ///< plan.network: the plan renders it in place of `model`
     std::optional<Certificate> certificate;  ///< of the plan; recomputed, and found the same
 
-    /// The model that the plan renders.
+    /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
 };
 
 namespace detail {
 
-/// N rows of d numbers, one after the other.
+/// Returns N rows of d numbers, one after the other.
 [[nodiscard]] inline std::vector<double> matrix(const JsonField& field, std::size_t d, bool positive) {
     std::vector<double> values;
     for (const JsonField& row : field.items()) {
@@ -46,6 +44,7 @@ namespace detail {
     return values;
 }
 
+/// Checks the member `fit`.
 inline void check_fit(const JsonField& fit, std::size_t wavelets) {
     fit.require_keys({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
     (void)fit["model_class"].words();
@@ -63,6 +62,7 @@ inline void check_fit(const JsonField& fit, std::size_t wavelets) {
                               std::to_string(wavelets) + ", the wavelets of the network");
 }
 
+/// Checks the member `data`.
 inline void check_data(const JsonField& data) {
     data.require_keys({"sha256", "files", "rows", "columns"});
     (void)data["sha256"].words();
@@ -76,16 +76,14 @@ inline void check_data(const JsonField& data) {
     }
 }
 
+/// Returns the domain of a file with its continuation.
 inline Domain read_domain(const JsonField& file, std::size_t d) {
     const JsonField domain = file["domain"];
     domain.require_keys({"lower", "upper"});
     const JsonField beyond = file["continuation"];
     beyond.require_keys({"below", "above", "period"});
-    const auto continuation = [](const JsonField& side) {
-        return side.one_of({"linear", "free"}) == "free" ? Continuation::Free : Continuation::Linear;
-    };
-    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), continuation(beyond["below"]),
-                continuation(beyond["above"]), std::nullopt};
+    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), beyond["below"].as<Continuation>(),
+                beyond["above"].as<Continuation>(), std::nullopt};
     domain["lower"].require_length(d, "one for each dimension");
     domain["upper"].require_length(d, "one for each dimension");
     for (std::size_t k = 0; k < d; ++k) {
@@ -102,7 +100,7 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     return read;
 }
 
-/// The network at `network`, which is the file's own or that of its plan, with the domain and kind of the file.
+/// Returns the network at `network`, which is that of the file or of its plan, with the domain and kind of the file.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
     network.require_keys({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
                           "linear_hysteresis", "bias_hysteresis"});
@@ -144,7 +142,8 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     return {read, {loss.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
 }
 
-/// The network that a plan renders in place of the identified one: of the same inputs, with the same hysteresis.
+/// Returns the network that a plan renders instead of the identified one. It has the same inputs and the same
+/// hysteresis.
 inline std::optional<ForceModel> read_limited(const JsonField& file) {
     if (file["plan"].is_null() || file["plan"]["network"].is_null()) {
         return std::nullopt;
@@ -162,11 +161,12 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
 
 }  // namespace detail
 
-/// The model in the text of a model file. Throws std::invalid_argument: field path, value, what would be right.
+/// Returns the model in the text of a model file. Throws std::invalid_argument with the path of the field, its value
+/// and the rule.
 [[nodiscard]] inline ModelFile parse_model(const Json& content) {
     const detail::JsonField file{content, ""};
     file.require_object();
-    // A file of another version may differ in every other field.
+    // Checked first, because every other field of another version may differ.
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
@@ -179,11 +179,9 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField units = file["units"];
     units.require_keys({"position", "force"});
     ModelFile read{detail::read_network(file["network"], file),
-                   file["kind"].words(),
                    units["position"].one_of({"rad", "m", "count", ""}),
                    units["force"].one_of({"N*m", "N", "A", ""}),
                    {},
-                   "",
                    {},
                    {},
                    {}};
@@ -200,7 +198,6 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         read.model.require_slopes_within({bounds["min"].number(), bounds["max"].number()});
     }
     detail::check_data(file["data"]);
-    read.data_sha256 = file["data"]["sha256"].words();
     detail::check_fit(file["fit"], read.model.parameters().weight.size());
     read.plan = detail::read_plan(file["plan"]);
     read.limited = detail::read_limited(file);
@@ -213,7 +210,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     return read;
 }
 
-/// Reads a model file. Throws std::invalid_argument: one sentence that begins with the file's name.
+/// Reads a model file. Throws std::invalid_argument with one sentence that begins with the name of the file.
 [[nodiscard]] inline ModelFile load_model_file(const std::string& path) {
     const Json content = read_json(path);
     try {

@@ -16,15 +16,16 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate_check.hpp"
 
-// The two parts of a model file that say how it is rendered: the plan, and what is proved of it.
+// The two parts of a model file about its rendering: the plan and its certificate.
 namespace palpate::detail {
 
-/// Given where the structure has a use for it, null where it has none.
+/// Throws unless the field is given exactly if the structure uses it, otherwise null.
 inline void require_given(const JsonField& field, bool used, const char* structure_has) {
     field.require(field.is_null() != used, (used ? "given: " : "null: ") + std::string("the structure has ") +
                                                (used ? "" : "no ") + structure_has);
 }
 
+/// Returns the scheme of a plan; nothing for null.
 [[nodiscard]] inline std::optional<Scheme> read_plan(const JsonField& plan) {
     if (plan.is_null()) {
         return std::nullopt;
@@ -62,8 +63,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     return scheme;
 }
 
-/// The certificate of a plan, recomputed from the rendered model and the device: one that says anything else is
-/// refused.
+/// Returns the certificate of a plan, recomputed from the rendered model and the device. Throws if it differs.
 [[nodiscard]] inline std::optional<Certificate> read_certificate(const JsonField& file,
                                                                  const std::optional<Scheme>& plan,
                                                                  const ForceModel& model,

@@ -16,15 +16,15 @@
 
 namespace palpate {
 
+/// Lines of metadata: key and text.
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
-/// A flight record: a CSV recording like any other, with `#` lines of metadata, a header of names that end in
-/// a unit, and one row a tick. How the run ended and how punctual it was is known at the end only, but stands
-/// at the top: room for it is kept there.
+/// A flight record: a CSV recording with `#` lines of metadata, a header of names that end in a unit, and one row for
+/// each tick. Its head reserves space for the end and the timing of the run, which are known only at the end.
 class RecordingFile {
   public:
-    /// Opens NAME.part and writes its head; returns the reason where that is not possible. An existing recording is
-    /// refused, or with `force` replaced at the end.
+    /// Opens NAME.part and writes its head. Returns the reason if that is not possible. An existing recording is
+    /// refused, or replaced at the end with `force`.
     [[nodiscard]] std::string open(const std::string& name, RecordUnits units, const Metadata& metadata,
                                    bool force = false) {
         units_ = std::move(units);
@@ -36,8 +36,8 @@ class RecordingFile {
             head += line(key, value);
         }
         head += line("palpate-columns", R"({"time": "time_s", "position": "position)" +
-                                            suffix(units_.position) + R"(", "force": "force)" +
-                                            suffix(units_.force) + R"(", "status": "status"})");
+                                            suffix_of(units_.position) + R"(", "force": "force)" +
+                                            suffix_of(units_.force) + R"(", "status": "status"})");
         ending_at_ = static_cast<off_t>(head.size());
         head += padded(line("ended", "not yet: the recording was cut off, or is still growing"));
         timing_at_ = static_cast<off_t>(head.size());
@@ -51,7 +51,7 @@ class RecordingFile {
         return "";
     }
 
-    /// Appends one row a tick. From one thread at a time.
+    /// Appends one row for each tick. Only one thread may call it at a time.
     void take(std::span<const TickRecord> ticks) noexcept {
         rows_.clear();
         for (const TickRecord& tick : ticks) {
@@ -64,7 +64,7 @@ class RecordingFile {
         refused_ += ticks.size() - whole;
     }
 
-    /// Writes how it ended, and renames the file. Returns a sentence where that is not possible.
+    /// Writes the end of the run and renames the file. Returns a sentence if that is not possible.
     [[nodiscard]] std::string finish(const std::string& ending, const std::string& timing) {
         file_.overwrite(ending_at_, padded(line("ended", ending)));
         file_.overwrite(timing_at_, padded(line("timing", timing)));
@@ -72,19 +72,16 @@ class RecordingFile {
     }
 
     [[nodiscard]] const GrowingFile& file() const noexcept { return file_; }
-    /// errno of the write after which nothing was written; 0 while all is well. From any thread.
+    /// Returns the errno of the write after which writing stopped, otherwise 0. Any thread may call it.
     [[nodiscard]] int error() const noexcept { return file_.error(); }
     [[nodiscard]] bool is_open() const noexcept { return file_.is_open(); }
+    /// Returns the number of rows written.
     [[nodiscard]] std::uint64_t written() const noexcept { return written_; }
-    /// Rows that the disk did not take.
+    /// Returns the number of rows that could not be written.
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
   private:
-    static constexpr std::size_t room = 512;  ///< for each line that is written at the end
-
-    [[nodiscard]] static std::string suffix(const std::string& unit) {
-        return unit.empty() ? "" : "_" + unit;
-    }
+    static constexpr std::size_t room = 512;  ///< bytes for each line that is written at the end
 
     [[nodiscard]] static std::string line(const std::string& key, std::string value) {
         for (char& letter : value) {

@@ -17,8 +17,8 @@
 
 namespace palpate {
 
-/// Sends some of the ticks as JSON lines over UDP to this machine: what PlotJuggler's UDP server reads. A
-/// datagram that the system does not take at once is dropped and counted.
+/// Sends some of the ticks as JSON lines over UDP to this machine, in the format of PlotJuggler's UDP server. A
+/// datagram that the system does not accept at once is dropped and counted.
 class Telemetry {
   public:
     static constexpr double usual_hz = 50.0;  ///< ticks a second
@@ -32,7 +32,8 @@ class Telemetry {
     Telemetry(const Telemetry&) = delete;
     Telemetry& operator=(const Telemetry&) = delete;
 
-    /// Begins to send `rate_hz` ticks a second to a port of the loopback; gives the reason where it cannot.
+    /// Starts to send `rate_hz` ticks a second to a port of the loopback interface. Returns the reason if that is not
+    /// possible.
     [[nodiscard]] std::string open(std::uint16_t port, double rate_hz, RecordUnits units) {
         socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
         if (socket_ < 0) {
@@ -46,6 +47,7 @@ class Telemetry {
         return "";
     }
 
+    /// Sends the ticks that are due.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (socket_ < 0) {
             return;
@@ -74,7 +76,7 @@ class Telemetry {
     int socket_ = -1;
     sockaddr_in target_{};
     double interval_ = 0.0;  ///< [s]
-    double due_ = 0.0;       ///< next tick time to send [s]
+    double due_ = 0.0;       ///< time of the next tick to send [s]
     RecordUnits units_;
     std::string line_;
     std::uint64_t sent_ = 0;

@@ -13,15 +13,15 @@
 
 namespace palpate {
 
-/// One tick as it is recorded and told: plain numbers, SI.
+/// One tick as it is recorded and sent: numbers in SI units.
 struct TickRecord {
-    double time = 0.0;      ///< of the wake-up, since the first [s]
+    double time = 0.0;      ///< of the wake-up, since the first one [s]
     double position = 0.0;  ///< measured [m or rad]
-    double force = 0.0;     ///< sent after the guards, positive out of the object [N or N*m]
-    double applied = 0.0;   ///< by the device when the position was sampled, same sign
+    double force = 0.0;     ///< after the guards, positive out of the object [N or N*m]
+    double applied = 0.0;   ///< of the device at the sample, same sign
     double measured =
-        std::numeric_limits<double>::quiet_NaN();  ///< by the transducer, same sign; NaN without
-    double environment_position = 0.0;             ///< y, where the object was evaluated [m or rad]
+        std::numeric_limits<double>::quiet_NaN();  ///< of the transducer, same sign; NaN without one
+    double environment_position = 0.0;             ///< position y of the object [m or rad]
     double velocity = 0.0;                         ///< of the device [m/s or rad/s]
     double device_time = 0.0;                      ///< the device's clock [s]
     double lateness = 0.0;                         ///< of the wake-up [s]
@@ -31,13 +31,13 @@ struct TickRecord {
     bool extrapolated = false;  ///< the object was evaluated outside its data
 };
 
-/// The force of a real object against the handle: what the transducer says, or, without one, what the motor has
-/// to hold against it. The latter holds for slow motion; the friction of the device is in it.
+/// Returns the force of a real object against the handle. Without a transducer it is the force that the motor holds
+/// against the object, which is valid for slow motion and includes the friction of the device.
 [[nodiscard]] inline double object_force(const TickRecord& tick) noexcept {
     return std::isnan(tick.measured) ? -tick.applied : tick.measured;
 }
 
-/// The units that a model gives to the columns, as they stand at the end of a column name; empty: unstated.
+/// Units of a model at the end of the column names; empty without a unit.
 struct RecordUnits {
     std::string position = "rad";
     std::string force = "Nm";
@@ -48,16 +48,21 @@ struct RecordUnits {
     return {position, force == "N*m" ? "Nm" : force};
 }
 
+/// "_Nm": what a column's name ends in; empty for an unstated unit.
+[[nodiscard]] inline std::string suffix_of(const std::string& unit) {
+    return unit.empty() ? "" : "_" + unit;
+}
+
 namespace detail {
 
-/// The shortest text that reads back as the same number.
+/// Appends the shortest text from which the same number is read.
 inline void append_number(std::string& text, double value) {
     std::array<char, 32> digits{};
     const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
     text.append(digits.data(), end);
 }
 
-/// The wake-up's time and lateness to the nanosecond: there is no more in them.
+/// Appends a time to the nanosecond, which is its resolution.
 inline void append_nanoseconds(std::string& text, double seconds) {
     std::array<char, 32> digits{};
     const auto end =
@@ -67,18 +72,18 @@ inline void append_nanoseconds(std::string& text, double seconds) {
 
 }  // namespace detail
 
-/// Column names: a stem, and the unit after the last underscore. Position and force come first and their stems
-/// stand alone, so that a reader chooses them without a hint. A velocity has no unit of the table of units:
-/// `radps` keeps it from being read as anything else.
+/// Returns the column names: a stem, and the unit after the last underscore. Position and force come first with plain
+/// stems, so that a reader chooses them without a hint. The table of units does not contain velocities; `radps` keeps a
+/// velocity from being read as another quantity.
 [[nodiscard]] inline std::string column_names(const RecordUnits& units) {
-    const auto unit = [](const std::string& suffix) { return suffix.empty() ? "" : "_" + suffix; };
-    const std::string velocity = units.position.empty() ? "" : "_" + units.position + "ps";
-    return "time_s,position" + unit(units.position) + ",force" + unit(units.force) + ",applied" +
-           unit(units.force) + ",environment_position" + unit(units.position) + ",velocity" + velocity +
+    const std::string position = suffix_of(units.position);
+    const std::string force = suffix_of(units.force);
+    return "time_s,position" + position + ",force" + force + ",applied" + force + ",environment_position" +
+           position + ",velocity" + position + (position.empty() ? "" : "ps") +
            ",sequence,device_clock_s,lateness_s,evaluations,extrapolated,status";
 }
 
-/// The same columns as one line of numbers.
+/// Appends the columns as one line of numbers.
 inline void append_row(std::string& text, const TickRecord& tick) {
     detail::append_nanoseconds(text, tick.time);
     for (const double value :
@@ -95,9 +100,8 @@ inline void append_row(std::string& text, const TickRecord& tick) {
     text += '\n';
 }
 
-/// The same again as one JSON object; a number that is none becomes null.
+/// Appends the columns as one JSON object; a number that is not finite becomes null.
 inline void append_json(std::string& text, const TickRecord& tick, const RecordUnits& units) {
-    const auto unit = [](const std::string& suffix) { return suffix.empty() ? "" : "_" + suffix; };
     const auto field = [&](const std::string& name, double value) {
         text += '"' + name + "\":";
         if (std::isfinite(value)) {
@@ -109,10 +113,10 @@ inline void append_json(std::string& text, const TickRecord& tick, const RecordU
     };
     text += '{';
     field("time_s", tick.time);
-    field("position" + unit(units.position), tick.position);
-    field("force" + unit(units.force), tick.force);
-    field("applied" + unit(units.force), tick.applied);
-    field("environment_position" + unit(units.position), tick.environment_position);
+    field("position" + suffix_of(units.position), tick.position);
+    field("force" + suffix_of(units.force), tick.force);
+    field("applied" + suffix_of(units.force), tick.applied);
+    field("environment_position" + suffix_of(units.position), tick.environment_position);
     field("lateness_s", tick.lateness);
     text += std::string("\"status\":\"") + palpate::text(tick.status).word + "\"}\n";
 }

@@ -20,8 +20,8 @@ inline constexpr double fourth_derivative_change = 16.8;
 /// Returns the numbers that replace |w_i| in bounds of fourth derivatives. Two wavelets of opposite sign that almost
 /// coincide cancel, except for their distance delta: the largest relative difference of their dilations plus the sum of
 /// alpha |difference of their translations|. From one wavelet to the other, D^4 psi(t, t, t, t) changes by at most
-/// (|D^5 psi| max(r, 1) + 4 |D^4 psi|) |t|^4 delta. The changes of r, t and the dilations add at most a tenth for delta
-/// <= 0.02, with the decay e^{-0.22 r^2}.
+/// (|D^5 psi| max(r, 1) + 4 |D^4 psi|) |t|^4 delta. The changes of r, t and the dilations add at most a tenth for
+/// delta <= 0.02, with the decay e^{-0.22 r^2}.
 [[nodiscard]] inline std::vector<double> uncancelled_weights(const NetworkParameters& network) {
     constexpr double near = 0.02;
     constexpr double change = 1.11 * fourth_derivative_change;

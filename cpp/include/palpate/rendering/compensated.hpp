@@ -66,8 +66,8 @@ class Compensated {
     double stiffness_;
 };
 
-/// Solves the load line of a compensated environment, f + p (x - f/K_c) = q. It is a multiple of a load line of f: (1 -
-/// p/K_c) f(x) + p x = q. It rises if f' < K_c: one table, and one evaluation of f.
+/// Solves the load line of a compensated environment, f + p (x - f/K_c) = q. It is a multiple of a load line of f:
+/// (1 - p/K_c) f(x) + p x = q. It rises if f' < K_c: one table, and one evaluation of f.
 class CompensatedResolvent {
   public:
     using Memory = Resolvent::Memory;

@@ -67,8 +67,8 @@ static_assert(Structure<DirectVelocity>);
 /// Largest number of samples that a prediction uses.
 inline constexpr int most_prediction_taps = 16;
 
-/// Returns the weight w_j of the step d_{k-j} = x_{k-j+1} - x_{k-j} in the prediction with m taps: w_j = (m - j + 1) /
-/// (m (m + 1)). The sum of w_1 to w_m is 1/2.
+/// Returns the weight w_j of the step d_{k-j} = x_{k-j+1} - x_{k-j} in the prediction with m taps:
+/// w_j = (m - j + 1) / (m (m + 1)). The sum of w_1 to w_m is 1/2.
 [[nodiscard]] constexpr double prediction_weight(int taps, int j) noexcept {
     return static_cast<double>(taps - j + 1) / (taps * (taps + 1.0));
 }

@@ -13,14 +13,14 @@ namespace palpate {
 
 /// Result of one tick.
 struct Tick {
-    Reading reading;             ///< input of the force
-    Rendered rendered;           ///< output of the structure
+    Reading reading;             ///< reading from which the force was computed
+    Rendered rendered;           ///< result of the structure
     Command command;             ///< sent to the device, after the guards
-    Status status = Status::Ok;  ///< most serious one of the tick
+    Status status = Status::Ok;  ///< most serious status of the tick
 };
 
-/// One tick of rendering: read, compute, limit, send. No allocation, lock, exception, log or system call but
-/// the device exchange. If a reading is bad, the force sent is zero.
+/// One tick of rendering: read, compute, limit, send. It does not allocate, lock, throw, log or make a system call,
+/// except for the device exchange. After a bad reading it sends zero force.
 template <Device D, Structure S>
 class Controller {
   public:
@@ -30,7 +30,7 @@ class Controller {
     Controller(D& device, S structure, ForceLimit limit)
         : Controller{device, std::move(structure), Guards{.limit = limit}} {}
 
-    /// Takes a first sample with zero force and puts the virtual object at rest there.
+    /// Takes a first sample with zero force and sets the virtual object at rest there.
     [[nodiscard]] Status start() noexcept {
         reading_ = device_.exchange({});
         structure_.reset(reading_.position);
@@ -59,7 +59,7 @@ class Controller {
         device_.close();
     }
 
-    /// True if the device's clock paces the loop.
+    /// Returns true if the clock of the device paces the loop.
     [[nodiscard]] bool paced_by_device() const noexcept {
         if constexpr (requires { device_.sets_pace(); }) {
             return device_.sets_pace();
@@ -72,8 +72,8 @@ class Controller {
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
   private:
-    /// Books the tick that ended, if both its ends are known. A ramp can give energy once, so the account of what the
-    /// rendering gives begins when it is over.
+    /// Adds the last tick to the energy accounts, if both its positions are known. A ramp can give energy once, so the
+    /// account of the given energy starts after it.
     void observe(double object) noexcept {
         const double moved = guards_.motion.to(reading_.position);
         guards_.tank.visit(reading_.position, object);
@@ -83,9 +83,9 @@ class Controller {
         }
     }
 
-    /// The order of every output: limit, softening, ramp, slew, tank. The limit comes first, because only a scaled
-    /// clipped force is passive; a clipped scaled one of a model that repeats can be a motor. It also replaces numbers
-    /// that are not finite.
+    /// Applies the limits in order: force limit, softening, ramp, slew limit, tank. The force limit comes first,
+    /// because only a scaled clipped force is passive; a clipped scaled force of a periodic model can be active. It
+    /// also replaces numbers that are not finite.
     [[nodiscard]] Status guarded(const Rendered& rendered, double& force, Status believed) noexcept {
         force = rendered.force;
         const Status limited = guards_.limit.apply(force);
@@ -94,7 +94,7 @@ class Controller {
         const Status slewed = guards_.slew.apply(force);
         const Status drained = guards_.tank.apply(force);
         guards_.buzz.watch(reading_.position, force);
-        // What says that the rendering gave energy comes before what says that the device is weak.
+        // A status about given energy comes before a status about a weak device.
         for (const Status status : {rendered.status, ramped, drained, softened, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;

@@ -13,14 +13,14 @@
 
 namespace palpate {
 
-/// What a device adds to a summary.
+/// Fields and lines that a device adds to a summary.
 struct DeviceReport {
-    std::string name;  ///< of the field that holds `fields`; empty: no field
+    std::string name;  ///< name of the field that holds `fields`; empty without them
     NamedValues fields;
     Lines lines;
 };
 
-/// A device that was chosen at run time, with its properties. It is a `Device`.
+/// A device that is chosen at run time, with its properties. It is a `Device`.
 class LiveDevice {
   public:
     LiveDevice() = default;
@@ -31,20 +31,21 @@ class LiveDevice {
     [[nodiscard]] virtual Opened open() = 0;
     [[nodiscard]] virtual Reading exchange(const Command& command) noexcept = 0;
     virtual void close() noexcept = 0;
-    /// True if its exchange waits for the device's own clock.
+    /// Returns true if its exchange waits for the clock of the device.
     [[nodiscard]] virtual bool sets_pace() const noexcept = 0;
-    /// Returns what happened on the device so far.
+    /// Returns the events of the device so far.
     [[nodiscard]] virtual DeviceReport report() const = 0;
 
-    std::string title;  ///< for messages
+    std::string title;  ///< name in messages
     DeviceProfile profile;
-    ModelScale scale;        ///< of the model to the default knob
+    ModelScale scale;        ///< of the model relative to the default knob
     double rate_hz = 0.0;    ///< ticks a second
-    Metadata metadata;       ///< for recordings
-    bool simulated = false;  ///< true if nothing moves
-    bool transducer = true;  ///< true if it measures the force
+    Metadata metadata;       ///< head of recordings
+    bool simulated = false;  ///< true if no real device moves
+    bool transducer = true;  ///< true if the device measures the force
 };
 
+/// Wraps a device of any type as a `LiveDevice`.
 template <Device D>
 class LiveDeviceOf final : public LiveDevice {
   public:

@@ -8,10 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <stdexcept>
-#include <string>
 
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 #include "palpate/io/tick_record.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/timing.hpp"
@@ -22,74 +20,70 @@ namespace palpate {
 
 /// Rate, duration and limits of a loop.
 struct LoopSettings {
-    double rate_hz = 1000.0;         ///< 100 to 10 000
-    double duration_s = 10.0;        ///< infinity = until a stop is requested
-    double lowest_rate_share = 0.8;  ///< of rate_hz: below it for half a second, the loop stops; 0 = never
-    std::uint64_t tolerated = 5;     ///< ticks in a row without a sound sample; one more, and the loop stops
-    /// A longer time between two ticks ends the loop: nothing is certified of it [s]
+    double rate_hz = 1000.0;         ///< 100 to 10 000 [Hz]
+    double duration_s = 10.0;        ///< infinity = endless [s]
+    double lowest_rate_share = 0.8;  ///< share of rate_hz that stops the loop; 0 = never
+    std::uint64_t tolerated = 5;     ///< consecutive bad ticks; one more stops the loop
+    /// Longest time between two ticks; a longer time ends the loop, because it is not certified [s].
     double longest_period_s = std::numeric_limits<double>::infinity();
 };
 
 inline constexpr double lowest_rate_hz = 100.0;
 inline constexpr double highest_rate_hz = 10'000.0;
-inline constexpr double held_rate_share = 0.99;  ///< of the rate; a loop below it is reported
+inline constexpr double held_rate_share = 0.99;  ///< share of the rate; a slower loop is reported
 
-/// Throws std::invalid_argument: the field, its value, what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const LoopSettings& settings) {
-    const auto require = [](bool holds, const char* field, double value, const char* right) {
-        if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
-        }
-    };
-    require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
-            settings.rate_hz, "100 to 10000");
-    require(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
-    require(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s",
-            settings.longest_period_s, "at least one period");
-    require(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
-            settings.lowest_rate_share, "0 to 1");
+    require_field(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
+                  settings.rate_hz, readable(lowest_rate_hz) + " to " + readable(highest_rate_hz));
+    require_field(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
+    require_field(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s",
+                  settings.longest_period_s, "at least one period");
+    require_field(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
+                  settings.lowest_rate_share, "0 to 1");
 }
 
 /// Reason why a loop ended.
 enum class ExitReason : std::uint8_t {
     TimeUp,
     StopRequested,
-    Guard,        ///< samples or forces were not plausible
-    DeviceFault,  ///< reported by the device, or it stopped answering
+    Guard,        ///< samples or forces were implausible
+    DeviceFault,  ///< the device reported a fault or did not respond
     RateTooLow,
     NotCertified,  ///< a tick was later than the certificate allows
 };
 
-/// True if the loop ended as planned.
+/// Returns true if the loop ended as planned.
 [[nodiscard]] constexpr bool is_orderly(ExitReason reason) noexcept {
     return reason == ExitReason::TimeUp || reason == ExitReason::StopRequested;
 }
 
-/// Progress of a running loop. Each number is valid by itself; they may belong to different ticks.
+/// Progress of a running loop. Each number is valid; two numbers may belong to different ticks.
 struct LoopProgress {
     std::atomic<std::uint64_t> ticks{0};
     std::atomic<std::uint64_t> missed{0};
-    std::atomic<std::uint64_t> lost{0};  ///< samples
-    std::atomic<double> position{0.0};
-    std::atomic<double> force{0.0};
-    std::atomic<double> object_force{0.0};  ///< of a real object against the handle
+    std::atomic<std::uint64_t> lost{0};     ///< lost samples
+    std::atomic<double> position{0.0};      ///< position of the handle [m or rad]
+    std::atomic<double> force{0.0};         ///< force on the handle [N or N*m]
+    std::atomic<double> object_force{0.0};  ///< force of a real object on the handle [N or N*m]
     RateCheck rate;
 };
 
 /// Result of a loop.
 struct LoopReport {
     ExitReason exit_reason = ExitReason::TimeUp;
-    Status status = Status::Ok;  ///< of the last tick
+    Status status = Status::Ok;  ///< status of the last tick
     LoopTiming timing;
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double given_in_ramp = 0.0;  ///< largest net energy given by the motor during the ramp at the start [J]
+    double given_in_ramp = 0.0;  ///< largest net energy from the motor during the ramp at the start [J]
     double given = 0.0;          ///< the same after the ramp [J]
-    double most_stored = 0.0;    ///< upper bound of the energy that the rendering stored above its least [J]
+    double most_stored = 0.0;    ///< upper bound of the stored energy above its least [J]
     std::uint64_t buzzes = 0;    ///< limit cycles, each of which softened the object
 };
 
+/// Returns the record of a tick.
 [[nodiscard]] inline TickRecord record_of(const Tick& tick, const Wake& wake, Nanoseconds first) noexcept {
     TickRecord record;
     record.time = static_cast<double>(wake.now - first) * 1e-9;
@@ -110,7 +104,7 @@ struct LoopReport {
 
 namespace detail {
 
-/// True if the loop must stop after this many bad ticks in a row; sets `reason`.
+/// Returns true if the loop must stop after this number of consecutive bad ticks; sets `reason`.
 [[nodiscard]] inline bool ends(Status status, std::uint64_t bad_in_a_row, std::uint64_t tolerated,
                                ExitReason& reason) noexcept {
     if (!is_final(status) && bad_in_a_row <= tolerated) {
@@ -123,7 +117,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// Runs the loop (wake up, tick, hand over the record) until the time is up, a stop is requested, a guard or the device
+/// Runs the loop (wake up, tick, pass the record on) until the time is up, a stop is requested, a guard or the device
 /// stops it, or its rate is too low. On every exit it sends zero force and closes the device. `clock` has start() and
 /// wait(); `sink` has push(record). It does not allocate, lock, throw, log or make a system call, except for the clock
 /// and the device exchange.
@@ -144,7 +138,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         report.timing.add(wake);
         if (too_late) {
             report.exit_reason = ExitReason::NotCertified;
-            break;  // the last force was held too long already
+            break;  // the last force was already held too long
         }
         const Tick tick = controller.tick();
         const TickRecord record = record_of(tick, wake, report.timing.first);

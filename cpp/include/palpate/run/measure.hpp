@@ -5,6 +5,7 @@
 #include <atomic>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "palpate/fields/readable.hpp"
@@ -22,19 +23,30 @@ namespace palpate {
 /// Options of a measurement of a real object. Without `probe` and `push` a hand moves the handle.
 struct MeasureOptions : RunOptions {
     RecordUnits units;
-    bool probe = false;  ///< the device moves the handle slowly between lower and upper
+    bool probe = false;  ///< slow motion between lower and upper
     std::optional<double> lower, upper, speed, stiffness, force_limit;  ///< of the probe
     std::optional<double> push;   ///< force of short pushes to either side [N or N*m]
-    bool keep = false;            ///< keep every tick in the summary
+    bool keep = false;            ///< true: keep every tick
     bool transducer = true;       ///< of the simulated device
-    double friction_share = 0.0;  ///< Coulomb friction of the simulated device, relative to its force limit
+    double friction_share = 0.0;  ///< Coulomb friction / force limit, simulated
 
+    /// Returns true if the device moves the handle.
     [[nodiscard]] bool moves() const noexcept { return probe || push; }
 };
 
+template <>
+inline constexpr auto fields_of<MeasureOptions> = std::tuple_cat(
+    fields_of<RunOptions>,
+    std::tuple{Field<&MeasureOptions::probe>{"probe"}, Field<&MeasureOptions::lower>{"lower"},
+               Field<&MeasureOptions::upper>{"upper"}, Field<&MeasureOptions::speed>{"speed"},
+               Field<&MeasureOptions::stiffness>{"stiffness"},
+               Field<&MeasureOptions::force_limit>{"force_limit"}, Field<&MeasureOptions::push>{"push"},
+               Field<&MeasureOptions::keep>{"keep"}, Field<&MeasureOptions::transducer>{"transducer"},
+               Field<&MeasureOptions::friction_share>{"friction_share"}});
+
 namespace detail {
 
-/// Returns the settings of the probe: the given ones, else the default ones at the scale of the device.
+/// Returns the settings of the probe: the given ones, otherwise the defaults at the scale of the device.
 [[nodiscard]] inline ProbeSettings chosen_probe(const MeasureOptions& options, const LiveDevice& device) {
     ProbeSettings probe;
     probe.lower = options.lower.value_or(probe.lower);
@@ -53,12 +65,17 @@ namespace detail {
 
 }  // namespace detail
 
-/// Measures a real object on a device that is not open yet. The object moves by a hand, a probe or pushes.
+/// Measures a real object on a closed device. A hand, a probe or pushes move the object.
 [[nodiscard]] inline Summary measure(const MeasureOptions& options, LiveDevice& device,
                                      const std::atomic<bool>& stop_requested, const Watch& watch) {
     SessionSettings session{.loop = options.loop, .real_time = options.real_time};
     session.loop.rate_hz = device.rate_hz;
     validate(session.loop);
+    detail::require(
+        device.transducer || options.probe || options.record.empty(),
+        device.profile.id +
+            " has no force transducer, and its motor does not show a force while a hand moves the handle: "
+            "probe instead");
     const double period_s = 1.0 / device.rate_hz;
     GuardSettings guards = guards_for(device.scale, device.profile);
     std::string moved_by = "a hand";
@@ -71,7 +88,7 @@ namespace detail {
                    readable(probe->force_limit);
     }
     if (!options.moves()) {
-        guards.ramp_s = 0.0;  // no force to increase
+        guards.ramp_s = 0.0;  // there is only zero force
     }
     validate(guards);
     Metadata metadata{{"created_by", options.created_by}};

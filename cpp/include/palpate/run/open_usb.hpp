@@ -27,6 +27,7 @@ namespace palpate {
 
 namespace detail {
 
+/// Returns the state of the connection for a summary.
 [[nodiscard]] inline DeviceReport usb_report(const UsbDevice& device) {
     const UsbHealth health = device.health();
     const StreamHealth& stream = health.stream;
@@ -62,7 +63,7 @@ namespace detail {
                       " late echoes; " + number(health.timeouts) + " timeouts, " + number(health.stalls) +
                       " stalls, " + number(health.bus_errors) + " bus errors, " +
                       number(stream.watchdog_trips) + " watchdog trips"}}};
-    if (stream.delay.count() > 0) {  // a disabled device may accept no command
+    if (stream.delay.count() > 0) {  // a disabled device may refuse all commands
         report.fields.push_back({"round_trip", fields(stream.round_trip)});
         report.fields.push_back({"delay", fields(stream.delay)});
         report.fields.push_back(
@@ -91,7 +92,7 @@ namespace detail {
                                                           const PlannedModel& model) {
     UsbOptions usb = detail::usb_options(options);
     if (!options.uncertified && model.certificate) {
-        usb.longest_delay_s = model.certificate->device.delay_s;  // a later command is not certified
+        usb.longest_delay_s = model.certificate->device.delay_s;  // later commands are not certified
     }
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);
     if (const Opened opened = live->open(); !opened) {
@@ -104,8 +105,8 @@ namespace detail {
     }
     if (std::abs(options.loop.rate_hz - device.info().rate_hz) > 0.5) {
         const std::string rate = std::to_string(device.info().rate_hz);
-        refuse("--rate-hz is " + readable(options.loop.rate_hz) + "; " + name + " sends " + rate +
-               " packets a second and paces the loop: choose --rate-hz " + rate);
+        refuse("rate_hz is " + readable(options.loop.rate_hz) + "; " + name + " sends " + rate +
+               " packets a second and paces the loop: choose " + rate);
     }
     live->title = name + (options.uncertified ? ", uncertified," : "");
     live->profile = device.profile();
@@ -114,7 +115,7 @@ namespace detail {
     return live;
 }
 
-/// Returns a USB device for a measurement, not open yet. It makes force for a probe and for pushes only.
+/// Returns a closed USB device for a measurement. It makes force only for a probe and for pushes.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> usb_to_measure(MeasureOptions& options) {
     UsbOptions usb = detail::usb_options(options);
     usb.makes_force = false;
@@ -125,12 +126,6 @@ namespace detail {
     const wire::Info info = listener.info();
     const std::string name = listener.name().text();
     listener.close();
-    const bool transducer = (info.capabilities & wire::has_transducer) != 0;
-    detail::require(
-        transducer || options.probe || options.record.empty(),
-        profile.id +
-            " has no force transducer, and its motor does not show a force while a hand moves the handle: "
-            "probe instead");
     detail::require(!options.probe || options.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     options.force_limit =
@@ -141,12 +136,13 @@ namespace detail {
     live->profile = profile;
     live->rate_hz = info.rate_hz;
     live->metadata = {{"device", profile.id}};
-    live->transducer = transducer;
+    live->transducer = (info.capabilities & wire::has_transducer) != 0;
     return live;
 }
 
 #else
 
+/// Throws, because this build does not include libusb.
 [[noreturn]] inline void refuse_usb(const RunOptions& options) {
     refuse("device " + options.device +
            ": palpate was built without libusb; install libusb-1.0-0-dev and build it again");

@@ -13,11 +13,12 @@
 
 namespace palpate {
 
-/// Smallest and largest value seen; NaN before the first value.
+/// Smallest and largest of some values; NaN before the first value.
 struct Range {
     double lower = std::numeric_limits<double>::quiet_NaN();
     double upper = std::numeric_limits<double>::quiet_NaN();
 
+    /// Extends the range to a value.
     void add(double value) noexcept {
         lower = std::fmin(lower, value);
         upper = std::fmax(upper, value);
@@ -30,8 +31,9 @@ struct RecordSinks {
     Telemetry telemetry;
     std::vector<TickRecord> kept;
     bool keeps = false;        ///< true if every tick is kept in memory
-    bool real_object = false;  ///< true if the recorded force is that of a real object, not of a virtual one
+    bool real_object = false;  ///< true if the recorded force is that of a real object
 
+    /// Takes the records of some ticks.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (real_object) {
             recorded_.assign(ticks.begin(), ticks.end());
@@ -54,8 +56,8 @@ struct RecordSinks {
         }
     }
 
-    Range positions;                 ///< of the ticks taken
-    Range forces;                    ///< of the ticks taken, of a real object if there is one
+    Range positions;                 ///< range of the handle [m or rad]
+    Range forces;                    ///< range of the force, of a real object if there is one
     std::uint64_t extrapolated = 0;  ///< ticks outside the model's data
 
   private:

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -34,15 +35,29 @@ namespace palpate {
 /// Options of every session.
 struct RunOptions {
     std::string device = "simulated";
-    std::optional<double> wait_s;  ///< for an answer of the device; default: the device's own [s]
+    std::optional<double> wait_s;  ///< longest wait for the device; default: that of the device [s]
     LoopSettings loop;
     RealTimeOptions real_time;
-    std::string record;  ///< recording; empty: none
-    bool force = false;  ///< replace an existing recording
+    std::string record;  ///< name of the recording; empty without one
+    bool force = false;  ///< true: replace an existing recording
     std::optional<std::uint16_t> telemetry_port;
     double telemetry_hz = Telemetry::usual_hz;
     std::string created_by;
 };
+
+template <>
+inline constexpr auto fields_of<RunOptions> =
+    std::tuple{Field<&RunOptions::device>{"device"},
+               Field<&RunOptions::wait_s>{"wait_s"},
+               Field<&RunOptions::loop, &LoopSettings::rate_hz>{"rate_hz"},
+               Field<&RunOptions::loop, &LoopSettings::duration_s>{"duration_s"},
+               Field<&RunOptions::loop, &LoopSettings::lowest_rate_share>{"lowest_rate_share"},
+               Field<&RunOptions::real_time, &RealTimeOptions::priority>{"priority"},
+               Field<&RunOptions::real_time, &RealTimeOptions::cpu>{"cpu"},
+               Field<&RunOptions::record>{"record"},
+               Field<&RunOptions::force>{"force"},
+               Field<&RunOptions::telemetry_port>{"telemetry_port"},
+               Field<&RunOptions::telemetry_hz>{"telemetry_hz"}};
 
 /// Options of a rendering. Fields that are not set follow the model and the device.
 struct RenderOptions : RunOptions {
@@ -56,43 +71,52 @@ struct RenderOptions : RunOptions {
     double frozen_s = GuardSettings{}.frozen_s;
     bool energy_tank = true;
     bool uncertified = false;
-    std::vector<std::string> faults;  ///< of the simulated device
+    std::vector<std::string> faults;  ///< faults of the simulated device
 };
+
+template <>
+inline constexpr auto fields_of<RenderOptions> = std::tuple_cat(
+    fields_of<RunOptions>, all_within<&RenderOptions::scheme>(fields_of<SchemeChoices>),
+    std::tuple{Field<&RenderOptions::force_limit>{"force_limit"},
+               Field<&RenderOptions::uncertified>{"uncertified"}, Field<&RenderOptions::faults>{"faults"}});
 
 /// A model and its plan.
 struct PlannedModel {
-    std::string name;  ///< of its file
+    std::string name;  ///< name of its file
     ForceModel model;  ///< the identified model
     std::string position_unit;
     std::string force_unit;
     std::optional<Scheme> plan;
-    std::optional<ForceModel> limited;  ///< rendered by the plan in place of `model`
+    std::optional<ForceModel> limited;  ///< model that the plan renders instead of `model`
     std::optional<Certificate> certificate;
 
+    /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
     /// Returns the name and the units, for a refusal.
     [[nodiscard]] std::string in_units() const {
         const auto unit = [](const std::string& text) { return text.empty() ? "no unit" : text; };
         return name + " is in " + unit(position_unit) + " and " + unit(force_unit);
     }
+    /// Returns the units of a recording of this model.
     [[nodiscard]] RecordUnits units() const { return record_units(position_unit, force_unit); }
 };
 
-/// A rendering on an open device, settled before anything moves.
+/// Rendering on an open device, with all settings, before the handle moves.
 struct RenderJob {
-    const ForceModel& model;  ///< that is rendered
+    const ForceModel& model;  ///< the rendered model
     Scheme scheme;
     GuardSettings guards;
     SessionSettings session;
     Metadata metadata;
-    std::vector<std::string> notes;  ///< for the user
+    std::vector<std::string> notes;  ///< messages for the user
 };
 
+/// Throws std::invalid_argument with the sentence.
 [[noreturn]] inline void refuse(const std::string& sentence) {
     throw std::invalid_argument(sentence);
 }
 
-/// True if the options choose a rendering that differs from the plan. Then no certificate holds.
+/// Returns true if the options choose a rendering that differs from the plan. No certificate holds in this case.
 [[nodiscard]] inline bool differs_from_plan(const RenderOptions& options) noexcept {
     return options.scheme.any() || options.force_limit || options.slew_s || options.tolerated;
 }
@@ -103,7 +127,7 @@ struct RenderJob {
         return "the model has no certificate";
     }
     if (options.uncertified) {
-        return "--uncertified was given";
+        return "uncertified was set";
     }
     return differs_from_plan(options) ? "the options change the planned rendering" : "";
 }
@@ -111,11 +135,11 @@ struct RenderJob {
 namespace detail {
 
 /// Returns the reason why a model must not move a device; empty if its certificate holds for the device, its rate and
-/// the options. The reader of the model checked that the certificate fits the model.
+/// the options. The reader of the model has checked that the certificate fits the model.
 [[nodiscard]] inline std::string certificate_mismatch(const RenderOptions& options, const PlannedModel& model,
                                                       const DeviceProfile& device) {
     const auto differs = [](double certified, double measured) {
-        constexpr double rounding = 1e-6;  // of a profile written by hand
+        constexpr double rounding = 1e-6;  // of a handwritten profile
         return std::abs(certified - measured) > rounding * std::abs(measured);
     };
     if (!model.certificate) {
@@ -142,12 +166,13 @@ namespace detail {
                readable(device.force_limit) + " N*m";
     }
     if (differs_from_plan(options)) {
-        return "is certified as it was planned: leave out --structure and its numbers, --force-limit, "
-               "--slew-s, --tolerated-samples";
+        return "is certified as it was planned: leave out structure and its numbers, force_limit, slew_s, "
+               "tolerated_samples";
     }
     return "";
 }
 
+/// Returns the guards with the chosen options; the others have the defaults for the device.
 [[nodiscard]] inline GuardSettings chosen_guards(const RenderOptions& options, const LiveDevice& device) {
     GuardSettings guards = guards_for(device.scale, device.profile);
     guards.force_limit = options.force_limit.value_or(guards.force_limit);
@@ -158,19 +183,19 @@ namespace detail {
     guards.energy_tank = options.energy_tank;
     validate(guards);
     if (!device.profile.makes(guards.force_limit)) {
-        refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +
+        refuse("force_limit is " + readable(guards.force_limit) + ", the device makes " +
                readable(device.profile.force_limit));
     }
     guards.force_limit = std::min(guards.force_limit, device.profile.force_limit);
     return guards;
 }
 
-/// Below this share of its rate the certificate does not hold, because it is for the period of the rate.
+/// Share of the rate below which the certificate does not hold, because it is for the period of that rate.
 inline constexpr double certified_rate_share = 0.99;
 
-/// Sets guards and loop as certified: no slew limit and no tick without a force, because the proofs do not cover them;
-/// the certified force limit; no longer time between two ticks than certified; damping and friction of the device for
-/// the energy tank.
+/// Sets guards and loop as certified. Removes the slew limit and ticks without a force, because the proofs do not cover
+/// them. Sets the certified force limit, the longest certified time between two ticks, and the device's damping and
+/// friction for the energy tank.
 inline void keep_certified(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.certified = true;
     guards.slew_s = 0.0;
@@ -182,7 +207,7 @@ inline void keep_certified(const Certificate& certificate, GuardSettings& guards
     loop.longest_period_s = certificate.longest_period_s;
 }
 
-/// Opens telemetry and recording. Returns a sentence if an interrupted recording was set aside, else "".
+/// Opens telemetry and recording. Returns a sentence if an interrupted recording was renamed, otherwise "".
 inline std::string open_sinks(const RunOptions& options, const RecordUnits& units, const Metadata& metadata,
                               RecordSinks& sinks) {
     if (options.telemetry_port) {
@@ -232,8 +257,9 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
 
 }  // namespace detail
 
-/// Settles scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a
-/// certificate that holds for it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a refusal.
+/// Chooses scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a
+/// certificate that holds for it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a
+/// refusal.
 [[nodiscard]] inline RenderJob settle(const RenderOptions& options, const PlannedModel& model,
                                       const LiveDevice& device, RecordSinks& sinks) {
     std::string reason = void_reason(options, model);
@@ -241,7 +267,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         reason = detail::certificate_mismatch(options, model, device.profile);
         if (!reason.empty()) {
             refuse(model.name + " " + reason +
-                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+                   "; make a certificate with 'palpate plan', or set uncertified to render without");
         }
     }
     const bool follows_plan = model.plan && !options.scheme.any();
@@ -277,7 +303,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         flight_metadata(options.created_by, job.metadata, model.name, job.scheme, job.guards, loop.rate_hz);
     if (std::error_code ignored;
         !options.record.empty() && std::filesystem::equivalent(options.record, model.name, ignored)) {
-        refuse("--record " + options.record + " is the model; writing there would destroy it");
+        refuse("record is " + options.record + ", the model; writing there would destroy it");
     }
     if (std::string note = detail::open_sinks(options, model.units(), job.metadata, sinks); !note.empty()) {
         job.notes.push_back(std::move(note));

@@ -26,16 +26,16 @@ namespace palpate {
 struct SessionSettings {
     LoopSettings loop{};
     RealTimeOptions real_time{};
-    std::chrono::milliseconds hand_over_every{20};  ///< oldest record that is not written yet
-    double ring_s = 10.0;                           ///< longest pause of the writer
+    std::chrono::milliseconds hand_over_every{20};  ///< age from which a record is written
+    double ring_s = 10.0;                           ///< longest pause of the writer [s]
     std::size_t last_ticks = 500;                   ///< saved to NAME.fault.csv after a fault
 };
 
 /// State of a running session.
 struct SessionView {
     const LoopProgress& progress;
-    const std::vector<std::string>* refused;  ///< privileges; null until they were requested
-    int disk_error;                           ///< errno of the recording, 0 while it is written
+    const std::vector<std::string>* refused;  ///< refused privileges; null before they were requested
+    int disk_error;                           ///< errno of the recording; 0 without an error
 };
 
 /// Result of a session.
@@ -54,6 +54,7 @@ struct LoopSink {
     Recorder& recorder;
     LastRecords<TickRecord>& last;
 
+    /// Adds the record of a tick.
     void push(const TickRecord& record) noexcept {
         recorder.push(record);
         last.push(record);
@@ -62,11 +63,11 @@ struct LoopSink {
 
 }  // namespace detail
 
-/// Called fifty times a second while a session runs; it may request its stop.
+/// Function that is called fifty times a second while a session runs; it may request its stop.
 using Watch = std::function<void(const SessionView&)>;
 
-/// Runs the loop on an open device until it ends. Then the device is closed, at zero force, and every record has reached
-/// the sinks.
+/// Runs the loop on an open device until it ends. After that the device is closed at zero force, and the sinks have
+/// received every record.
 template <class Control>
 [[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
                                         RecordSinks& sinks, const std::atomic<bool>& stop_requested,
@@ -74,7 +75,7 @@ template <class Control>
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
-    const auto loop_report = std::make_unique<LoopReport>();  // large: not on the stack
+    const auto loop_report = std::make_unique<LoopReport>();  // on the heap, because it is large
     LoopProgress progress;
     std::atomic<bool> privileges_known{false};
     std::atomic<bool> over{false};

@@ -17,7 +17,7 @@
 
 namespace palpate {
 
-/// "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us"
+/// Returns a text such as "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us".
 [[nodiscard]] inline std::string percentiles(const DurationHistogram& histogram) {
     std::string text;
     for (const auto& [name, share] :
@@ -61,8 +61,8 @@ namespace palpate {
            " Hz for half a second";
 }
 
-/// Returns the most energy that a rendering had given, net, in one line. The ramp at the start can give what the object
-/// holds once, so its energy is stated separately.
+/// Returns the largest net energy that a rendering gave, in one line. The ramp at the start can give the energy of the
+/// object once, so its energy is stated separately.
 [[nodiscard]] inline std::string energy_text(const LoopReport& report) {
     const std::string stored = std::isfinite(report.most_stored)
                                    ? "the object held at most " + readable(report.most_stored) + " J"
@@ -71,7 +71,7 @@ namespace palpate {
            " J after it; " + stored;
 }
 
-/// "massless, compensated, K_c = 100, B_c = 0.02"
+/// Returns a text such as "massless, compensated, K_c = 100, B_c = 0.02".
 [[nodiscard]] inline std::string describe(const Scheme& scheme) {
     std::string text{name_of(scheme.structure)};
     text += scheme.compensated ? ", compensated" : "";
@@ -91,7 +91,7 @@ namespace palpate {
     return text;
 }
 
-/// The head of a flight record.
+/// Returns the head of a flight record.
 [[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const Metadata& device,
                                               const std::string& model, const Scheme& scheme,
                                               const GuardSettings& guards, double rate_hz) {
@@ -130,8 +130,8 @@ namespace palpate {
     return warnings;
 }
 
-/// Writes the last ticks before a fault as a recording of their own, NAME.fault.csv; without `force` a name that is
-/// taken is followed by NAME.fault-2.csv, NAME.fault-3.csv, ... Returns a sentence about it.
+/// Writes the last ticks before a fault to a separate recording, NAME.fault.csv. Without `force` it keeps an existing
+/// file and uses NAME.fault-2.csv, NAME.fault-3.csv, ... Returns a sentence with the name or the error.
 [[nodiscard]] inline std::string write_last_ticks(const std::string& record, bool force,
                                                   const RecordUnits& units, const Metadata& metadata,
                                                   const SessionReport& report, const LoopSettings& settings) {

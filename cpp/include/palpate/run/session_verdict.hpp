@@ -19,17 +19,17 @@
 
 namespace palpate {
 
-/// Reservation about a session: value, likely cause and cure in one sentence.
+/// Defect of a session: value, likely cause and cure in one sentence.
 struct SessionFinding {
-    std::string_view level;  ///< "usable", or "no" where the result is unfit for use
+    std::string_view level;  ///< "usable", or "no" for an unusable result
     std::string sentence;
 };
 
-/// Expectations that a session is judged by.
+/// Expected properties of a session.
 struct SessionExpectation {
-    bool recorded = false;      ///< a recording was requested
-    double encoder_step = 0.0;  ///< of the device [m or rad]; 0 = not quantised
-    Range domain{};             ///< positions of the rendered model; NaN where a real object is measured
+    bool recorded = false;      ///< true if a recording was requested
+    double encoder_step = 0.0;  ///< of the device [m or rad]; 0 without quantisation
+    Range domain{};             ///< positions of the rendered model; NaN for a real object
     std::string position_unit{};
     std::vector<std::string> warnings{};  ///< from `finish_record`
 };
@@ -38,10 +38,11 @@ namespace detail {
 
 inline constexpr double tolerated_loss = 0.001;   ///< share of deadlines, samples and rows that may be lost
 inline constexpr double tolerated_change = 0.01;  ///< share of ticks whose force may differ from the model's
-inline constexpr double fewest_encoder_steps = 50;    ///< that a recording should cover
-inline constexpr double smallest_domain_share = 0.1;  ///< that a rendering should cover
+                                                  ///< force
+inline constexpr double fewest_encoder_steps = 50;    ///< least number that a recording covers
+inline constexpr double smallest_domain_share = 0.1;  ///< least share that a rendering covers
 
-/// "12 of 1000 (1.2 %)"
+/// Returns a text such as "12 of 1000 (1.2 %)".
 [[nodiscard]] inline std::string share_text(std::uint64_t part, std::uint64_t whole) {
     return std::to_string(part) + " of " + std::to_string(whole) + " (" +
            readable(100.0 * static_cast<double>(part) /
@@ -49,11 +50,12 @@ inline constexpr double smallest_domain_share = 0.1;  ///< that a rendering shou
            " %)";
 }
 
+/// Returns true if a part exceeds a share of the whole.
 [[nodiscard]] inline bool exceeds(std::uint64_t part, std::uint64_t whole, double share) noexcept {
     return static_cast<double>(part) > share * static_cast<double>(whole);
 }
 
-/// Findings about lost time, samples and rows.
+/// Adds findings about lost time, samples and rows.
 inline void judge_losses(const SessionReport& report, const LoopSettings& settings,
                          std::vector<SessionFinding>& findings) {
     const LoopTiming& timing = report.loop.timing;
@@ -83,7 +85,7 @@ inline void judge_losses(const SessionReport& report, const LoopSettings& settin
     }
 }
 
-/// Findings about ticks whose force was not the model's.
+/// Adds findings about ticks whose force differed from the model's force.
 inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
     const std::uint64_t ticks = loop.timing.ticks();
@@ -114,7 +116,7 @@ inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const
     }
 }
 
-/// Findings about the motion of the handle.
+/// Adds findings about the motion of the handle.
 inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
     const double covered = sinks.positions.upper - sinks.positions.lower;
@@ -134,7 +136,7 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
 
 }  // namespace detail
 
-/// Judges a session: an empty list means "good". The most serious finding comes first.
+/// Judges a session. The most serious finding comes first; an empty list means "good".
 [[nodiscard]] inline std::vector<SessionFinding> judge_session(const SessionReport& report,
                                                                const LoopSettings& settings,
                                                                const RecordSinks& sinks,
@@ -154,7 +156,7 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     for (const std::string& warning : expected.warnings) {
         findings.push_back({"usable", warning});
     }
-    if (is_orderly(report.loop.exit_reason)) {  // a run that was stopped early says nothing about the motion
+    if (is_orderly(report.loop.exit_reason)) {  // an interrupted run does not show the usual motion
         detail::judge_forces(report.loop, sinks, expected, findings);
         detail::judge_motion(sinks, expected, findings);
     }
@@ -164,12 +166,12 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     return findings;
 }
 
-/// "good", "usable" or "no".
+/// Returns "good", "usable" or "no".
 [[nodiscard]] inline std::string level_of(const std::vector<SessionFinding>& findings) {
     return findings.empty() ? "good" : std::string(findings.front().level);
 }
 
-/// "good", "usable: ..." or "no: ..."
+/// Returns "good", "usable: ..." or "no: ...".
 [[nodiscard]] inline std::string verdict_text(const std::vector<SessionFinding>& findings) {
     std::string text = level_of(findings);
     for (const SessionFinding& finding : findings) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "palpate/fields/readable.hpp"
@@ -22,7 +23,7 @@
 
 namespace palpate {
 
-/// Result of a session: everything that palpate-control and Python report.
+/// Result of a session: all values that palpate-control and Python report.
 struct Summary {
     SessionReport report;
     LoopSettings loop;
@@ -34,15 +35,17 @@ struct Summary {
     std::uint64_t telemetry_dropped = 0;
     Range positions;
     Range forces;
-    std::vector<TickRecord> kept;       ///< every tick, if they were kept
-    std::vector<std::string> notes;     ///< from before the session
+    std::vector<TickRecord> kept;       ///< every tick, if ticks are kept
+    std::vector<std::string> notes;     ///< from the time before the session
     std::vector<std::string> warnings;  ///< from the end of the recording
-    std::string last_ticks;             ///< where the last ticks before a fault are; empty without a fault
+    std::string last_ticks;             ///< recording of the last ticks before a fault; empty without one
     std::vector<SessionFinding> findings;
     std::string device;
     DeviceReport device_report;
 
+    /// Returns true if the session ended as planned.
     [[nodiscard]] bool orderly() const noexcept { return is_orderly(report.loop.exit_reason); }
+    /// Returns the exit reason as a sentence.
     [[nodiscard]] std::string ended() const { return exit_text(report.loop, loop); }
     /// Returns a sentence for each difference from the request.
     [[nodiscard]] std::vector<std::string> all_notes() const {
@@ -57,12 +60,23 @@ struct Summary {
     }
 };
 
-/// Percentiles of durations [us].
+/// Returns percentiles of durations [us].
 [[nodiscard]] inline NamedValues fields(const DurationHistogram& histogram) {
     return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
             {"p99_us", 1e-3 * histogram.quantile(0.99)},
             {"p999_us", 1e-3 * histogram.quantile(0.999)},
             {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
+}
+
+/// Ticks of each status that occurred.
+[[nodiscard]] inline NamedValues ticks_by_status(const LoopReport& loop) {
+    NamedValues counts;
+    for (std::size_t k = 0; k < status_texts.size(); ++k) {
+        if (loop.ticks_by_status[k] > 0) {
+            counts.push_back({std::string(status_texts[k].word), loop.ticks_by_status[k]});
+        }
+    }
+    return counts;
 }
 
 /// The fields of a summary, for JSON and for Python.
@@ -72,12 +86,6 @@ struct Summary {
     findings.reserve(summary.findings.size());
     for (const SessionFinding& finding : summary.findings) {
         findings.push_back({{"level", std::string(finding.level)}, {"sentence", finding.sentence}});
-    }
-    NamedValues ticks_by_status;
-    for (std::size_t k = 0; k < status_texts.size(); ++k) {
-        if (loop.ticks_by_status[k] > 0) {
-            ticks_by_status.push_back({std::string(status_texts[k].word), loop.ticks_by_status[k]});
-        }
     }
     NamedValues all{
         {"verdict", verdict_text(summary.findings)},
@@ -93,7 +101,7 @@ struct Summary {
         {"lateness", fields(loop.timing.lateness)},
         {"missed_deadlines", loop.timing.missed},
         {"longest_gap_us", 1e-3 * static_cast<double>(loop.timing.period.largest())},
-        {"ticks_by_status", ticks_by_status},
+        {"ticks_by_status", ticks_by_status(loop)},
         {"lost_samples", loop.lost_samples},
         {"repeated_samples", loop.repeated_samples},
         {"record", summary.record.empty() ? Value{} : Value{summary.record}},
@@ -116,16 +124,14 @@ struct Summary {
     return all;
 }
 
-/// The lines of a summary, for a person.
+/// Returns the lines of a summary, for the terminal.
 [[nodiscard]] inline Lines lines(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     const bool slow = loop.timing.rate_hz() < held_rate_share * summary.loop.rate_hz;
     std::string counts;
-    for (std::size_t k = 0; k < status_texts.size(); ++k) {
-        if (loop.ticks_by_status[k] > 0) {
-            counts += (counts.empty() ? "" : ", ") + std::to_string(loop.ticks_by_status[k]) + " " +
-                      status_texts[k].word;
-        }
+    for (const NamedValue& status : ticks_by_status(loop)) {
+        counts += (counts.empty() ? "" : ", ") + std::to_string(std::get<std::uint64_t>(status.value)) + " " +
+                  status.name;
     }
     Lines all{
         {"ended", summary.ended()},

@@ -20,8 +20,8 @@
 
 namespace palpate {
 
-/// Solves f(y) + p y = q in at most four evaluations, for every start and every q, if p is certified to make F(y) =
-/// f(y) + p y rise. Otherwise `LoadLineSolver` searches from the last position.
+/// Solves f(y) + p y = q in at most four evaluations, for every start and every q, if p is certified to make
+/// F(y) = f(y) + p y rise. Otherwise `LoadLineSolver` searches from the last position.
 ///
 /// When the model is loaded, all positions are cut into cells of width w with
 ///

@@ -16,8 +16,8 @@ namespace palpate {
 /// Let F(y) = f(y) + p y rise, and let F(u) = q. Then c(f(y)) + p y also rises, because p > 0 and each of its slopes is
 /// F' or p. It has one solution:
 /// - |f(u)| <= F_max: u itself, since c(f(u)) = f(u).
-/// - f(u) > F_max: y = (q - F_max) / p. Since p y = q - F_max > q - f(u) = p u, y > u and F(y) > q. This means f(y) > q
-///   - p y = F_max: the limit is active at y.
+/// - f(u) > F_max: y = (q - F_max) / p. Since p y = q - F_max > q - f(u) = p u, y > u and F(y) > q. This means
+///   f(y) > q - p y = F_max: the limit is active at y.
 /// - f(u) < -F_max: y = (q + F_max) / p in the same way.
 ///
 /// For an environment with memory this holds for each of its states. If p does not certify that F rises, the solver

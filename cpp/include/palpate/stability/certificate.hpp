@@ -26,9 +26,10 @@
 
 namespace palpate {
 
+/// Result of a certificate.
 enum class Verdict : std::uint8_t {
-    Certified,      ///< no motion of the handle can take more energy out than went in
-    StableLocally,  ///< the linearised system is stable; energy is not accounted for
+    Certified,      ///< no motion of the handle can take out more energy than was put in
+    StableLocally,  ///< the linearised system is stable; energy is not considered
     Refused,
 };
 
@@ -36,7 +37,7 @@ template <>
 inline constexpr auto words_of<Verdict> =
     std::array<std::string_view, 3>{"certified", "stable-locally", "refused"};
 
-/// What is proved of a model, rendered by a scheme, on a device: every inequality with both its sides.
+/// Proved properties of a model that a scheme renders on a device: every inequality with both sides.
 struct Certificate {
     std::string model;
     Scheme scheme;
@@ -48,6 +49,7 @@ struct Certificate {
     std::string fingerprint;
     std::string why;
 
+    /// Returns true if the rendering is passive.
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
 };
 
@@ -98,8 +100,8 @@ void hash_value(NumberHash& hash, const T& value) {
 
 }  // namespace detail
 
-/// 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of the
-/// device, bounds, sides of each line, verdict. Detects a certificate that was edited; it is no signature.
+/// Returns 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of
+/// the device, bounds, sides of each line, verdict. They detect an edited certificate; they are not a signature.
 [[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
     detail::NumberHash hash;
     for_each_field<Certificate>([&](const auto& field) {
@@ -113,7 +115,7 @@ void hash_value(NumberHash& hash, const T& value) {
     return hash.text();
 }
 
-/// The inequalities of a scheme, whatever they say. Fields that the structure has no use for are ignored.
+/// Returns the inequalities of a scheme, whether they hold or not. Fields that the structure does not use are ignored.
 [[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
                                                              const DeviceProfile& device) {
     std::vector<Inequality> lines = with_kind(
@@ -127,8 +129,9 @@ void hash_value(NumberHash& hash, const T& value) {
 
 namespace detail {
 
-/// The longest period for which every line holds, all else equal; at most 100 times the longest one asked for. Most
-/// right sides grow with it in proportion, so that guess is tried before a bisection.
+/// Returns the longest period for which every line holds with all other numbers unchanged, at most 100 times the
+/// longest requested period. Most right sides are proportional to the period, so the proportional value is tried before
+/// a bisection.
 [[nodiscard]] inline double longest_period(const std::vector<Inequality>& lines, const ForceBounds& bounds,
                                            const Scheme& scheme, const DeviceProfile& device) {
     constexpr double most = 100.0;
@@ -167,6 +170,7 @@ namespace detail {
     return low * T;
 }
 
+/// Returns the line with the smallest reserve.
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
     const Inequality* least = nullptr;
     for (const Inequality& line : lines) {
@@ -177,6 +181,7 @@ namespace detail {
     return least;
 }
 
+/// Returns the sentence that explains the verdict.
 [[nodiscard]] inline std::string reason(const std::vector<Inequality>& lines, Verdict verdict) {
     for (const Inequality& line : lines) {
         if (!line.holds()) {
@@ -195,12 +200,12 @@ namespace detail {
 
 }  // namespace detail
 
-/// The bounds of the force that a scheme renders: those of the model, the coupling taken out where it says so.
+/// Returns bounds of the force that a scheme renders: those of the model, compensated if the scheme is.
 [[nodiscard]] inline ForceBounds rendered_bounds(const ForceBounds& bounds, const Scheme& scheme) noexcept {
     return scheme.compensated ? compensated(bounds, scheme.coupling.stiffness) : bounds;
 }
 
-/// What is proved of any rendered force within bounds. Wider bounds never prove more.
+/// Certifies any rendered force within bounds. Wider bounds never prove more.
 [[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
                                                   const DeviceProfile& device) {
     Certificate certificate;
@@ -226,14 +231,15 @@ namespace detail {
     return certificate;
 }
 
-/// What is proved of any force within bounds, rendered by a scheme on a device.
+/// Certifies any force within bounds that a scheme renders on a device.
 [[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
                                          const DeviceProfile& device) {
     return certify_rendered(rendered_bounds(bounds, scheme), scheme, device);
 }
 
-/// Bounds of a model's force that a scheme renders on a device. The mean of a force that repeats is that of the limited
-/// force. An object with mass has the unlimited one, and the energy-consistent step need not lose what the play loses.
+/// Returns bounds of a model's force that a scheme renders on a device. The mean of a periodic force is that of the
+/// limited force. An object with mass has the unlimited force, and the energy-consistent step may dissipate less than
+/// the play.
 [[nodiscard]] inline ForceBounds rendered_bounds(const ForceModel& model, const Scheme& scheme,
                                                  const DeviceProfile& device) {
     const double limit =
@@ -245,8 +251,8 @@ namespace detail {
     return bounds;
 }
 
-/// What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason; a scheme
-/// or a profile that is impossible throws std::invalid_argument.
+/// Certifies a model that a scheme renders on a device. A refusal is a result with a reason; an impossible scheme or
+/// profile throws std::invalid_argument.
 [[nodiscard]] inline Certificate certify(const ForceModel& model, const Scheme& scheme,
                                          const DeviceProfile& device) {
     validate(device);

@@ -15,8 +15,8 @@
 
 namespace palpate {
 
-/// Whether two computations of one number agree: on another machine the last digits may differ. What is not finite
-/// agrees with nothing.
+/// Returns true if two computations of one number agree. On another machine the last digits may differ. A number that
+/// is not finite agrees with no other number.
 [[nodiscard]] inline bool agree(double stored, double recomputed) noexcept {
     const double larger = std::max(std::abs(stored), std::abs(recomputed));
     return std::isfinite(larger) && std::abs(stored - recomputed) <= 1e-9 * larger;
@@ -27,13 +27,14 @@ namespace palpate {
 
 namespace detail {
 
-[[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed) {
-    return "certificate." + path + " is " + readable(stored) + ": must be " + readable(recomputed) +
+[[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed,
+                                           const char* bound = "") {
+    return "certificate." + path + " is " + readable(stored) + ": must be " + bound + readable(recomputed) +
            ", which is what model and device give; plan it again";
 }
 
-/// A bound that is stored must hold for the model; it may be wider than what is computed today, because an older
-/// release bounded less sharply and what it proved is still true.
+/// Returns a sentence if a stored bound does not hold for the model. It may be wider than the bound computed today: an
+/// older release used wider bounds, and its proofs remain valid.
 [[nodiscard]] inline std::string tighter_than_true(const ForceBounds& stored, const ForceBounds& now) {
     std::string wrong;
     for_each_field<ForceBounds>([&](const auto& field) {
@@ -42,14 +43,14 @@ namespace detail {
         const bool lower = std::string_view{field.name}.ends_with("_min");
         if (wrong.empty() && !(lower ? bound <= true_bound : bound >= true_bound) &&
             !agree(bound, true_bound)) {
-            wrong = std::string("certificate.bounds.") + field.name + " is " + readable(bound) +
-                    ": must be " + (lower ? "at most " : "at least ") + readable(true_bound) +
-                    ", which is what model and device give; plan it again";
+            wrong = disagrees(std::string("bounds.") + field.name, bound, true_bound,
+                              lower ? "at most " : "at least ");
         }
     });
     return wrong;
 }
 
+/// Returns a sentence about the first difference between two lines; empty without one.
 [[nodiscard]] inline std::string line_disagrees(const std::string& path, const Inequality& stored,
                                                 const Inequality& now) {
     if (stored.id != now.id) {
@@ -66,7 +67,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// The first field in which a device is not the one that was certified, as a sentence; empty where it is that one.
+/// Returns a sentence about the first field in which a device differs from the certified one; empty without one.
 [[nodiscard]] inline std::string device_difference(const DeviceProfile& certified,
                                                    const DeviceProfile& device) {
     const std::string opening = "the certificate is for the device " + certified.id;
@@ -91,9 +92,9 @@ namespace detail {
     return wrong;
 }
 
-/// Computes a stored certificate again and returns the result, with its texts. The stored sides, verdict and period
-/// must follow from the stored bounds. The stored bounds must be no narrower than the bounds computed from the model.
-/// Throws std::invalid_argument with the first field that differs, its value and the right one.
+/// Recomputes a stored certificate and returns the result, with its texts. The stored sides, verdict and period must
+/// follow from the stored bounds. The stored bounds must contain the bounds computed from the model. Throws
+/// std::invalid_argument with the first field that differs, its value and the right one.
 [[nodiscard]] inline Certificate checked(const Certificate& stored, const ForceModel& model) {
     const auto require = [](const std::string& wrong) { detail::require(wrong.empty(), wrong); };
     if (const std::string now = fingerprint(model); stored.model != now) {
@@ -121,7 +122,7 @@ namespace detail {
     for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
         const std::string path = "inequalities[" + std::to_string(k) + "]";
         require(detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]));
-        // Another machine may round differently: keep the stored numbers, which the fingerprint covers.
+        // Another machine may round differently, so the stored numbers are kept, which the fingerprint covers.
         now.inequalities[k].left = stored.inequalities[k].left;
         now.inequalities[k].right = stored.inequalities[k].right;
     }

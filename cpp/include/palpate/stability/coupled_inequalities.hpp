@@ -18,19 +18,19 @@ namespace palpate {
 
 namespace detail {
 
-/// True if forces come late.
+/// Returns true if the device has a delay.
 [[nodiscard]] inline bool late(const DeviceProfile& device) noexcept {
     return device.late_samples() > 0;
 }
 
-/// A line beyond which nothing is known, and what to do there.
+/// Returns a line for an unknown bound, with the cure.
 [[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double known,
                                         double value, const char* cure) {
     return {id, name, formula, known, value, Basis::None, cure};
 }
 
-/// Damping for a coupling and an object behind it whose force falls with a slope of at most `falling`; for 0 with or
-/// without a force limit.
+/// Returns the damping needed for a coupling and an object behind it whose force falls with a slope of at most
+/// `falling`. For 0 it holds with and without a force limit.
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
                                                     const DeviceProfile& device) {
     return {"damping-coupling",
@@ -45,14 +45,14 @@ namespace detail {
             "Colgate, Stanley and Brown 1995; docs/certificate.md"};
 }
 
+/// Adds the line h >= 0, if the model has hysteresis.
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
-        lines.push_back({"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower,
-                         0.0, Basis::Proved, "docs/certificate.md"});
+        lines.push_back(loss_inequality(bounds));
     }
 }
 
-/// No bound is known for the effect of encoder steps on this object.
+/// Adds a line for encoder steps; a bound of their effect on this object is not known.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name,
@@ -72,13 +72,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                         "leave the mass out (mass 0, damping 0)");
 }
 
-/// p + min f' > 0: the load line has one solution.
+/// Returns p + min f' > 0: the load line has one solution.
 [[nodiscard]] inline Inequality uniqueness(double p, double falling, const char* formula) {
     return {"unique-solution", "one solution of the load line", formula, p, falling,
             Basis::Proved,     "docs/certificate.md",           true};
 }
 
-/// True if the force of a coupling to a mass can reach the limit. It has no bound, because a hand can move any
+/// Returns true if the force of a coupling to a mass can reach the limit. It is unbounded, because a hand can move any
 /// distance in a sample.
 [[nodiscard]] inline bool limit_acts(const DeviceProfile& device) noexcept {
     return std::isfinite(device.force_limit);
@@ -86,10 +86,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 }  // namespace detail
 
+/// Share of the device's damping that a coupling uses where nothing else sets its stiffness.
+inline constexpr double usual_coupling_share = 0.95;
+
 /// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
 /// object whose force falls with a slope of at most `falling`; 0 if there is none.
 [[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
-                                              double share) {
+                                              double share = usual_coupling_share) {
     constexpr double finer = 0.97;
     constexpr double softest = 1e-9;
     constexpr int halvings = 40;
@@ -116,9 +119,9 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 /// An object without mass behind a coupling, its force limited: slopes of the limited force are those of the force or
 /// 0. Without coupling damping a static one is a static force F(x) of slope K_c f' / (K_c + f').
-[[nodiscard]] inline std::vector<Inequality> massless_inequalities(const ForceBounds& bounds,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double p = coupling.load_line_slope(device.period_s);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -155,12 +158,12 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 }
 
 /// An object with mass behind a coupling, backward Euler. The mass does not help a force that falls.
-[[nodiscard]] inline std::vector<Inequality> implicit_inequalities(const ForceBounds& bounds, Inertia inertia,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
-    const double damped = 2.0 * inertia.damping / T;
-    const double alone = inertia.load_line_slope(T);
+    const double damped = 2.0 * scheme.inertia.damping / T;
+    const double alone = scheme.inertia.load_line_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -179,9 +182,9 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     lines.push_back(detail::coupling_inequality(coupling, std::max(0.0, bounds.falling() - damped), device));
     lines.push_back(detail::uniqueness(coupled + alone, bounds.falling(), "p > s_"));
     if (!bounds.hysteresis && bounds.slope.lower == bounds.slope.upper) {
-        lines.push_back(detail::friction_inequality(device,
-                                                    implicit_gain(bounds.slope.lower, inertia, coupling, T),
-                                                    bounds.mean_force, "||g||_1 Delta / 2"));
+        lines.push_back(detail::friction_inequality(
+            device, implicit_gain(bounds.slope.lower, scheme.inertia, coupling, T), bounds.mean_force,
+            "||g||_1 Delta / 2"));
     } else {
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     }
@@ -190,13 +193,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 /// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope, and at any
 /// solution of the step.
-[[nodiscard]] inline std::vector<Inequality> energy_consistent_inequalities(const ForceBounds& bounds,
-                                                                            Inertia inertia,
-                                                                            VirtualCoupling coupling,
-                                                                            const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
+                                                          const ForceBounds& bounds, const Scheme& scheme,
+                                                          const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const bool limited = detail::limit_acts(device);
-    const double alone = inertia.midpoint_slope(T);
+    const double alone = scheme.inertia.midpoint_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -207,22 +210,6 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                      "docs/certificate.md", true});
     detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     return lines;
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return massless_inequalities(bounds, scheme.coupling, device);
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
-                                                          const ForceBounds& bounds, const Scheme& scheme,
-                                                          const DeviceProfile& device) {
-    return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
 }
 
 }  // namespace palpate

@@ -13,14 +13,14 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/stability/force_bounds.hpp"
 
-// Device damping and friction that a coupling needs: against hold and delay, and against encoder steps.
+// Device damping and friction that a coupling needs because of hold, delay and encoder steps.
 namespace palpate {
 
 namespace detail {
 
-/// Largest value over theta = 2 phi of a trigonometric polynomial of a degree N that is never negative, from the
-/// values at points h apart: at most 1 / (1 - (N h)^2 / 8) of the largest of them (Bernstein's inequality). The
-/// result is never below the true maximum, and at most 2e-6 of it above.
+/// Returns the largest value over theta = 2 phi of a non-negative trigonometric polynomial of degree N. By Bernstein's
+/// inequality it is at most 1 / (1 - (N h)^2 / 8) of the largest value at points h apart. The result is never below the
+/// true maximum, and at most 2e-6 of it above.
 template <class Polynomial>
 [[nodiscard]] double most_over_frequencies(int degree, Polynomial polynomial) noexcept {
     const int points = 1024 * degree;
@@ -32,13 +32,13 @@ template <class Polynomial>
     return largest / (1.0 - spacing * spacing / 8.0);
 }
 
-/// sin((n + 1) phi) / sin(phi), the size of 1 + z^-1 + ... + z^-n.
+/// Returns sin((n + 1) phi) / sin(phi), the absolute value of 1 + z^-1 + ... + z^-n.
 [[nodiscard]] inline double sum_of_delays(int whole, double phi) noexcept {
     return phi > 0.0 ? std::sin((whole + 1) * phi) / std::sin(phi) : whole + 1.0;
 }
 
-/// The largest need of every delay up to n + tau samples, where need(n, phi) is that of n whole samples at one
-/// frequency. In the first part of a sample, tau of it, the force is that of n + 1 samples of delay: at each frequency
+/// Returns the largest need of every delay up to n + tau samples; need(n, phi) is that of n whole samples at one
+/// frequency. In the first part of a sample, tau of it, the force is that of n + 1 samples of delay. At each frequency
 /// its need is (1 - tau) need(n) + tau need(n + 1).
 template <class Need>
 [[nodiscard]] double need_up_to(int whole, double fraction, Need need) noexcept {
@@ -56,14 +56,14 @@ template <class Need>
 
 }  // namespace detail
 
-/// The device damping, over the longest period, that a coupling needs if it is held for a sample and n + tau samples
-/// late, whatever object stands behind it whose force falls with a slope of at most s. With beta = B_c / T,
-/// H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)),
+/// Returns the device damping, divided by the longest period, that a coupling needs if it is held for a sample and
+/// delayed by n + tau samples. It holds for any object behind it whose force falls with a slope of at most s. With
+/// beta = B_c / T, H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)),
 ///
 ///     s / 2 + max over theta of |H_n - s|^2 / (2 (K_c + 2 beta - s)),   s <= K_c + beta.
 ///
-/// Without delay that is K_c / 2 + beta for each s. A force limit on the coupling itself leaves it as it is if s = 0.
-/// Infinite where nothing is proved.
+/// Without delay this is K_c / 2 + beta for each s. A force limit on the coupling does not change it if s = 0. Returns
+/// infinity without a proof.
 [[nodiscard]] inline double coupling_need(VirtualCoupling coupling, double period_s, int whole,
                                           double fraction = 0.0, double falling = 0.0) noexcept {
     const double stiffness = coupling.stiffness;
@@ -88,8 +88,8 @@ template <class Need>
                     }));
 }
 
-/// gamma: largest error of the force of a massless object behind a coupling, over the error of the reading that
-/// causes it.
+/// Returns gamma: largest error of the force of a massless object behind a coupling, divided by the error of the
+/// reading that causes it.
 [[nodiscard]] inline double massless_gain(const ForceBounds& bounds, VirtualCoupling coupling,
                                           double period_s) noexcept {
     const double falling = bounds.falling();
@@ -106,14 +106,14 @@ template <class Need>
     return gain;
 }
 
-/// The same of a spring of stiffness K with mass behind a coupling, backward Euler, no force limit: the sum of |g|, g
-/// the impulse response of C A / (C + A),
+/// Returns gamma of a spring of stiffness K with mass behind a coupling, by backward Euler without a force limit: the
+/// sum of |g|, where g is the impulse response of C A / (C + A),
 ///
 ///     C = K_c + beta (1 - z^-1),   A = (m/T^2) (1 - z^-1)^2 + (B_o/T) (1 - z^-1) + K.
 ///
-/// With the poles r_1, r_2, |r_2| <= |r_1| = rho, and u = g_N - r_1 g_{N-1}, N >= 3, the terms after g_N add at most
-/// (rho |g_N| + |u| |r_2| / (1 - |r_2|)) / (1 - rho), because g_{k+1} = r_1 g_k + r_2^{k+1-N} u. The sum ends when
-/// that is 1 % of it, and contains it. Infinite if a pole does not lie inside the unit circle.
+/// With the poles r_1, r_2, |r_2| <= |r_1| = rho, and u = g_N - r_1 g_{N-1}, N >= 3, g_{k+1} = r_1 g_k + r_2^{k+1-N} u.
+/// The terms after g_N therefore add at most (rho |g_N| + |u| |r_2| / (1 - |r_2|)) / (1 - rho). The sum ends when this
+/// remainder is 1 % of it, and includes it. Returns infinity if a pole does not lie inside the unit circle.
 [[nodiscard]] inline double implicit_gain(double stiffness, Inertia inertia, VirtualCoupling coupling,
                                           double period_s) noexcept {
     constexpr double tail_share = 0.01;

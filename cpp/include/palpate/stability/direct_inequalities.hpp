@@ -15,11 +15,11 @@ namespace palpate {
 
 namespace detail {
 
-/// Friction that covers the errors of the force: `gain` times half an encoder step, half a force step, and the mean
-/// push of a model that repeats.
+/// Returns the line for friction, which must exceed the errors of the force: `gain` times half an encoder step, half a
+/// force step, and the mean force of a periodic model.
 [[nodiscard]] inline Inequality friction_inequality(const DeviceProfile& device, double gain,
                                                     double mean_force, const std::string& formula) {
-    // An encoder without steps needs nothing, however steep the force.
+    // Without encoder steps a steep force needs no friction.
     const double encoder = device.encoder_step > 0.0 ? 0.5 * gain * device.encoder_step : 0.0;
     return {"friction-steps",
             "Coulomb friction against encoder and force steps",
@@ -28,6 +28,11 @@ namespace detail {
             encoder + 0.5 * device.force_step + mean_force,
             Basis::Proved,
             "Abbott and Okamura 2005; Diolaiti et al. 2006; docs/certificate.md"};
+}
+
+[[nodiscard]] inline Inequality loss_inequality(const ForceBounds& bounds) {
+    return {"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
+            Basis::Proved,      "docs/certificate.md"};
 }
 
 /// Damping that covers hold and delay of a force with these slopes, and B_v of its dependence on velocity.
@@ -41,7 +46,7 @@ namespace detail {
             late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
 }
 
-/// Damping that covers hold and delay of a force at a predicted position.
+/// Returns the line for damping with prediction.
 [[nodiscard]] inline Inequality prediction_inequality(const DeviceProfile& device, double need,
                                                       const std::string& formula) {
     return {"damping-hold",
@@ -55,8 +60,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// A static force held for a sample, any motion within it: M and s_ bound the slopes of f, B is `device_need`, with
-/// a prediction from m samples `predicted_need`.
+/// Returns the lines of a static force that is held for a sample, with any motion within it. M and s_ bound the slopes
+/// of f. B is `device_need`; with a prediction from m samples it is `predicted_need`.
 [[nodiscard]] inline std::vector<Inequality> direct_inequalities(const ForceBounds& bounds,
                                                                  const DeviceProfile& device,
                                                                  int predict = 0) {
@@ -72,15 +77,13 @@ namespace detail {
             detail::friction_inequality(device, bounds.steepest, bounds.mean_force, "L Delta / 2")};
 }
 
-/// A force with hysteresis, f = g + s h with a play of radius r, rendered directly: while it sticks h / r adds to
-/// its slope. The encoder is wrong in x and in the play. Without delay the play of the reading counts as exact, for
-/// a little more slope. With a prediction the play follows the measured position.
+/// Returns the lines of a force with hysteresis, f = g + s h with a play of radius r, rendered directly. While it
+/// sticks, h / r adds to its slope. The encoder has errors in x and in the play. Without delay the play of the reading
+/// is treated as exact, for a slightly larger slope. With a prediction the play follows the measured position.
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
                                                                      const DeviceProfile& device,
                                                                      int predict = 0) {
-    const Inequality loss{
-        "loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
-        Basis::Proved,      "docs/certificate.md"};
+    const Inequality loss = detail::loss_inequality(bounds);
     const bool late = device.late_samples() > 0;
     if (predict > 0) {
         const double gain = predicted_encoder_gain(predict);
@@ -108,8 +111,8 @@ namespace detail {
                                         bounds.mean_force, "(max(|g'| + |h'|) + e + max h / r) Delta / 2")};
 }
 
-/// A force f(x, v) of position and velocity rendered directly, the velocity a backward difference or a mean of
-/// several: M and s_ are of f(., 0), L_x = max |df/dx| is over all v.
+/// Returns the lines of a force f(x, v) of position and velocity that is rendered directly, with the velocity as a
+/// backward difference or a mean of several. M and s_ are of f(., 0); L_x = max |df/dx| is over all v.
 [[nodiscard]] inline std::vector<Inequality> velocity_inequalities(const ForceBounds& bounds,
                                                                    const DeviceProfile& device) {
     return {detail::hold_inequality(

@@ -17,10 +17,12 @@
 
 namespace palpate {
 
-/// The device damping that the explicit structure needs for a passive port, linearised where the slope is K:
+/// Returns the device damping that the explicit structure needs for a passive port, linearised at the slope K:
 ///
-///     T / (2 (1 - cos theta)) Re{(1 - e^{-j theta}) z^{-n_d} H},   z = e^{j theta},   H = C E / (C + E),
-///     E = (m/T^2) (z^2 - (2 - T B_o/m) z + 1 - T B_o/m) / z + K,   C = K_c + B_c (1 - z^{-1}) / T.
+///     T / (2 (1 - cos theta)) Re{(1 - e^{-j theta}) z^{-n_d} H},   z = e^{j theta},   H = C E / (C + E).
+///
+/// E is the object, E = (m/T^2) (z^2 - (2 - T B_o/m) z + 1 - T B_o/m) / z + K, and C the coupling,
+/// C = K_c + B_c (1 - z^{-1}) / T.
 [[nodiscard]] inline double explicit_need_at(double theta, double slope, Inertia inertia,
                                              VirtualCoupling coupling, double period_s,
                                              int delay_samples) noexcept {
@@ -36,13 +38,13 @@ namespace palpate {
            ((1.0 - back) * std::polar(1.0, -delay_samples * theta) * felt).real();
 }
 
-/// The largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
-/// sample. It belongs to the linearised system; its error is not bounded.
+/// Returns the largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
+/// sample. It holds for the linearised system; its error is not bounded.
 [[nodiscard]] inline double explicit_need(Interval slopes, Inertia inertia, VirtualCoupling coupling,
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    constexpr int halvings = 20;     // of the grid's step, in the end
+    constexpr int halvings = 20;     // of the step of the grid
     constexpr double lowest = 1e-4;  // [rad a sample]
     const double octaves = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
@@ -83,9 +85,10 @@ namespace palpate {
 /// An object with mass behind a coupling, every force one sample old (paper figure 14). No proof covers it: what
 /// is known is where its linearisation is stable at a held device, and what damping makes the linearised port
 /// passive.
-[[nodiscard]] inline std::vector<Inequality> explicit_inequalities(const ForceBounds& bounds, Inertia inertia,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<Inequality> inequalities(ExplicitStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const Inertia inertia = scheme.inertia;
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const double damping = inertia.damping + coupling.damping;
     const char* const poles = "poles of the linearised step; docs/certificate.md";
@@ -104,11 +107,6 @@ namespace palpate {
          "b >= max T Re{(1 - 1/z) H} / (2 - 2 cos theta)", device.viscous_damping,
          device.longest_period_s() / T * explicit_need(slopes, inertia, coupling, T, device.late_samples()),
          Basis::Linear, "Colgate and Schenkel 1997, linearised; docs/certificate.md"}};
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(ExplicitStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return explicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
 }
 
 }  // namespace palpate

@@ -16,8 +16,8 @@
 
 namespace palpate {
 
-/// Proved bounds of a model over every position that can be reached, continuations included. For a force with
-/// hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h/r more while it sticks.
+/// Proved bounds of a model over all positions, continuations included. For a force with hysteresis, f = g + s h with a
+/// play of radius r, the slope of a path is g' + s h', plus h/r while it sticks.
 struct ForceBounds {
     Interval slope;
     double steepest = 0.0;
@@ -28,12 +28,12 @@ struct ForceBounds {
     double drag = 0.0;
     bool hysteresis = false;
 
-    /// M = max(0, max f'); NaN stays NaN
+    /// Returns M = max(0, max f'); NaN stays NaN.
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
-    /// s_ = max(0, -min f'); NaN stays NaN
+    /// Returns s_ = max(0, -min f'); NaN stays NaN.
     [[nodiscard]] double falling() const noexcept { return slope.lower >= 0.0 ? 0.0 : -slope.lower; }
 
-    /// r, as loss and loss_per_play give it; infinite without a loss
+    /// Returns r, computed from loss and loss_per_play; infinity without hysteresis.
     [[nodiscard]] double play_radius() const noexcept {
         return loss_per_play > 0.0 ? loss.upper / loss_per_play : std::numeric_limits<double>::infinity();
     }
@@ -55,7 +55,7 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
                               Rule::NotNegative},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
 
-/// True if every bound is a number. Nothing is certified of one that is not.
+/// Returns true if every bound is finite. Bounds that are not finite cannot be certified.
 [[nodiscard]] inline bool finite(const ForceBounds& bounds) noexcept {
     bool all = true;
     for_each_field<ForceBounds>(
@@ -63,12 +63,12 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
     return all;
 }
 
-/// The slope K_c k / (K_c + k) that is felt through a coupling where the object's is k > -K_c.
+/// Returns the slope K_c k / (K_c + k) that is felt through a coupling to an object of slope k > -K_c.
 [[nodiscard]] inline double felt_slope(double slope, double coupling_stiffness) noexcept {
     return coupling_stiffness * slope / (coupling_stiffness + slope);
 }
 
-/// The bounds of a static force whose coupling was taken out of it beforehand: slopes K_c f' / (K_c - f').
+/// Returns the bounds of a compensated static force, with slopes K_c f' / (K_c - f').
 [[nodiscard]] inline ForceBounds compensated(const ForceBounds& bounds, double coupling_stiffness) noexcept {
     const auto hardened = [&](double slope) {
         return slope < coupling_stiffness ? -felt_slope(-slope, coupling_stiffness)
@@ -82,19 +82,20 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
 
 namespace detail {
 
-/// How much wider than the true range the bounds of a slope may be [of the steepest]: what they are wider by is
-/// stiffness that is not rendered.
+/// Largest excess of the bounds of a slope over its true range [share of the steepest]. The excess is stiffness that
+/// cannot be rendered.
 inline constexpr double slope_slack = 1e-4;
-/// The same of a force of two inputs, whose box takes many more cells.
+/// The same for a force of two inputs, whose box needs many more cells.
 inline constexpr double velocity_slack = 1e-3;
 
-/// Proved bounds over [from, to] of a g' + b h' + c h, where h shares the wavelets of g.
+/// Coefficients of a g' + b h' + c h, where h uses the wavelets of g.
 struct SlopeReading {
     double of_force_slope = 1.0;  ///< a
     double of_loss_slope = 0.0;   ///< b
     double of_loss = 0.0;         ///< c
 };
 
+/// Returns proved bounds of this sum over [from, to].
 [[nodiscard]] inline Interval reading_bounds(const NetworkParameters& force, const NetworkParameters& loss,
                                              const SlopeReading& reading, double from, double to,
                                              double relative = slope_slack) {
@@ -111,15 +112,15 @@ struct SlopeReading {
     return enclose(std::array{Term{slope_of, 1}, Term{value_of, 0}}, from, to, relative);
 }
 
-/// The slopes that a continuation can have: its line's, and none beyond its reach.
+/// Returns the slopes of a continuation: that of its line, and 0 beyond its reach.
 [[nodiscard]] inline Interval line_slopes(const EdgeLine& line) noexcept {
     const double slope = line.at_edge.slope;
     return std::isfinite(line.reach) ? Interval{std::min(slope, 0.0), std::max(slope, 0.0)}
                                      : Interval{slope, slope};
 }
 
-/// Bounds of h, sharpened until its sign is certain or does not matter: h >= 0 is imposed with a margin that
-/// is small beside its largest value.
+/// Returns bounds of h, sharpened until its sign is certain or irrelevant. h >= 0 is enforced with a margin that is
+/// small compared with its largest value.
 [[nodiscard]] inline Interval loss_bounds(const NetworkParameters& loss, double from, double to) {
     Interval bounds;
     for (const double relative : {1e-4, 1e-6}) {
@@ -131,6 +132,7 @@ struct SlopeReading {
     return bounds;
 }
 
+/// Returns bounds of a force without hysteresis.
 [[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve, double force_limit) {
     ForceBounds bounds;
     bounds.slope = slope_bounds(curve.parameters(), curve.lower(), curve.upper(), slope_slack);
@@ -146,6 +148,7 @@ struct SlopeReading {
     return bounds;
 }
 
+/// Returns bounds of a force with hysteresis.
 [[nodiscard]] inline ForceBounds hysteresis_bounds(const HysteresisNetwork& pair, double radius,
                                                    double force_limit) {
     const NetworkCurve& g = pair.force();
@@ -171,7 +174,7 @@ struct SlopeReading {
         for (const auto& [line, loss] : {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
             const Interval slopes = line_slopes(line);
             const double loss_slope = std::abs(loss.at_edge.slope);
-            if (std::isfinite(loss.reach)) {  // it dies out
+            if (std::isfinite(loss.reach)) {  // it decreases to zero
                 bounds.loss.lower = std::min(bounds.loss.lower, 0.0);
             }
             const double stick = std::max(0.0, loss.at_edge.value) / radius;
@@ -188,7 +191,8 @@ struct SlopeReading {
     return bounds;
 }
 
-/// Slopes at rest, continuations included, and over all velocities what drags and what an encoder step costs.
+/// Returns bounds of the slopes at rest, continuations included, and over all velocities of the drag and of the effect
+/// of an encoder step.
 [[nodiscard]] inline ForceBounds velocity_bounds(const VelocityNetwork& force) {
     const RadialBounds rest = force.resting_bounds(velocity_slack);
     const RadialBounds moving = force.moving_bounds(velocity_slack);
@@ -205,9 +209,8 @@ struct SlopeReading {
 
 }  // namespace detail
 
-/// Bounds of a model of one position, or of position and velocity, on a device that limits its force to
-/// `force_limit`; `play_radius` in place of the model's own where it is above 0. Throws std::invalid_argument for
-/// other models of several inputs.
+/// Returns bounds of a model of position, or of position and velocity, on a device with this force limit. A
+/// `play_radius` above 0 replaces that of the model. Throws std::invalid_argument for other models of several inputs.
 [[nodiscard]] inline ForceBounds force_bounds(const ForceModel& model, double play_radius = 0.0,
                                               double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);
@@ -221,8 +224,8 @@ struct SlopeReading {
     return detail::hysteresis_bounds(pair, play_radius > 0.0 ? play_radius : pair.play_radius(), force_limit);
 }
 
-/// The shift of a force that repeats with which it does not push on average on a device that limits it; 0 for
-/// other models. Add it to the bias of the network.
+/// Returns the shift of a periodic force for which its limited mean is not active; 0 for other models. Add it to the
+/// bias of the network.
 [[nodiscard]] inline double balancing_shift(const ForceModel& model, double force_limit) {
     if (const WaveletNetwork* network = model.network()) {
         const NetworkCurve& f = network->curve();

@@ -16,16 +16,17 @@
 
 namespace palpate {
 
-/// Slopes of a force: df/dx lies in [-falling, rising] everywhere.
+/// Range of the slopes of a force: df/dx lies in [-falling, rising] everywhere.
 struct SlopeRange {
     double rising = 0.0;   ///< M >= 0
     double falling = 0.0;  ///< s >= 0
 
+    /// Returns the larger absolute slope.
     [[nodiscard]] double steepest() const noexcept { return std::max(rising, falling); }
 };
 
-/// R(Lambda): damping over the period, b / T, that a force held for a sample needs if it is computed at a position
-/// x_k - q_k with sum of q^2 <= Lambda^2 sum of d^2. Closed form, proved in docs/certificate.md.
+/// Returns R(Lambda): damping divided by the period, b / T, that a held force needs if it is computed at a position
+/// x_k - q_k with sum of q^2 <= Lambda^2 sum of d^2. The closed form is proved in docs/certificate.md.
 [[nodiscard]] inline double held_need(double lag, SlopeRange slopes) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
@@ -40,8 +41,8 @@ struct SlopeRange {
 
 namespace detail {
 
-/// a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: the largest energy of one step. h is M (1/2 + rho)
-/// above 0, M (1 + rho)^2 / 2 + s rho^2 / 2 on [-1, 0] and s (-rho - 1/2) below -1.
+/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: the largest energy of one step. h is M
+/// (1/2 + rho) above 0, M (1 + rho)^2 / 2 + s rho^2 / 2 on [-1, 0] and s (-rho - 1/2) below -1.
 [[nodiscard]] inline double step_energy(SlopeRange slopes, double l, double gamma) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
@@ -58,7 +59,8 @@ namespace detail {
     return most;
 }
 
-/// Q = sum of taps[j - 1] z^-j at z = exp(i theta), conjugated; by the recurrence of cos and sin of j theta.
+/// Returns the conjugate of Q = sum of taps[j - 1] z^-j at z = exp(i theta), by the recurrence of cos and sin of j
+/// theta.
 [[nodiscard]] inline std::complex<double> response(std::span<const double> taps, double theta) noexcept {
     const double twice = 2.0 * std::cos(theta);
     std::complex<double> before = 1.0;
@@ -71,7 +73,7 @@ namespace detail {
     return sum;
 }
 
-/// Sum of |taps|.
+/// Returns the sum of |taps|.
 [[nodiscard]] inline double size_of(std::span<const double> taps) noexcept {
     double size = 0.0;
     for (const double tap : taps) {
@@ -80,13 +82,13 @@ namespace detail {
     return size;
 }
 
-/// How the maximum over frequency of a trigonometric polynomial of degree N is found from `resolution` N + 1 values.
+/// Method for the maximum over frequency of a trigonometric polynomial of degree N, from `resolution` N + 1 values.
 enum class Maximum : std::uint8_t {
-    Likely,  ///< by a parabola through the largest value and its neighbours
+    Likely,  ///< from a parabola through the largest value and its neighbours
     Proved,  ///< never below the true maximum, rounding included
 };
 
-/// The maximum of value(k) over k = 0 to last. `size` bounds the polynomial less its mean.
+/// Returns the maximum of value(k) over k = 0 to last. `size` bounds the polynomial minus its mean.
 template <class Value>
 [[nodiscard]] double maximum_of(Maximum kind, int resolution, std::size_t last, double size, Value value) {
     std::size_t at = 0;
@@ -98,7 +100,7 @@ template <class Value>
         }
     }
     if (kind == Maximum::Proved) {
-        // Riesz: near its maximum the polynomial stays above a cosine of N theta, and the nearest frequency seen is
+        // Riesz: near its maximum the polynomial stays above a cosine of N theta, and the nearest sampled frequency is
         // at most pi / (2 resolution N) away.
         return largest + (1.0 - std::cos(0.5 * std::numbers::pi / resolution) + 1e-12) * size;
     }
@@ -124,10 +126,10 @@ class FilterGain {
         }
     }
 
-    /// Sum of |taps|, an upper bound of |Q|.
+    /// Returns the sum of |taps|, an upper bound of |Q|.
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// max over theta of l Re Q + gamma |Q|^2.
+    /// Returns max over theta of l Re Q + gamma |Q|^2.
     [[nodiscard]] double most(double l, double gamma) const noexcept {
         return maximum_of(kind_, resolution_, real_.size() - 1, (std::abs(l) + gamma * size_) * size_,
                           [&](std::size_t k) { return l * real_[k] + gamma * square_[k]; });
@@ -141,11 +143,12 @@ class FilterGain {
     std::vector<double> square_;
 };
 
-/// Least value of a convex function between two ends, and where.
+/// Position and value of the minimum of a convex function.
 struct Least {
     double at = 0.0;
     double value = 0.0;
 };
+/// Finds the minimum of a convex function between two ends by golden sections.
 template <class Function>
 [[nodiscard]] Least least_between(double low, double high, Function function) {
     constexpr int steps = 40;  // to 4e-9 of the interval
@@ -172,9 +175,9 @@ template <class Function>
     return at_left <= at_right ? Least{left, at_left} : Least{right, at_right};
 }
 
-/// min over l and gamma of cost(gain, l, gamma), convex in both. Every l and gamma is a proof, so the search may use
-/// likely maxima; what is returned uses proved ones. A little weight on l and gamma makes the search end at the same
-/// place on every machine.
+/// Returns min over l and gamma of cost(gain, l, gamma), convex in both. Every l and gamma is a proof, so the search
+/// may use likely maxima; the result uses proved maxima. A small weight on l and gamma makes the search end at the same
+/// values on every machine.
 template <class Gain = FilterGain, class Cost>
 [[nodiscard]] double least_cost(std::span<const double> taps, SlopeRange slopes, Cost cost) {
     constexpr double weight = 1e-8;
@@ -193,12 +196,12 @@ template <class Gain = FilterGain, class Cost>
 
 }  // namespace detail
 
-/// b / T that a static force needs if it is computed at x_k - q_k, q = Q d a causal filter of the steps
-/// d_k = x_{k+1} - x_k: q_k = sum of taps[j - 1] d_{k-j}. The smaller of
+/// Returns b / T that a static force needs if it is computed at x_k - q_k. Here q = Q d is a causal filter of the steps
+/// d_k = x_{k+1} - x_k: q_k = sum of taps[j - 1] d_{k-j}. The result is the smaller of
 ///
 ///     min over l, gamma of a + max over theta of l Re Q + gamma |Q|^2     and     R(sum of |taps|).
 ///
-/// n samples of delay are n taps of 1; a force with hysteresis may be delayed only (docs/certificate.md).
+/// n samples of delay are n taps of 1. For a force with hysteresis only delays are proved (docs/certificate.md).
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, SlopeRange slopes) {
     const double size = detail::size_of(taps);
     const double simple = held_need(size, slopes);
@@ -214,7 +217,7 @@ template <class Gain = FilterGain, class Cost>
 
 namespace detail {
 
-/// The line of `delayed_need` for exactly n + tau samples, 0 < tau < 1.
+/// Returns the need of `delayed_need` for exactly n + tau samples, 0 < tau < 1.
 [[nodiscard]] inline double split_sample_need(int whole, double fraction, SlopeRange slopes) {
     const double uneven = fraction * (1.0 - fraction);
     const double simple = held_need(std::sqrt(whole * (whole + 2.0 * fraction) + fraction), slopes);
@@ -233,15 +236,15 @@ namespace detail {
 
 }  // namespace detail
 
-/// b / T that a held force needs if it comes n + tau samples late, static or with hysteresis. Each sample begins
-/// with the command before: the motion of its first part, alpha, is free. With
-/// Q = z^-1 + ... + z^-n + tau z^-(n+1), for one l and gamma,
+/// Returns b / T that a held force needs with a delay of n + tau samples, static or with hysteresis. Each sample begins
+/// with the command before; the motion during that part, alpha, is free. With Q = z^-1 + ... + z^-n + tau z^-(n+1), for
+/// one l and gamma,
 ///
 ///     Z = a + max over theta of (l Re Q + gamma |Q|^2) + gamma tau (1 - tau)
 ///     b / T >= (Z + sqrt(Z^2 - 4 tau (1 - tau) (a gamma - l^2 / 4))) / 2,
 ///
-/// the largest eigenvalue of the form in d and alpha. It is continuous in the delay. A force that falls can need a
-/// little less after n + tau samples than after n: the larger of both, because a delay may be shorter than stated.
+/// the largest eigenvalue of the form in d and alpha. It is continuous in the delay. A falling force can need slightly
+/// less after n + tau samples than after n. The result is the larger need, because a delay may be shorter than stated.
 [[nodiscard]] inline double delayed_need(int whole, double fraction, SlopeRange slopes) {
     const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
     const double need = filtered_need(taps, slopes);
@@ -250,7 +253,7 @@ namespace detail {
 
 namespace detail {
 
-/// A causal filter in both parts of a sample: Q of the command of this sample and (1 + Q) / z of the one before.
+/// A causal filter in both parts of a sample: Q for the command of this sample and (1 + Q) / z for the one before.
 class SplitGain {
   public:
     SplitGain(std::span<const double> taps, Maximum kind, int resolution)
@@ -265,7 +268,7 @@ class SplitGain {
 
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// Largest eigenvalue over all frequencies of the form of both parts, with a gamma for each.
+    /// Returns the largest eigenvalue over all frequencies of the form of both parts, with a gamma for each.
     [[nodiscard]] double most(double fraction, double rest, SlopeRange slopes, double l, double gamma_first,
                               double gamma_second) const noexcept {
         const double first = step_energy(slopes, l, gamma_first);
@@ -295,10 +298,11 @@ class SplitGain {
 
 }  // namespace detail
 
-/// The same for a static force whose command, computed at x_k - q_k, acts a further fraction tau of a sample late:
-/// during the first part of a sample, in which the handle moves by alpha, the command before. Each part is a step of
-/// its own, alpha^2 h(q' / alpha) and beta^2 h((q + alpha) / beta), against B (alpha^2 / tau + beta^2 / (1 - tau)).
-/// `rest`: 1 - tau; where the instant between both parts varies, tau and `rest` are the longest of each.
+/// Returns the need of a static force whose command, computed at x_k - q_k, acts a further fraction tau of a sample
+/// late. During the first part of a sample, in which the handle moves by alpha, the command before acts. Each part is a
+/// separate step, alpha^2 h(q' / alpha) and beta^2 h((q + alpha) / beta), compared with B
+/// (alpha^2 / tau + beta^2 / (1 - tau)). `rest` is 1 - tau. If the instant between both parts varies, tau and `rest`
+/// are the longest of each.
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes,
                                           double rest) {
     if (!(fraction > 0.0) || !(slopes.steepest() > 0.0) || !std::isfinite(slopes.rising + slopes.falling)) {
@@ -312,14 +316,15 @@ class SplitGain {
     };
     return std::min(least(fraction, rest), least(std::sqrt(fraction), std::sqrt(rest)));
 }
+/// Returns the same need with `rest` = 1 - tau.
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes) {
     return filtered_need(taps, fraction, slopes, 1.0 - fraction);
 }
 
 namespace detail {
 
-/// The need of a filter that leaves out the motion during a time of at most nu T around each sample, which enters q
-/// up to `gain` times.
+/// Returns the need of a filter that ignores the motion during a time of at most nu T around each sample. That motion
+/// enters q up to `gain` times.
 [[nodiscard]] inline double roughly_filtered_need(std::span<const double> taps, double gain, double nu,
                                                   SlopeRange slopes) {
     const double off = gain * std::sqrt(nu);
@@ -330,23 +335,23 @@ namespace detail {
     });
 }
 
-/// nu of `roughly_filtered_need`: the time between a sample and the instant `delay` after the one `whole` before it,
-/// times the number of such times that can overlap, over T.
+/// Returns nu of `roughly_filtered_need`: the time between a sample and the instant `delay` after the one `whole`
+/// before it, times the number of such times that can overlap, divided by T.
 [[nodiscard]] inline double uncertain_time(double delay, double period, double jitter, int whole) noexcept {
     const double off = std::abs(delay - whole * period);
     const double span = off + jitter + std::max(0.0, jitter - off);
     return (off + jitter) * std::ceil(span / (period - jitter)) / (period + jitter);
 }
 
-/// The need with samples at k period + u_k, 0 <= u_k <= jitter, and each command acting `delay` after its sample:
-/// the smaller of R(Lambda) and the line for n samples of delay with what the rest of the delay, at most a time
-/// nu T from the n-th sample, adds.
+/// Returns the need with samples at k period + u_k, 0 <= u_k <= jitter. Each command acts `delay` after its sample. It
+/// is the smaller of R(Lambda) and the need for n samples of delay plus the effect of the remaining delay, at most a
+/// time nu T from the n-th sample.
 [[nodiscard]] inline double jittered_need(double delay, double period, double jitter, SlopeRange slopes) {
     const double T = period + jitter;
-    if (delay <= period - jitter) {  // within its own sample
+    if (delay <= period - jitter) {  // within the same sample
         return delayed_need(0, delay / T, slopes);
     }
-    // Lambda^2 T: what the delay that begins at one sample has in common with all others, itself included.
+    // Lambda^2 T: overlap of the delay that begins at one sample with all others, itself included.
     double common = delay;
     for (int j = 1; j * period < delay + jitter; ++j) {
         const double rest = delay - j * period;
@@ -364,10 +369,9 @@ namespace detail {
 
 }  // namespace detail
 
-/// b / T that a held force needs on a device, static or with hysteresis; T is the longest time between two samples.
-/// The device class: samples are taken at k period_s + u_k with 0 <= u_k <= jitter_s (the loop keeps to absolute
-/// times), and each command acts delay_s after its own sample. A device that counts its delay in samples needs no
-/// more with jitter than without.
+/// Returns b / T that a held force needs on a device, static or with hysteresis; T is the longest time between two
+/// samples. Samples are taken at k period_s + u_k with 0 <= u_k <= jitter_s, because the loop uses absolute times. Each
+/// command acts delay_s after its sample. If a device counts its delay in samples, jitter does not increase its need.
 [[nodiscard]] inline double device_need(const DeviceProfile& device, SlopeRange slopes) {
     const bool steady = device.jitter_s == 0.0 || device.late_samples() == 0;
     return steady ? delayed_need(device.whole_delay_samples(), device.delay_fraction(), slopes)

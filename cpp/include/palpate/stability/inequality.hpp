@@ -14,17 +14,17 @@
 
 namespace palpate {
 
-/// What an inequality rests on.
+/// Basis of an inequality.
 enum class Basis : std::uint8_t {
     Proved,  ///< a proof for every motion and every passive hand
-    Linear,  ///< the linearised system only: says that it is stable near an equilibrium
-    None,    ///< no bound is known beyond this one; what lies beyond is refused
+    Linear,  ///< the linearised system only: stable near an equilibrium
+    None,    ///< no known bound beyond the stated one; larger values are refused
 };
 
 template <>
 inline constexpr auto words_of<Basis> = std::array<std::string_view, 3>{"proved", "linear", "none"};
 
-/// One line of a certificate: left >= right, or left > right where it is strict.
+/// One line of a certificate: left >= right, or left > right if it is strict.
 struct Inequality {
     std::string id;
     std::string name;
@@ -35,12 +35,13 @@ struct Inequality {
     std::string source;
     bool strict = false;
 
+    /// Returns left - right.
     [[nodiscard]] double margin() const noexcept { return left - right; }
 
-    /// The margin as a share of the left side.
+    /// Returns the margin divided by the left side.
     [[nodiscard]] double reserve() const noexcept { return margin() / std::abs(left); }
 
-    /// Never for a side that is not a number.
+    /// Returns true if the inequality holds; false if a side is not finite.
     [[nodiscard]] bool holds() const noexcept {
         return std::isfinite(left) && std::isfinite(right) && (strict ? left > right : left >= right);
     }
@@ -59,12 +60,13 @@ inline constexpr auto fields_of<Inequality> = std::tuple{
     Field<&Inequality::source>{"source", "Where the proof stands.", Rule::Any, false},
     Field<&Inequality::strict>{"strict", "True if both sides must differ.", Rule::Any, false}};
 
+/// Returns true if all lines hold.
 [[nodiscard]] inline bool all_hold(const std::vector<Inequality>& lines) noexcept {
     return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
 }
 
-/// "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a known bound has its
-/// cure as source.
+/// Returns a text such as "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a
+/// known bound has its cure as source.
 [[nodiscard]] inline std::string shortfall(const Inequality& line) {
     if (line.rests_on == Basis::None) {
         return line.name + ": " + line.formula + (line.left != 0.0 ? " = " + readable(line.left) : "") +

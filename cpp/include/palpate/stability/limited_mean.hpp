@@ -17,20 +17,20 @@ namespace palpate {
 
 namespace detail {
 
-/// The strokes g + h and g - h of a model that repeats; h is null without hysteresis.
+/// Press and release force g + h and g - h of a periodic model; h is null without hysteresis.
 struct PeriodicStrokes {
     const NetworkCurve& g;
     const NetworkCurve* h = nullptr;
     double steepest = 0.0;  ///< proved bound of |g'| + |h'|
 
-    /// Value and antiderivative of g + side h + shift.
+    /// Returns value and antiderivative of g + side h + shift.
     [[nodiscard]] std::pair<double, double> at(double x, double side, double shift) const noexcept {
         const Curve force = g.inside(x);
         const Curve loss = h != nullptr ? h->inside(x) : Curve{};
         return {force.value + side * loss.value + shift, force.integral + side * loss.integral + shift * x};
     }
 
-    /// What rounding alone can make of a mean.
+    /// Returns the largest rounding error of a mean.
     [[nodiscard]] double rounding() const noexcept {
         const double reach = std::max(std::abs(g.lower()), std::abs(g.upper()));
         const auto size = [&](const NetworkParameters& network) {
@@ -45,9 +45,9 @@ struct PeriodicStrokes {
     }
 };
 
-/// Proved bounds of the mean over a period of c(g + side h + shift), where c limits a force to +-limit. Cells in
-/// which the limit is certainly reached, or certainly not, are integrated exactly. Others are halved until what
-/// they can hide is below rounding: in a cell of width w that is at most L w^2 / 4.
+/// Returns proved bounds of the mean over a period of c(g + side h + shift), where c limits a force to +-limit. Cells
+/// in which the limit is certainly reached, or certainly not, are integrated exactly. Others are halved until their
+/// error is below rounding: in a cell of width w it is at most L w^2 / 4.
 [[nodiscard]] inline Interval limited_mean(const PeriodicStrokes& strokes, double side, double shift,
                                            double limit) {
     constexpr std::size_t first_cells = 256;
@@ -93,8 +93,8 @@ struct PeriodicStrokes {
     return {mean - hidden / period, mean + hidden / period};
 }
 
-/// How strongly a limited model that repeats pushes on average, beyond what its loss takes:
-/// max(0, mean c(g - h), -mean c(g + h)). Above 0 it is a motor. Rounding counts as 0.
+/// Returns the mean force of a limited periodic model in excess of its loss: max(0, mean c(g - h), -mean c(g + h)).
+/// Above 0 the model is active. Values below rounding count as 0.
 [[nodiscard]] inline double mean_push(const PeriodicStrokes& strokes, double limit, double shift = 0.0) {
     if (!strokes.g.periodic()) {
         return 0.0;
@@ -107,13 +107,13 @@ struct PeriodicStrokes {
     return push <= strokes.rounding() ? 0.0 : push;
 }
 
-/// The smallest shift of the force for which it does not push on average. The mean of a limited force never falls
-/// with the shift, and has one zero.
+/// Returns the smallest shift of the force for which the model is not active. The mean of a limited force never
+/// decreases with the shift, and has one zero.
 [[nodiscard]] inline double balancing_shift(const PeriodicStrokes& strokes, double limit) {
     if (mean_push(strokes, limit) == 0.0) {
         return 0.0;
     }
-    // The stroke that pushes: the force of the lower one is above 0, or that of the upper one below 0.
+    // The active side: the mean of g - h is above 0, or that of g + h is below 0.
     const double side = limited_mean(strokes, -1.0, 0.0, limit).upper > 0.0 ? -1.0 : 1.0;
     const auto pushes = [&](double shift) {
         const Interval mean = limited_mean(strokes, side, side * shift, limit);
@@ -125,7 +125,7 @@ struct PeriodicStrokes {
         low = high;
         high *= 2.0;
     }
-    constexpr int halvings = 1100;  // to neighbouring numbers, wherever they lie
+    constexpr int halvings = 1100;  // sufficient to reach neighbouring numbers
     for (int k = 0; k < halvings; ++k) {
         const double middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) {

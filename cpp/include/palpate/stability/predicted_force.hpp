@@ -12,7 +12,8 @@
 
 namespace palpate {
 
-/// Q of a force that is held n samples late at a position predicted from m samples, as taps of z^-1, z^-2, ...:
+/// Returns Q of a force that is delayed by n samples at a position predicted from m samples, as taps of z^-1, z^-2,
+/// ...:
 ///
 ///     Q = z^-1 + ... + z^-n - z^-n sum of w_j z^-j.
 [[nodiscard]] inline std::vector<double> prediction_taps(int whole, int predict) {
@@ -23,23 +24,23 @@ namespace palpate {
     return taps;
 }
 
-/// b / T that a force held at a predicted position needs, static or with a play that follows the measured position.
-/// The advance changes the force by at most L |sum of w_j d_{k-j}|, which costs L / 2 and no more.
+/// Returns b / T that a force held at a predicted position needs, static or with a play that follows the measured
+/// position. The prediction changes the force by at most L |sum of w_j d_{k-j}|, which adds L / 2.
 [[nodiscard]] inline double predicted_path_need(const DeviceProfile& device, SlopeRange slopes) {
     return device_need(device, slopes) + 0.5 * slopes.steepest();
 }
 
-/// Largest error of a predicted position over that of the encoder, (m + 3) / (m + 1): the last sample counts
-/// (m + 2) / (m + 1) times, the m before it 1 / (m + 1) together.
+/// Returns the largest error of a predicted position divided by that of the encoder, (m + 3) / (m + 1). The last sample
+/// has the weight (m + 2) / (m + 1), the m before it together 1 / (m + 1).
 [[nodiscard]] constexpr double predicted_encoder_gain(int predict) noexcept {
     return predict > 0 ? (predict + 3.0) / (predict + 1.0) : 1.0;
 }
 
-/// b / T that a static force held at a predicted position needs: R(1/2) or less without delay; with delay often less
-/// than without prediction.
+/// Returns b / T that a static force held at a predicted position needs: at most R(1/2) without delay; with delay often
+/// less than without prediction.
 ///
-/// With jitter the instant at which a command begins to act moves by up to the jitter within its sample. Where it can
-/// leave the sample, the delay counts as the nearest whole samples and the rest as unknown motion.
+/// With jitter the instant at which a command begins to act varies by up to the jitter within its sample. If it can
+/// leave the sample, the delay is rounded to whole samples and the rest is treated as unknown motion.
 [[nodiscard]] inline double predicted_need(const DeviceProfile& device, int predict, SlopeRange slopes) {
     const double simple = predicted_path_need(device, slopes);
     if (!(slopes.steepest() > 0.0) || !std::isfinite(simple)) {

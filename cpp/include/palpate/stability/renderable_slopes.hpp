@@ -2,11 +2,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
+#include "palpate/rendering/scale.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/stability/certificate.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/held_force.hpp"
@@ -16,7 +23,8 @@ namespace palpate {
 
 namespace detail {
 
-/// The largest value in [0, most] for which a condition holds that holds for every smaller value.
+/// Returns the largest value in [0, most] for which a condition holds; the condition also holds for every smaller
+/// value.
 template <class Holds>
 [[nodiscard]] double largest_that_holds(double most, Holds holds) {
     if (holds(most)) {
@@ -37,7 +45,7 @@ template <class Holds>
     return low;
 }
 
-/// True if direct rendering of a force with these slopes is certified; with hysteresis, h / r = stick.
+/// Returns true if direct rendering of a force with these slopes is certified; with hysteresis, h / r = stick.
 [[nodiscard]] inline bool holds_directly(const DeviceProfile& device, SlopeRange sliding, double stick) {
     ForceBounds bounds;
     bounds.slope = {-sliding.falling, sliding.rising + stick};
@@ -48,18 +56,18 @@ template <class Holds>
                                 : direct_inequalities(bounds, device));
 }
 
-/// Above every slope that matters, far below where numbers end.
+/// Returns a slope that is larger than any realistic one and far below the largest number.
 [[nodiscard]] inline double beyond_every_slope(const DeviceProfile& device) noexcept {
     return 1e9 * (1.0 + device.viscous_damping / device.period_s);
 }
 
 }  // namespace detail
 
-/// The slopes that direct rendering is certified for: the inverse of its inequalities.
+/// Returns the slopes for which direct rendering is certified: the inverse of its inequalities.
 ///
-/// First the steepest k for which slopes of -k and k hold together, neither counted steeper than `wanted`. Then
-/// slopes may fall, and after that rise, as steeply as is still certified: falling slopes cost less. With hysteresis
-/// these are slopes while sliding; a stick adds h / r = `stick`. An end that nothing limits is infinite.
+/// First finds the largest k for which slopes of -k and k are certified together, both limited to `wanted`. Then finds
+/// the largest falling slope, and after that the largest rising one, because falling slopes need less damping. With
+/// hysteresis these are slopes while sliding; sticking adds h / r = `stick`. A side without a limit is infinite.
 [[nodiscard]] inline Interval renderable_slopes(const DeviceProfile& device, double stick = 0.0,
                                                 SlopeRange wanted = {
                                                     std::numeric_limits<double>::infinity(),
@@ -71,7 +79,7 @@ template <class Holds>
     };
     const double both = detail::largest_that_holds(
         most, [&](double k) { return holds(std::min(k, wanted.rising), std::min(k, wanted.falling)); });
-    // Not at the very edge, where rounding would hide what is left for the other side.
+    // Slightly inside the edge, because there rounding would hide the remaining margin for the other side.
     double rising = inside * std::min(both, wanted.rising);
     double falling = inside * std::min(both, wanted.falling);
     falling = std::max(falling, inside * detail::largest_that_holds(most, [&](double k) {
@@ -85,15 +93,15 @@ template <class Holds>
     return {-end(falling), end(rising)};
 }
 
-/// The slope h / r that leaves half of what the device holds to sliding.
+/// Returns the slope h / r that leaves half of the device's largest slope for sliding.
 [[nodiscard]] inline double steepest_stick(const DeviceProfile& device) {
     return detail::largest_that_holds(detail::beyond_every_slope(device), [&](double stick) {
         return detail::holds_directly(device, {stick, stick}, stick);
     });
 }
 
-/// The narrowest play radius for which hysteresis is certified, at least `least`; infinite if none is. `sliding`:
-/// bounds of the model with a play so wide that sticking adds no slope.
+/// Returns the narrowest play radius for which hysteresis is certified, at least `least`; infinity without one.
+/// `sliding` are bounds of the model with a play so wide that sticking adds no slope.
 [[nodiscard]] inline double narrowest_play(const ForceBounds& sliding, const DeviceProfile& device,
                                            double least, double most) {
     const auto holds = [&](double radius) {
@@ -117,6 +125,44 @@ template <class Holds>
         (holds(middle) ? wide : narrow) = middle;
     }
     return wide;
+}
+
+/// Object and coupling of the explicit structure: the stiffest coupling, then the least object damping, for which its
+/// linearisation is stable; the last ones tried if none is. `chosen` sets mass, damping, coupling and play radius.
+[[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
+                                            const SchemeChoices& chosen) {
+    constexpr std::array shares{0.9, 0.75, 0.6, 0.45, 0.3, 0.15};  // of the stiffest coupling
+    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};              // B_o T / m; the paper's choice is 0.5
+    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};             // slope limit over the slope that it meets
+    const double T = device.period_s;
+    const double stiffest = stiffest_coupling(0.0, 0.0, device);
+    Scheme scheme;
+    scheme.structure = StructureKind::Explicit;
+    scheme.play_radius = chosen.play_radius.value_or(0.0);
+    scheme.coupling.damping = chosen.coupling_damping.value_or(0.1 * device.viscous_damping);
+    for (const double share : shares) {
+        const double stiffness = chosen.coupling_stiffness.value_or(std::max(share * stiffest, 1e-9));
+        scheme.coupling.stiffness = stiffness;
+        std::set<std::pair<double, double>> objects;  // damping and mass
+        for (const double ratio : ratios) {
+            for (const double reserve : reserves) {
+                const double limit = reserve * (std::max(0.0, bounds.slope.upper) + stiffness) - stiffness;
+                const Inertia object = explicit_object(limit, scheme.coupling, ratio, T);
+                const double mass = chosen.mass.value_or(0.0) > 0.0 ? *chosen.mass : object.mass;
+                objects.emplace(chosen.damping.value_or(ratio * mass / T), mass);
+            }
+        }
+        for (const auto& [damping, mass] : objects) {
+            scheme.inertia = {mass, damping};
+            if (finite(bounds) && all_hold(inequalities_of(bounds, scheme, device))) {
+                return scheme;
+            }
+        }
+        if (chosen.coupling_stiffness) {
+            break;
+        }
+    }
+    return scheme;
 }
 
 }  // namespace palpate

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measured boundaries against theory: nothing fails before its bound, and the bounds that are exact are met.
+// Measured boundaries against theory: all failures are beyond the bounds, and exact bounds are reached.
 #include "limits/failure_maps.hpp"
 #include "limits/hands.hpp"
 
@@ -16,7 +16,8 @@
 namespace palpate::bench {
 namespace {
 
-/// Measured over theory, least and largest; a limit that nothing failed at counts as `none`.
+/// Returns the least and largest quotient of measured and theoretical limit. A limit without a failure counts as
+/// `none`.
 Interval ratios(const FailureMap& map, std::size_t first, std::size_t last, double none = 1.0) {
     Interval found{1e300, -1e300};
     for (std::size_t line = first; line <= last; ++line) {
@@ -44,7 +45,7 @@ TEST(FailureMaps, ASpringJustPastItsBoundSwingsUpWithAHeavyHand) {
     expect_between(ratios(damping_map(3), 0, 2), 1.0, 1.02);
 }
 
-// Spring against a bound for every force with slopes from 0 to its stiffness: within 4 %.
+// A spring against a bound for every force with slopes from 0 to its stiffness: within 4 %.
 TEST(FailureMaps, PredictionFailsJustPastItsBoundForEveryNumberOfSamplesAndDelay) {
     const FailureMap map = prediction_map(test::cases(5));
     expect_between(ratios(map, 0, 2), 1.0, 1.04);
@@ -121,7 +122,7 @@ TEST(FailureMaps, GuardsTakeTheBuzzOutOfAWallThatIsTooStiff) {
     }
 }
 
-// The bound is for every hand that only takes energy: a heavy one needs all of it, a light one nearly all.
+// The bound is for every passive hand: a heavy hand needs all of it, a light one almost all.
 TEST(FailureMaps, ALightHandLeavesLittleOfTheBoundUnusedAndAHandThatDampsLeavesMuch) {
     const FailureMap map = hand_map(3);
     for (std::size_t delay = 0; delay <= 2; ++delay) {
@@ -133,7 +134,7 @@ TEST(FailureMaps, ALightHandLeavesLittleOfTheBoundUnusedAndAHandThatDampsLeavesM
     expect_between(ratios(map, 3, 3), 2.0, 2.3);
 }
 
-// A slow swing of a heavy hand feels no lag, so what remains is far below the bound.
+// A heavy hand swings slowly and does not feel a lag, so its need is far below the bound.
 TEST(FailureMaps, AHeavyHandCarriesUpTo18TimesTheStiffnessWithAPrediction) {
     const FailureMap map = hand_map(3);
     const FailureLine& plain = map.lines[0];
@@ -174,7 +175,7 @@ TEST(Guards, CostNextToNothingAndDoWhatTheyAreThereFor) {
     }
 }
 
-/// Whether any of a hand's loops, within the play and across it, gets more out of a model than it held.
+/// Returns true if a loop of a hand, within the play or across it, takes more energy out of a model than it stored.
 bool generates(const ForceModel& model, const DeviceProfile& device) {
     constexpr std::size_t ticks = 3000;
     Scheme scheme;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The time steps of the comparison: their order, and their special cases.
+// Tests of the order and of the special cases of the compared time steps.
 #include "solvers/time_steps.hpp"
 
 #include <cmath>

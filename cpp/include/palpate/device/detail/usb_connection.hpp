@@ -19,7 +19,7 @@
 
 namespace palpate {
 
-/// Which device it is: for people, and to find it again.
+/// Name of a device, for messages and to find it again.
 struct UsbName {
     std::string manufacturer;
     std::string product;
@@ -27,7 +27,7 @@ struct UsbName {
     int bus = 0;
     int address = 0;
 
-    /// "emulated knob EMU-1 (bus 1, address 2)"
+    /// Returns a text such as "emulated knob EMU-1 (bus 1, address 2)".
     [[nodiscard]] std::string text() const {
         const std::string place =
             "(bus " + std::to_string(bus) + ", address " + std::to_string(address) + ")";
@@ -38,25 +38,28 @@ struct UsbName {
 
 namespace detail {
 
+/// Deleter of a libusb context.
 struct CloseContext {
     void operator()(libusb_context* context) const noexcept { libusb_exit(context); }
 };
+/// Deleter of a device handle.
 struct CloseHandle {
     void operator()(libusb_device_handle* handle) const noexcept {
         libusb_release_interface(handle, wire::interface_number);
         libusb_close(handle);
     }
 };
+/// Deleter of a list of devices.
 struct FreeList {
     void operator()(libusb_device** list) const noexcept { libusb_free_device_list(list, 1); }
 };
 
-/// One device that answers as it should, its interface claimed for this program.
+/// Connection to one suitable device, with its interface claimed for this program.
 class UsbConnection {
   public:
     static constexpr unsigned request_timeout_ms = 500;
 
-    /// Opens the device of this serial number, or the only one there is.
+    /// Opens the device with this serial number, or the only device if `serial` is empty.
     [[nodiscard]] Opened open(const std::string& serial) {
         libusb_context* context = nullptr;
         if (const int code = libusb_init(&context); code != 0) {
@@ -75,7 +78,7 @@ class UsbConnection {
         context_.reset();
     }
 
-    /// A request without data. 0, or an error of libusb.
+    /// Sends a request without data. Returns 0 or an error of libusb.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) const noexcept {
         const int moved = libusb_control_transfer(handle_.get(), wire::request_to_device,
                                                   static_cast<std::uint8_t>(request), value,
@@ -97,6 +100,7 @@ class UsbConnection {
         wire::Info info;
     };
 
+    /// Opens the suitable device; refuses none or several.
     [[nodiscard]] Opened choose(const std::string& serial) {
         libusb_device** found = nullptr;
         const auto count = libusb_get_device_list(context_.get(), &found);
@@ -106,7 +110,7 @@ class UsbConnection {
         const std::unique_ptr<libusb_device*, FreeList> list{found};
         std::vector<Candidate> fitting;
         std::vector<std::string> others;   // serial numbers
-        std::vector<std::string> reasons;  // why one is out of the question
+        std::vector<std::string> reasons;  // why a device is not suitable
         for (libusb_device* device : std::span{found, static_cast<std::size_t>(count)}) {
             if (is_ours(device)) {
                 examine(device, serial, fitting, others, reasons);
@@ -152,7 +156,7 @@ class UsbConnection {
                "system sees one";
     }
 
-    /// By what the system knows without opening it.
+    /// Returns true if the descriptors, which the system knows without opening the device, are those of the protocol.
     [[nodiscard]] static bool is_ours(libusb_device* device) noexcept {
         libusb_device_descriptor descriptor{};
         if (libusb_get_device_descriptor(device, &descriptor) != 0 ||
@@ -182,7 +186,7 @@ class UsbConnection {
         });
     }
 
-    /// Opens it and asks it who it is.
+    /// Opens a device, reads its name and checks its properties.
     static void examine(libusb_device* device, const std::string& serial, std::vector<Candidate>& fitting,
                         std::vector<std::string>& others, std::vector<std::string>& reasons) {
         UsbName name;

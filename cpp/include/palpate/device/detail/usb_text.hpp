@@ -9,40 +9,26 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
+
+#include "palpate/device/wire.hpp"
 
 namespace palpate::detail {
 
-/// What an error of libusb means, and what helps.
+/// Returns the meaning of an error of libusb, and the cure.
 [[nodiscard]] inline std::string usb_reason(int code) {
-    switch (code) {
-        case LIBUSB_ERROR_ACCESS:
-            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
-                   "again";
-        case LIBUSB_ERROR_BUSY:
-            return "another program uses it; end that program, then try again";
-        case LIBUSB_ERROR_NO_DEVICE:
-        case LIBUSB_ERROR_NOT_FOUND:
-            return "it was unplugged meanwhile; plug it in and try again";
-        case LIBUSB_ERROR_TIMEOUT:
-            return "it does not answer; unplug it and plug it in again";
-        case LIBUSB_ERROR_PIPE:
-            return "it refused a request; its firmware may be of another version";
-        case LIBUSB_ERROR_NO_MEM:
-            return "the system has no memory left for USB; see "
-                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
-        case LIBUSB_ERROR_IO:
-            return "the transfer failed on the bus; try another cable or port";
-        default:
-            return std::string(libusb_error_name(code)) + ", " + libusb_strerror(code);
-    }
+    static_assert(LIBUSB_ERROR_IO == -1 && LIBUSB_ERROR_ACCESS == -3 && LIBUSB_ERROR_NO_MEM == -11);
+    const std::string_view cause = wire::usb_cause(code);
+    return cause.empty() ? std::string(libusb_error_name(code)) + ", " + libusb_strerror(code)
+                         : std::string(cause);
 }
 
-/// An integer of two bytes, the least first.
+/// Returns an integer of two bytes, little endian.
 [[nodiscard]] inline std::uint16_t two_bytes(std::span<const std::uint8_t> bytes, std::size_t at) {
     return static_cast<std::uint16_t>(bytes[at] + 256U * bytes[at + 1]);
 }
 
-/// UTF-8 of one character.
+/// Appends one character as UTF-8.
 inline void append_utf8(std::string& text, std::uint32_t character) {
     const auto byte = [&](std::uint32_t bits) { text.push_back(static_cast<char>(bits)); };
     const auto rest = [&](unsigned shift) { byte(0x80U | (character >> shift & 0x3FU)); };
@@ -63,11 +49,11 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
     }
 }
 
-/// The text of a string descriptor's UTF-16 (little endian) as UTF-8, on one line, without blanks at its ends; empty
-/// where it is no text.
+/// Returns the UTF-16 text (little endian) of a string descriptor as UTF-8, on one line and without blanks at its ends;
+/// empty if it is not text.
 [[nodiscard]] inline std::string text_of_utf16(std::span<const std::uint8_t> bytes) {
     std::string text;
-    std::uint32_t high = 0;  // the first half of a pair
+    std::uint32_t high = 0;  // first half of a surrogate pair
     for (std::size_t k = 0; k + 1 < bytes.size(); k += 2) {
         const std::uint32_t unit = two_bytes(bytes, k);
         const bool is_low = unit >= 0xDC00 && unit < 0xE000;
@@ -90,7 +76,7 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
                : text.substr(first, text.find_last_not_of(' ') + 1 - first);
 }
 
-/// A string of the device, in the first of its languages; empty where it has none.
+/// Returns a string of the device, in its first language; empty without one.
 [[nodiscard]] inline std::string string_of(libusb_device_handle* handle, std::uint8_t index) {
     std::array<std::uint8_t, 255> bytes{};
     const auto read = [&](std::uint8_t which, std::uint16_t language) {

@@ -21,7 +21,7 @@
 
 namespace palpate::detail {
 
-/// What came in, as it came in.
+/// One received packet, unchanged, with its time.
 struct UsbArrival {
     std::array<std::uint8_t, wire::largest_packet> bytes{};
     std::uint32_t size = 0;
@@ -32,10 +32,10 @@ struct UsbArrival {
     }
 };
 
-/// The transfers of one stream: two reads always queued, one write and one request at most on their way, one thread
-/// for libusb's events. All memory is taken when it starts.
+/// The transfers of one stream: two queued reads, at most one write and one request in flight, one thread for libusb's
+/// events. All memory is allocated at the start.
 ///
-/// The owner's thread writes and takes arrivals; the event thread runs the callbacks. What both see is atomic; a
+/// The owner's thread writes and takes arrivals; the event thread runs the callbacks. Shared members are atomic. A
 /// transfer counts as in flight until the last line of its callback.
 class UsbTransfers {
   public:
@@ -52,7 +52,7 @@ class UsbTransfers {
     UsbTransfers(const UsbTransfers&) = delete;
     UsbTransfers& operator=(const UsbTransfers&) = delete;
 
-    /// 0, or why nothing runs: an error of libusb.
+    /// Starts the reads and the event thread. Returns 0 or an error of libusb; after an error nothing runs.
     [[nodiscard]] int start() {
         if (write_ == nullptr || request_ == nullptr ||
             std::any_of(reads_.begin(), reads_.end(),
@@ -67,7 +67,7 @@ class UsbTransfers {
         return error_.load(std::memory_order_acquire);
     }
 
-    /// Takes back every transfer and waits until none is left. What the device does is nobody's business then.
+    /// Cancels every transfer and waits until all have ended. Errors of the device are ignored.
     void stop() noexcept {
         if (!events_.joinable()) {
             return;
@@ -87,7 +87,8 @@ class UsbTransfers {
         events_.join();
     }
 
-    /// Sends a command, unless the last one is still on its way. 0, LIBUSB_ERROR_BUSY or another error of libusb.
+    /// Sends a command, unless the last one is still in flight. Returns 0, LIBUSB_ERROR_BUSY or another error of
+    /// libusb.
     [[nodiscard]] int write(const wire::OutPacket& command) noexcept {
         if (is_gone()) {
             return LIBUSB_ERROR_NO_DEVICE;
@@ -96,7 +97,7 @@ class UsbTransfers {
             return LIBUSB_ERROR_BUSY;
         }
         out_bytes_ = wire::encode(command);
-        constexpr unsigned no_timeout = 0;  // the device's watchdog is the one that counts
+        constexpr unsigned no_timeout = 0;  // the device's watchdog ends a command instead
         libusb_fill_interrupt_transfer(write_.get(), handle_, wire::out_endpoint, out_bytes_.data(),
                                        static_cast<int>(out_bytes_.size()), &UsbTransfers::written, this,
                                        no_timeout);
@@ -109,7 +110,8 @@ class UsbTransfers {
         return code;
     }
 
-    /// A request without data, waited for. 0, or an error of libusb. Only one at a time, and by the owner's thread.
+    /// Sends a request without data and waits for its end. Returns 0 or an error of libusb. Only the owner's thread may
+    /// call it, one request at a time.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) noexcept {
         if (requests_in_flight_.load(std::memory_order_acquire) != 0) {
             return LIBUSB_ERROR_BUSY;
@@ -129,39 +131,40 @@ class UsbTransfers {
         return ended ? answer_.load(std::memory_order_relaxed) : static_cast<int>(LIBUSB_ERROR_TIMEOUT);
     }
 
-    /// Waits for packets; false: none came before the deadline, or none can come any more.
+    /// Waits for packets. Returns false if none came before the deadline, or none can come.
     [[nodiscard]] bool wait_for_arrival(Nanoseconds deadline) noexcept {
         (void)wait_until([&] { return arrived() > 0 || is_gone(); }, deadline);
         return arrived() > 0;
     }
-    /// Whether a write is on its way.
+    /// Returns true if a write is in flight.
     [[nodiscard]] bool writes() const noexcept {
         return writes_in_flight_.load(std::memory_order_acquire) != 0;
     }
-    /// Waits until it has ended; false: it has not.
+    /// Waits until the write has ended. Returns false if it has not.
     [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes(); }, deadline);
     }
-    /// Waits until it has ended or a packet is there; false: neither.
+    /// Waits until the write has ended or a packet has arrived. Returns false if neither happened.
     [[nodiscard]] bool wait_for_write_or_arrival(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes() || arrived() > 0 || is_gone(); }, deadline);
     }
 
-    /// Packets that wait to be taken.
+    /// Returns the number of packets that wait.
     [[nodiscard]] std::size_t arrived() const noexcept { return arrivals_.size(); }
     [[nodiscard]] bool take(UsbArrival& arrival) noexcept { return arrivals_.pop({&arrival, 1}) == 1; }
 
-    /// Nothing comes back from this: unplugged, or an error that repeats itself.
+    /// Returns true after an error that cannot be recovered: unplugged, or a repeated error.
     [[nodiscard]] bool is_gone() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
     [[nodiscard]] std::uint64_t bus_errors() const noexcept {
         return bus_errors_.load(std::memory_order_relaxed);
     }
-    /// Commands that were on their way and did not arrive.
+    /// Returns the number of commands that were in flight and did not arrive.
     [[nodiscard]] std::uint64_t lost_writes() const noexcept {
         return lost_writes_.load(std::memory_order_relaxed);
     }
+    /// Returns the number of transfers in flight.
     [[nodiscard]] int in_flight() const noexcept {
         return reads_in_flight_.load(std::memory_order_acquire) +
                writes_in_flight_.load(std::memory_order_acquire) +
@@ -173,7 +176,7 @@ class UsbTransfers {
     static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
     static constexpr Nanoseconds cancel_again = nanoseconds_a_second / 10;
     static constexpr unsigned request_timeout_ms = 500;
-    static constexpr int errors_to_give_up = 100;  ///< in a row
+    static constexpr int errors_to_give_up = 100;  ///< consecutive errors
 
     struct FreeTransfer {
         void operator()(libusb_transfer* transfer) const noexcept { libusb_free_transfer(transfer); }
@@ -189,10 +192,10 @@ class UsbTransfers {
     // ---------------------------------------------------------------------------------------- event thread
 
     void handle_events() noexcept {
-        // A packet that waits for its turn on the processor is late for the loop: this thread stands above it.
+        // This thread has a higher priority than the loop, because a waiting packet makes the loop late.
         const sched_param priority{90};
         (void)pthread_setschedparam(pthread_self(), SCHED_FIFO,
-                                    &priority);  // refused: told by the loop's own
+                                    &priority);  // a refusal is reported for the loop
         while (runs_.load(std::memory_order_acquire)) {
             timeval wait{0, 100'000};
             const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
@@ -204,7 +207,7 @@ class UsbTransfers {
         }
     }
 
-    /// A halted endpoint: its other transfers are taken back, then it is cleared and goes on.
+    /// Clears a halted endpoint: cancels its other transfers, clears it and continues.
     void recover() noexcept {
         if (stopping_.load(std::memory_order_acquire) || is_gone()) {
             return;
@@ -212,7 +215,7 @@ class UsbTransfers {
         if (reads_halted_) {
             if (reads_in_flight_.load(std::memory_order_acquire) > 0) {
                 for (Read& read : reads_) {
-                    (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has ended
+                    (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has already ended
                 }
                 return;
             }
@@ -230,7 +233,7 @@ class UsbTransfers {
         }
     }
 
-    /// By start() before the event thread has anything to do with it, then by the event thread only.
+    /// Submits a read. start() calls it before the event thread uses it, then only the event thread.
     void submit(Read& read) noexcept {
         constexpr unsigned no_timeout = 0;
         libusb_fill_interrupt_transfer(read.transfer.get(), handle_, wire::in_endpoint, read.bytes.data(),
@@ -282,7 +285,7 @@ class UsbTransfers {
         arrival.time = monotonic_now();
         arrival.size = static_cast<std::uint32_t>(read.transfer->actual_length);
         std::copy_n(read.bytes.begin(), arrival.size, arrival.bytes.begin());
-        (void)arrivals_.push(arrival);  // full: nobody has read for long, and will begin anew
+        (void)arrivals_.push(arrival);  // full: the loop has not read for long and will restart
         changes_.happened();
     }
 
@@ -346,7 +349,7 @@ class UsbTransfers {
 
     // ------------------------------------------------------------------------------------------- both threads
 
-    /// Waits until something is so that a transfer makes so; false: it is not.
+    /// Waits until a condition that transfers change is true. Returns false after the deadline.
     template <class IsSo>
     [[nodiscard]] bool wait_until(IsSo is_so, Nanoseconds deadline) noexcept {
         while (!is_so()) {
@@ -365,7 +368,7 @@ class UsbTransfers {
         }
     }
 
-    /// The first error from which nothing comes back.
+    /// Stores the first error that cannot be recovered.
     void note(int code) noexcept {
         if (code == 0) {
             return;
@@ -377,7 +380,7 @@ class UsbTransfers {
 
     void cancel_all() noexcept {
         for (Read& read : reads_) {
-            (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has ended
+            (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has already ended
         }
         (void)libusb_cancel_transfer(write_.get());
         (void)libusb_cancel_transfer(request_.get());
@@ -393,7 +396,7 @@ class UsbTransfers {
     std::atomic<int> answer_{0};
 
     RingBuffer<UsbArrival> arrivals_;
-    WakeUp changes_;  ///< something arrived, ended or broke
+    WakeUp changes_;  ///< a packet arrived, or a transfer ended or failed
     std::atomic<int> reads_in_flight_{0};
     std::atomic<int> writes_in_flight_{0};
     std::atomic<int> requests_in_flight_{0};
@@ -403,9 +406,9 @@ class UsbTransfers {
     std::atomic<std::uint64_t> stalls_{0};
     std::atomic<std::uint64_t> bus_errors_{0};
     std::atomic<std::uint64_t> lost_writes_{0};
-    bool reads_halted_ = false;   ///< of the event thread
-    bool writes_halted_ = false;  ///< of the event thread
-    int errors_in_a_row_ = 0;     ///< of the event thread
+    bool reads_halted_ = false;   ///< used by the event thread only
+    bool writes_halted_ = false;  ///< used by the event thread only
+    int errors_in_a_row_ = 0;     ///< used by the event thread only
 
     std::thread events_;
 };

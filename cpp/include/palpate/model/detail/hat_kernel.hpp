@@ -201,9 +201,9 @@ PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns)
     return total(sum);
 }
 
-/// Computes Taylor's formula about the middle of a box. With A_n = w (d + n - r^2) E of each wavelet, psi = -A_0, D psi
-/// = A_2 u and D^2 psi = A_2 I - A_4 u u'. D^3 psi is A_6 u u u minus A_4 u_j for each pair of equal other indices. The
-/// factors of all wavelets are computed first, then the sums over the wavelets.
+/// Computes Taylor's formula about the middle of a box. With A_n = w (d + n - r^2) E of each wavelet, psi = -A_0, D
+/// psi = A_2 u and D^2 psi = A_2 I - A_4 u u'. D^3 psi is A_6 u u u minus A_4 u_j for each pair of equal other indices.
+/// The factors of all wavelets are computed first, then the sums over the wavelets.
 PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* middle, const double* radius,
                                      RadialExpansion& sums) noexcept {
     const std::size_t n = of.size;
