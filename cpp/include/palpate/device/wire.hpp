@@ -21,12 +21,12 @@
 /// counts. A force of this library is that of the object against the handle, so it is -1e-6 times the torque.
 namespace palpate::wire {
 
-inline constexpr std::uint16_t vendor_id = 0x1209;
+inline constexpr std::uint16_t vendor_id = 0x1209;   ///< identification of the device, with product_id
 inline constexpr std::uint16_t product_id = 0x0001;  ///< of pid.codes' test pair: for development only
 inline constexpr std::uint8_t interface_number = 0;
 inline constexpr std::array<std::uint8_t, 3> interface_kind{0xFF, 0x01, 0x01};  ///< class, subclass, protocol
-inline constexpr std::uint8_t in_endpoint = 0x81;
-inline constexpr std::uint8_t out_endpoint = 0x01;
+inline constexpr std::uint8_t in_endpoint = 0x81;   ///< interrupt IN endpoint: packets of the device
+inline constexpr std::uint8_t out_endpoint = 0x01;  ///< interrupt OUT endpoint: commands
 inline constexpr std::uint8_t protocol_version = 1;
 
 inline constexpr std::uint8_t request_to_host = 0xC1;  ///< bmRequestType: vendor, interface
@@ -63,11 +63,11 @@ inline constexpr std::size_t info_size = 32;
 /// Packet from the device, once every frame.
 struct InPacket {
     std::uint16_t sequence = 0;
-    std::uint32_t clock_us = 0;  ///< of the device at the encoder latch; wraps after 71 minutes
-    std::int32_t count = 0;
-    std::int32_t velocity_cps = 0;  ///< counts a second; 0 if it is not measured
-    std::int32_t torque_uNm = 0;    ///< applied torque
-    std::uint16_t status = 0;
+    std::uint32_t clock_us = 0;      ///< of the device at the encoder latch; wraps after 71 minutes
+    std::int32_t count = 0;          ///< position of the encoder
+    std::int32_t velocity_cps = 0;   ///< counts a second; 0 if it is not measured
+    std::int32_t torque_uNm = 0;     ///< applied torque
+    std::uint16_t status = 0;        ///< status bits
     std::uint16_t out_sequence = 0;  ///< of the last accepted OUT packet
     std::uint16_t out_age_us = 0;    ///< since it was accepted; saturates
     std::uint16_t temperature_dC = 0;

@@ -46,8 +46,8 @@ struct SlewLimit {
 
 /// Increases the force from zero at the start: scales the first `ticks` forces by 0, 1/ticks, 2/ticks, ...
 struct ForceRamp {
-    std::uint64_t ticks = 0;
-    std::uint64_t done = 0;
+    std::uint64_t ticks = 0;  ///< length of the ramp
+    std::uint64_t done = 0;   ///< ticks so far
 
     /// Returns true after the last scaled force.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }

@@ -207,6 +207,7 @@ class GrowingFile {
                             "force=True)";
     }
 
+    /// Returns the length of the whole lines.
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {
         const std::size_t end = written.rfind('\n');
         return end == std::string_view::npos ? 0 : end + 1;
@@ -239,6 +240,7 @@ class GrowingFile {
         return reason;
     }
 
+    /// Renames NAME.part to the first free name.
     [[nodiscard]] std::string move_aside() {
         int error = EEXIST;
         for (int k = 1; error == EEXIST; ++k) {

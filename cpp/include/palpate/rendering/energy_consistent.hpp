@@ -153,6 +153,7 @@ class EnergyConsistent {
                 memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + push};
     }
 
+    /// Returns f or D as the environment of the next step.
     [[nodiscard]] Stepped stepped(bool switched) const noexcept {
         return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
     }
@@ -213,6 +214,7 @@ class EnergyConsistent {
         return generates(any) ? end(by_energy, 0) : end(any, 0);
     }
 
+    /// Moves the object to a solution and returns the result of the tick.
     [[nodiscard]] Rendered moved_to(const Solution& solution, double force) noexcept {
         environment_.advance(solution.position, state_);
         velocity_ = 2.0 * (solution.position - position_) / period_ - velocity_;

@@ -38,7 +38,7 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
                                          : model.network()->at(position, {}).force;
 }
 
-/// Returns the largest force in either direction [N or N*m].
+/// Returns the largest of the forces at 1001 positions, in both directions [N or N*m]; 1 without a force.
 [[nodiscard]] inline double largest_force(const ForceModel& model) noexcept {
     const double lower = model.domain().lower[0];
     const double step = (model.domain().upper[0] - lower) / 1000.0;

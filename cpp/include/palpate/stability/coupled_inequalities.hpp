@@ -67,6 +67,7 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
     lines.push_back(friction);
 }
 
+/// Adds these lines for an object with mass.
 inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                           const DeviceProfile& device) {
     add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling",
