@@ -23,8 +23,8 @@ namespace palpate {
 /// these are the guards of a simulation, because other faults cannot occur there.
 struct Guards {
     ReadingGuard reading{};        ///< check of each sample
-    ForceLimit limit{};            ///< first limit of the force
-    LimitCycleDetector buzz{};     ///< softens the object after a limit cycle
+    ForceLimit limit{};            ///< first limit
+    LimitCycleDetector buzz{};     ///< softens the object
     ForceRamp ramp{};              ///< increase at the start
     SlewLimit slew{};              ///< change of the force
     EnergyTank tank{};             ///< energy that may be given
