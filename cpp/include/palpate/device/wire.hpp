@@ -54,8 +54,7 @@ inline constexpr std::uint32_t measures_velocity = 2;
 inline constexpr int shortest_watchdog_ms = 2;
 inline constexpr int longest_watchdog_ms = 1000;
 
-inline constexpr std::size_t largest_packet = 64;  ///< largest packet of a full-speed interrupt endpoint
-                                                   ///< [bytes]
+inline constexpr std::size_t largest_packet = 64;  ///< of a full-speed interrupt endpoint [bytes]
 inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
 inline constexpr std::size_t info_size = 32;

@@ -23,8 +23,7 @@ struct ModelScale {
 namespace detail {
 
 inline constexpr double knob_travel = 0.5;     ///< of a model that suits the default knob [rad]
-inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device, divided by the largest
-                                               ///< force
+inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device / largest force
 
 /// Returns the force while sliding in a direction, +1 for press and -1 for release. A model of position and velocity
 /// slides at the largest velocity of its data.
