@@ -29,8 +29,7 @@ struct ForceLimit {
 
 /// Limits the change of the force between two ticks. Zero, the safe command, is always possible.
 struct SlewLimit {
-    double largest_step = std::numeric_limits<double>::infinity();  ///< largest change in a tick [N or N*m],
-                                                                    ///< > 0
+    double largest_step = std::numeric_limits<double>::infinity();  ///< change in a tick [N or N*m], > 0
     double last = 0.0;                                              ///< force sent before [N or N*m]
 
     /// Limits the force.
