@@ -50,7 +50,7 @@ struct UsbHealth {
 /// Reading::status:
 /// - Timeout: no packet came, the device's watchdog ended the torque, or a command took longer than
 ///   `UsbOptions::longest_delay_s`.
-/// - Fault: the device reported one, was disabled or is gone. It is permanent.
+/// - Fault: the device reported a fault, was disabled or is gone. This status is permanent.
 /// - Lost: a command did not arrive or was not understood.
 /// - Limited: the device clipped a command.
 ///

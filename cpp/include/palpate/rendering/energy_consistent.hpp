@@ -12,9 +12,9 @@
 
 namespace palpate {
 
-/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, integrated without generated energy. The object's
-/// force does exactly the work that is stored, D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}). With midpoint kinematics the
-/// load line D + p y = q has
+/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, integrated by a step that never generates energy.
+/// The object's force does exactly the work that is stored, D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}). With midpoint
+/// kinematics the load line D + p y = q has
 ///
 ///     p = 2m/T^2 + B_o/T + K_c + B_c/T,
 ///     q = (2m/T^2 + B_o/T) y_{k-1} + (2m/T) v_{k-1} + K_c x_k + B_c (v_device + y_{k-1}/T).
