@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by all studies: scale of a run, JSON files with machine and date, tables of generated pages."""
+"""Provides all studies with the scale of a run, JSON files with machine and date, and tables of pages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from palpate.recording.files import replacing
 ROOT = Path(__file__).parents[1]
 
 SCALE = float(os.environ.get("PALPATE_BENCH_SCALE", "1"))
-"""1 for numbers that are published, 0.01 to see that everything runs."""
+"""1 for published numbers, 0.01 for a quick test"""
 
 
 def count(full: int) -> int:
@@ -57,7 +57,7 @@ def where() -> dict[str, Any]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes the whole file or nothing."""
+    """Replaces a file in one step, so an error leaves the old file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -77,7 +77,7 @@ def write_results(path: Path | None, results: Any) -> None:
 def markdown_table(
     header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: Sequence[int] = (0,)
 ) -> str:
-    """Returns a table; the numbers of the other columns are aligned right."""
+    """Returns a table; all columns except `text_columns` are aligned right."""
     rule = ["---" if k in text_columns else "---:" for k in range(len(header))]
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, rule, *rows))
 
@@ -99,7 +99,7 @@ def fill_tables(page: Path, tables: Mapping[str, str]) -> None:
         _, found, after = marked.partition(end)
         if not found or mark in after:
             raise SystemExit(
-                f"{page} has no table between '<!-- {name} -->' and '<!-- end -->', each on a separate line"
+                f"{page}: add '<!-- {name} -->' and '<!-- end -->', each on a separate line, around the table"
             )
         text = before + mark + table + end + after
     write_text(page, text)

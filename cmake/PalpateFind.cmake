@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-# A package from the system if it is there, else from its repository.
+# A package from the system if it is there, else from a pinned release archive.
 
 include_guard()
 
-# palpate_find_or_fetch(NAME TAG REPOSITORY [VERSION]): VERSION is the oldest that will do.
-function(palpate_find_or_fetch name tag repository)
+if(POLICY CMP0135) # since CMake 3.24: extracted files are as old as the download
+  cmake_policy(SET CMP0135 NEW)
+endif()
+
+# palpate_find_or_fetch(NAME URL SHA256 [VERSION]): VERSION is the oldest that will do.
+function(palpate_find_or_fetch name url sha256)
   find_package(${name} ${ARGN} QUIET)
   if(NOT ${name}_FOUND)
     include(FetchContent)
-    FetchContent_Declare(
-      ${name}
-      GIT_REPOSITORY "${repository}"
-      GIT_TAG "${tag}"
-      GIT_SHALLOW TRUE)
+    FetchContent_Declare(${name} URL "${url}" URL_HASH "SHA256=${sha256}")
     FetchContent_MakeAvailable(${name})
   endif()
 endfunction()

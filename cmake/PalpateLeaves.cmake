@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # Third-party headers of the leaves (Debian: nlohmann-json3-dev, libcli11-dev).
 
-palpate_find_or_fetch(nlohmann_json v3.11.2 https://github.com/nlohmann/json.git 3.9)
+palpate_find_or_fetch(
+  nlohmann_json https://github.com/nlohmann/json/releases/download/v3.11.2/json.tar.xz
+  8c4b26bf4b422252e13f332bc5e388ec0ab5c3443d24399acb675e68278d341f 3.9)
 if(PALPATE_BUILD_CONTROL)
-  palpate_find_or_fetch(CLI11 v2.1.2 https://github.com/CLIUtils/CLI11.git 2.1)
+  palpate_find_or_fetch(
+    CLI11 https://github.com/CLIUtils/CLI11/archive/refs/tags/v2.1.2.tar.gz
+    26291377e892ba0e5b4972cdfd4a2ab3bf53af8dac1f4ea8fe0d1376b625c8cb 2.1)
 endif()
 
 # Optional: the emulation of a USB device below libusb (Debian: libumockdev-dev).

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Story 1: a detent under the finger, rendered five ways. The same story is told in 01_detent.py.
+// Example 1: renders a detent with five structures. 01_detent.py does the same in Python.
 //
 //     c++ -std=c++20 -O2 -I cpp/include examples/01_detent.cpp -o detent && ./detent
 
@@ -15,7 +15,7 @@
 int main() {
     using namespace palpate;
 
-    // 1. The object: a soft spring of 2 N*m/rad with a detent at 0.2 rad, one wavelet written down by hand.
+    // 1. Define the object: a soft spring of 2 N*m/rad with a detent at 0.2 rad, as a network with one wavelet.
     const NetworkParameters network{
         .dimension = 1, .alpha = {30.0}, .beta = {0.2}, .weight = {-0.3}, .linear = {2.0}, .bias = 0.0};
     Domain range;
@@ -24,11 +24,11 @@ int main() {
     const ForceModel detent{network, range};
     const WaveletNetwork object{network, range};
 
-    // 2. The device and the hand: a knob with a 16-bit encoder at 1 kHz, swept through the detent. Simulated.
+    // 2. Choose a simulated device and hand: a knob with a 16-bit encoder at 1 kHz, moved through the detent.
     const DeviceProfile device;
     const Hand hand;
 
-    // 3. The structures, from the simplest to the one of the paper.
+    // 3. List the structures, from the simplest to the one of the paper.
     Scheme direct;
     Scheme compensated;
     Scheme massless;
@@ -47,7 +47,7 @@ int main() {
                                                                  {"implicit", implicit},
                                                                  {"explicit", explicit_one}}};
 
-    // 4. Render each for four seconds, and ask how far the force is from the object's at the handle.
+    // 4. Render each for four seconds and print the force error at the handle.
     for (const auto& [name, scheme] : schemes) {
         const Trace trace = simulate(detent, scheme, device, hand, 4000);
         double sum = 0.0;

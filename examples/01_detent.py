@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Story 1: a detent under the finger, rendered five ways. The same story is told in 01_detent.cpp.
+"""Example 1: renders a detent with five structures. 01_detent.cpp does the same in C++.
 
 python examples/01_detent.py
 """
@@ -7,8 +7,8 @@ python examples/01_detent.py
 import palpate
 from palpate.planning import force_error
 
-# 1. The object: a soft spring of 2 N*m/rad with a detent at 0.2 rad. Usually a recording gives it, by
-#    palpate.identify; here one wavelet is written down by hand.
+# 1. Define the object: a soft spring of 2 N*m/rad with a detent at 0.2 rad. Here the network has one wavelet;
+#    usually palpate.identify computes the model from a recording.
 detent = palpate.Model.from_network(
     units={"position": "rad", "force": "N*m"},
     alpha=[[30.0]],
@@ -19,10 +19,10 @@ detent = palpate.Model.from_network(
     upper=[0.5],
 )
 
-# 2. The device and the hand: a knob with a 16-bit encoder at 1 kHz, swept through the detent. Simulated.
+# 2. Choose a simulated device and hand: a knob with a 16-bit encoder at 1 kHz, moved through the detent.
 device, hand = palpate.DeviceProfile(), palpate.Hand()
 
-# 3. The structures, from the simplest to the one of the paper.
+# 3. List the structures, from the simplest to the one of the paper.
 schemes = {
     "direct": palpate.Scheme(structure="direct"),
     "massless, compensated": palpate.Scheme(structure="massless", compensated=True, coupling_damping=0.005),
@@ -31,7 +31,7 @@ schemes = {
     "explicit": palpate.Scheme(structure="explicit"),
 }
 
-# 4. Render each for four seconds, and ask how far the force is from the object's at the handle.
+# 4. Render each for four seconds and print the force error at the handle.
 for name, scheme in schemes.items():
     plan = palpate.Plan(detent, scheme)
     error = force_error(plan, palpate.simulate(plan, device, hand, 4.0))

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Story 2: a knob with the click of a real key switch. The same story is told in 02_click.py.
+// Example 2: renders the click of a real key switch on a knob. 02_click.py does the same in Python.
 //
 //     c++ -std=c++20 -O2 -I cpp/include examples/02_click.cpp -o click && ./click examples/02_click.json
 //
-// 02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); a millimetre of the key is
-// 0.1 rad of the knob, and a newton is 1 N*m. To feel it, on a device that `palpate check-device` found fit for it:
+// 02_click.json was identified from a measured Cherry MX Blue (ThereminGoat's force curves); 1 mm of the key is
+// 0.1 rad of the knob, 1 N is 1 N*m. To render it on a device, run `palpate check-device` first, then:
 //
 //     palpate-control examples/02_click.json --device usb --uncertified --force-limit 1
 
@@ -21,7 +21,7 @@
 
 namespace {
 
-/// How far a force falls at most below what it had reached before: a click.
+/// Returns the largest drop of a force below its previous maximum, which is felt as a click.
 double largest_fall(const std::vector<double>& force) {
     double highest = -std::numeric_limits<double>::infinity();
     double fall = 0.0;
@@ -37,7 +37,7 @@ double largest_fall(const std::vector<double>& force) {
 int main(int count, char** words) {
     using namespace palpate;
 
-    // 1. The object. Pressed, its force falls all at once; released, it comes back elsewhere.
+    // 1. Load the object. Its press force drops suddenly; its release force rises again at another position.
     const ForceModel click = load_model_file(count > 1 ? words[1] : "examples/02_click.json").model;
     const double lower = click.domain().lower[0];
     const double upper = click.domain().upper[0];
@@ -48,13 +48,13 @@ int main(int count, char** words) {
         press.push_back(click.hysteresis()->sliding(position, +1).force);
         release.push_back(click.hysteresis()->sliding(position, -1).force);
     }
-    std::printf("the switch: the press falls by %.3f N*m, the release by %.3f N*m\n", largest_fall(press),
+    std::printf("switch: press force drops by %.3f N*m, release force by %.3f N*m\n", largest_fall(press),
                 largest_fall(release));
 
-    // 2. A knob that suits it, and a hand that presses for a second. Simulated.
+    // 2. Simulate a knob that is scaled to the model, and a hand that presses for a second.
     const TestRig rig = rig_for(click, true, DeviceProfile{}.period_s);
 
-    // 3. Is the click still there when the knob renders it? An inertia behind the coupling rings.
+    // 3. Measure the drop of the rendered force. A mass behind the coupling oscillates.
     for (const StructureKind structure :
          {StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit}) {
         SchemeChoices chosen;
@@ -64,7 +64,7 @@ int main(int count, char** words) {
         const auto turn = std::max_element(felt.position.begin(), felt.position.end());
         const std::vector<double> pressed(felt.applied.begin(),
                                           felt.applied.begin() + (turn - felt.position.begin()) + 1);
-        std::printf("%s: the press falls by %.3f N*m\n",
+        std::printf("%s: press force drops by %.3f N*m\n",
                     std::string(structure_names[static_cast<std::size_t>(structure)]).c_str(),
                     largest_fall(pressed));
     }

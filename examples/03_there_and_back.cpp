@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Story 3: a switch is recorded, identified, rendered, recorded again. Also told in 03_there_and_back.py.
+// Example 3: records, identifies and renders a switch, then records and identifies the rendered one.
+// 03_there_and_back.py does the same in Python.
 //
 //     c++ -std=c++20 -O2 -I cpp/include examples/03_there_and_back.cpp -o back && ./back examples/02_click.json
 //
-// Everything here is simulated; the text of the Python file has the commands for a real switch on a real knob.
-// Identification is the verb `palpate identify`, which must be on the PATH.
+// Everything is simulated; the Python file lists the commands for a real switch and knob. The program calls
+// `palpate identify`, which must be on the PATH.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +29,7 @@ namespace {
 using namespace palpate;
 namespace fs = std::filesystem;
 
-/// Writes a recording as a transducer reads it, in steps of 0.1 mN*m.
+/// Writes a recording; the force has the 0.1 mN*m steps of a transducer.
 void write(const fs::path& recording, const std::vector<double>& position, const std::vector<double>& force,
            double period_s) {
     std::ofstream file{recording};
@@ -54,7 +55,7 @@ double force_of(const ForceModel& model, double position, double direction) {
                                          : model.network()->at(position, {}).force;
 }
 
-/// The largest difference between two models along a stroke, over the positions that both know.
+/// Prints the largest difference between two models along a stroke, over the common part of their domains.
 void compare(const char* name, const ForceModel& real, const ForceModel& again, double direction) {
     const double lower = std::max(real.domain().lower[0], again.domain().lower[0]);
     const double upper = std::min(real.domain().upper[0], again.domain().upper[0]);
@@ -66,7 +67,7 @@ void compare(const char* name, const ForceModel& real, const ForceModel& again, 
         difference = std::max(difference, std::abs(force_of(again, position, direction) - force));
         largest = std::max(largest, std::abs(force));
     }
-    std::printf("%s: %.3f N*m apart, of %.2f N*m\n", name, difference, largest);
+    std::printf("%s: largest difference %.3f N*m of %.2f N*m\n", name, difference, largest);
 }
 
 }  // namespace
@@ -75,7 +76,7 @@ int main(int count, char** words) {
     std::string made = (fs::temp_directory_path() / "palpate-XXXXXX").string();
     const fs::path folder = mkdtemp(made.data());
 
-    // 1. Obtain data: the switch of story 2 is pressed and let go four times, slowly, under a 16-bit encoder.
+    // 1. Record the switch of example 2: press and release it four times, slowly, with a 16-bit encoder.
     const ForceModel click = load_model_file(count > 1 ? words[1] : "examples/02_click.json").model;
     const double period_s = DeviceProfile{}.period_s;
     TestRig rig = rig_for(click, true, period_s);
@@ -100,13 +101,13 @@ int main(int count, char** words) {
     std::printf("identified: %zu wavelets, %s\n", real.parameters().weight.size(),
                 real.hysteresis() != nullptr ? "press and release differ" : "one stroke");
 
-    // 3. Implement: rendered by a knob with nothing on it, in a hand that sweeps. The coupling softens the click.
+    // 3. Render the model on a free knob that a hand moves through the domain. The coupling softens the click.
     rig = rig_for(real, true, period_s);
     const double start = std::clamp(0.0, real.domain().lower[0], real.domain().upper[0]);
     const Trace rendered = simulate(real, rig.scheme(real), rig.device, rig.hand, position.size(), 20, start);
     write(folder / "rendered.csv", rendered.position, rendered.applied, period_s);
 
-    // 4. Once more, from what was felt. 5. Compare: the largest difference, stroke by stroke.
+    // 4. Identify the recording of the rendered force. 5. Compare the forces of each stroke.
     const ForceModel again = identify(folder / "rendered.csv");
     compare("press", real, again, +1);
     compare("release", real, again, -1);

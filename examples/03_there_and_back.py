@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Story 3: a switch is recorded, identified, rendered, recorded again. Also told in 03_there_and_back.cpp.
+"""Example 3: records, identifies and renders a switch, then records and identifies the rendered one.
 
 python examples/03_there_and_back.py
 
-Everything here is simulated. With a real switch on a real knob the same is five commands:
+03_there_and_back.cpp does the same in C++. Everything is simulated. The commands for a real switch and knob:
 
 palpate record real.csv --device usb --probe --upper 0.3
 palpate identify real.csv -o real.json
@@ -25,7 +25,7 @@ from palpate.verification import compare
 folder = tempfile.TemporaryDirectory()
 real_csv, rendered_csv = (Path(folder.name) / name for name in ("real.csv", "rendered.csv"))
 
-# 1. Obtain data: the switch of story 2 is pressed and let go four times, slowly, under a 16-bit encoder.
+# 1. Record the switch of example 2: press and release it four times, slowly, with a 16-bit encoder.
 switch = palpate.load_model(Path(__file__).with_name("02_click.json"))
 rig = rig_for(switch)
 time = np.arange(8000) * rig.device.period_s
@@ -43,16 +43,16 @@ real = palpate.identify(palpate.read_recording(real_csv))
 strokes = "press and release differ" if real.hysteretic else "one stroke"
 print(f"identified: {real.fit.n_wavelets} wavelets, {strokes}")
 
-# 3. Implement: rendered by a knob with nothing on it, in a hand that sweeps. The coupling softens the click.
+# 3. Render the model on a free knob that a hand moves through the domain. The coupling softens the click.
 rig = rig_for(real)
 rendered = palpate.simulate(palpate.Plan(real, rig.scheme(real)), rig.device, rig.hand, 8.0)
 replace(rendered, force=np.round(rendered.force, 4)).write(rendered_csv)
 
-# 4. Once more, from what was felt.
+# 4. Identify the recording of the rendered force.
 again = palpate.identify(palpate.read_recording(rendered_csv))
 
-# 5. Compare: the largest difference between the real force and the rendered one, stroke by stroke.
+# 5. Compare the real and the rendered force of each stroke.
 for stroke in compare(real, again):
     difference, largest = np.max(np.abs(stroke.second - stroke.first)), np.max(np.abs(stroke.first))
-    print(f"{stroke.name or 'both ways'}: {difference:.3f} N*m apart, of {largest:.2f} N*m")
+    print(f"{stroke.name or 'both strokes'}: largest difference {difference:.3f} N*m of {largest:.2f} N*m")
 folder.cleanup()

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Builds and runs every study: tools/bench.sh [FOLDER]. One JSON file each in build/bench/; figures and tables of the
-# pages go to FOLDER, build/bench by default. A benchmark whose answer is wrong fails.
+# Builds and runs every study: tools/bench.sh [FOLDER]. Writes one JSON file for each study to build/bench/, and figures
+# and tables of the pages to FOLDER (default: build/bench). Fails if a benchmark gives a wrong result.
 set -euo pipefail
 
 to=${1:-build/bench}
@@ -31,7 +31,7 @@ for source in bench/solvers/bench_*.cpp; do
         --benchmark_context=compiler="$("$compiler" --version | head -1 | tr ', ' '__')" \
         --benchmark_context=flags="${flags// /_}" --benchmark_context=processor="${processor//[ ,]/_}"
     if grep -q '"error_occurred": true' "build/bench/$name.json"; then
-        echo "$name: a benchmark gave a wrong answer" >&2
+        echo "$name: a benchmark gave a wrong result" >&2
         exit 1
     fi
 done
@@ -53,9 +53,9 @@ study limits/certificate_table build/bench/certificate_search.txt --to "$to"
 study limits/failure_maps --to "$to" --points "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')"
 study limits/prediction --to "$to"
 study plans/plan_against_trial --to "$to" --grid "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')"
-echo "Results: build/bench/*.json; two runs are compared with compare.py of Google Benchmark. Figures: $to/figures"
+echo "Results: build/bench/*.json; compare two runs with compare.py of Google Benchmark. Figures: $to/figures"
 
-echo "Lateness of the real-time loop beside cyclictest"
+echo "Lateness of the real-time loop compared with cyclictest"
 cmake --preset control >/dev/null
 cmake --build --preset control >/dev/null
 if command -v cyclictest >/dev/null; then

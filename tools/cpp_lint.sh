@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# clang-format over all C++ sources, clang-tidy over the headers and the bindings. A file that was clean is not
-# looked at again until it, a header or the settings change.
+# Runs clang-format on all C++ sources and clang-tidy on the headers and the bindings. clang-tidy checks a clean file
+# again only after the file, a header or the settings have changed.
 set -euo pipefail
 export LC_ALL=C
 
@@ -23,13 +23,13 @@ tidy() {
     [ -e "$mark" ] && return
     case $source in
     *.hpp) flags=(-- -std=c++20 -Icpp/include -x c++ -Wno-pragma-once-outside-header) ;;
-    # The analyzer follows paths; those of the bindings are pybind11's. What is deprecated the compiler says.
+    # In the bindings the analyzer would check the code of pybind11. The compiler reports deprecated calls.
     *) flags=(-p "$commands" "--checks=-clang-analyzer-*" --extra-arg=-Wno-deprecated-declarations) ;;
     esac
     if .venv/bin/clang-tidy --quiet "$source" "${flags[@]}" 2>/dev/null; then
         touch "$mark"
     else
-        echo "clang-tidy is not content with $source" >&2
+        echo "clang-tidy reports errors in $source" >&2
         return 1
     fi
 }

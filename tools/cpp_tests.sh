@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Builds and runs the C++ tests of one preset: tools/cpp_tests.sh dev|release|asan|tsan
 #
-# The sanitizers slow a program ten times and get a tenth of the cases. Below a test scale of 10 the presets of the
-# long run take a sample of the tests only, to see that they have not rotted: threads and USB under the sanitizers,
-# numbers with all optimization.
+# The sanitizers make a program ten times slower, so they run a tenth of the cases. Below a test scale of 10 the presets
+# asan, tsan and release run some tests only: threads and USB with the sanitizers, numerics with full optimization.
 set -euo pipefail
 
 preset=$1
@@ -19,7 +18,7 @@ asan | tsan)
     ;;
 release) sample=(test_compiled_network) ;;
 esac
-# The thread sanitizer of older compilers cannot cope with the address randomization of newer kernels.
+# The thread sanitizer of older compilers fails with the address randomization of newer kernels.
 if [ "$preset" = tsan ] && setarch "$(uname -m)" --addr-no-randomize true 2>/dev/null; then
     with=(setarch "$(uname -m)" --addr-no-randomize)
 fi

@@ -3,9 +3,9 @@
 
 python tools/example_output.py [--check]
 
-A comment `<!-- output: COMMAND -->` before a text block says what prints it. The commands of a page run in
-one empty folder, in their order. The check compares words exactly and numbers within 5 %; durations are not
-compared.
+A comment `<!-- output: COMMAND -->` before a text block names the command that prints it. The commands of a
+page run in one empty folder, in their order. The check compares words exactly and numbers within 5 %;
+durations are not compared.
 """
 
 import argparse
@@ -21,14 +21,14 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 BLOCK = re.compile(
-    r"(<!-- output: (?P<command>.+) -->\n```text\n)(?P<text>.*?)(?=^```$)", re.DOTALL | re.MULTILINE
+    r"(<!-- output: (?P<command>[^\n]+) -->\n```text\n)(?P<text>.*?)(?=^```$)", re.DOTALL | re.MULTILINE
 )
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 DURATION = re.compile(r"\d+(?:\.\d+)? s$", re.MULTILINE)
 
 
 def output_of(command: str, folder: str) -> str:
-    """What a command prints on standard output; several are joined by &&."""
+    """Returns the standard output of the last command of a list that is joined by &&."""
     programs = Path(sysconfig.get_path("scripts"))
     text = ""
     for part in command.split(" && "):
@@ -43,7 +43,7 @@ def output_of(command: str, folder: str) -> str:
 
 
 def alike(written: str, printed: str) -> bool:
-    """Equal words, and numbers within 5 %."""
+    """Returns true if the words are equal and the numbers agree within 5 %."""
     written, printed = (DURATION.sub("T s", text) for text in (written, printed))
     if NUMBER.sub("0", written) != NUMBER.sub("0", printed):
         return False
@@ -53,7 +53,7 @@ def alike(written: str, printed: str) -> bool:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="change nothing, fail if a block differs")
+    parser.add_argument("--check", action="store_true", help="change no file, fail if a block differs")
     check = parser.parse_args().check
     stale = 0
     for page in PAGES:

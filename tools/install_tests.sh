@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs what we ship as others would, and uses it: the headers through find_package, the wheel of `pip install .`
-# in an environment that has nothing of this folder.
+# Installs and uses the package like a user: the headers with find_package, the wheel of `pip install .` in an
+# environment that is independent of this folder.
 set -euo pipefail
 
 place=build/install
@@ -18,13 +18,13 @@ cmake --build "$place/consumer"
 echo "pip install ."
 dependencies=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 .venv/bin/python -m venv --without-pip "$place/venv"
-# numpy and the others are borrowed instead of fetched again; the editable installation, a .pth file there, stays out.
+# Uses numpy and the other dependencies of .venv. The editable installation, a .pth file there, is not visible.
 "$place/venv/bin/python" - "$dependencies" <<'PYTHON'
 import sys, sysconfig
 with open(sysconfig.get_path("purelib") + "/dependencies.pth", "w") as file:
     file.write(sys.argv[1] + "\n")
 PYTHON
-# The compiled module is the one of the editable installation: the same options, so that nothing is compiled twice.
+# The options are those of the editable installation, so that its compiled module is used again.
 .venv/bin/python -m pip --python "$place/venv/bin/python" install --quiet --no-deps --ignore-installed \
     --no-build-isolation --config-settings cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON .
 cd "$place"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How late palpate-control wakes up, beside cyclictest on the same machine at the same priority.
+"""Compares the wake-up latency of palpate-control and cyclictest on one machine with the same priority.
 
-Blocks of both alternate, on an idle machine and with every core loaded, so that what the machine does
-meanwhile happens to both. Printed: the median over the blocks of each block's p99 and p99.9, and their ratio.
+Blocks of both programs alternate, on an idle machine and with every core loaded, so other load affects both.
+Prints the medians over the blocks of p99 and p99.9, and their ratio.
 
 python tools/lateness.py PALPATE-CONTROL MODEL.json OUT.json [--seconds 20] [--blocks 10]
 """
@@ -33,7 +33,7 @@ def ours(program: Path, model: Path, seconds: float, cpu: int) -> dict[str, floa
 
 
 def theirs(seconds: float, cpu: int) -> dict[str, float]:
-    # Verbose: its histogram ends at 1 ms, and a machine that is a guest itself wakes later than that.
+    # verbose, because the histogram ends at 1 ms and a virtual machine can wake up later
     command = ["cyclictest", "-v", "-m", "-N", "-t", "1", "-a", f"{cpu}", "-p", f"{PRIORITY}"]
     command += ["-i", f"{10**6 // RATE_HZ}", "-l", f"{round(seconds * RATE_HZ)}"]
     answer = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -43,12 +43,12 @@ def theirs(seconds: float, cpu: int) -> dict[str, float]:
 
 
 def quantile(ascending: list[float], share: float) -> float:
-    """The value that a share of all does not exceed."""
+    """Returns the smallest value that at least this share of all values does not exceed."""
     return ascending[math.ceil(share * len(ascending)) - 1]
 
 
 def load() -> list[subprocess.Popen[bytes]]:
-    """One busy process for every core."""
+    """Starts one busy process for every core."""
     return [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in os.sched_getaffinity(0)]
 
 
@@ -59,7 +59,7 @@ def main() -> int:
     parser.add_argument("output", type=Path)
     parser.add_argument("--seconds", type=float, default=20.0, help="length of a block")
     parser.add_argument(
-        "--blocks", type=int, default=10, help="of each program, in each state of the machine"
+        "--blocks", type=int, default=10, help="number for each program and state of the machine"
     )
     given = parser.parse_args()
     cpu = max(os.sched_getaffinity(0))

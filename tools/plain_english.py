@@ -83,7 +83,7 @@ _WORD = re.compile(r"[A-Za-z][A-Za-z'\u2019-]*")
 _FORBIDDEN = [(re.compile(rf"\b(?:{pattern})\b", re.I), instead) for pattern, instead in INSTEAD.items()]
 _OPENINGS = [(re.compile(pattern, re.I), instead) for pattern, instead in OPENINGS.items()]
 _SENTENCE_END = re.compile(r"(?<=[.!?;:])\s+(?=[\"'`(]?[A-Z0-9`])|\n\s*\n|\n\s*[-*|]\s|\n\s*\d+\.\s")
-_SECTION = re.compile(r"^\s*(Parameters|Returns|Raises|Notes|Examples|Attributes|References|Yields)\s*\n\s*-{4,}", re.M)
+_SECTION = re.compile(r"^ *(Parameters|Returns|Raises|Notes|Examples|Attributes|Yields)\s*\n\s*-{4,}", re.M)
 
 
 class Text(NamedTuple):
@@ -108,17 +108,20 @@ def python_texts(file: Path) -> Iterator[Text]:
     documentation: set[int] = set()
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
-        for at, each in enumerate(body if isinstance(body, list) else []):
-            if isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant) and isinstance(each.value.value, str):
-                documentation.add(id(each.value))
-                yield Text(file, each.lineno, "docstring", _prose(each.value.value))
+        for each in body if isinstance(body, list) else []:
+            value = each.value if isinstance(each, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                documentation.add(id(value))
+                yield Text(file, each.lineno, "docstring", _prose(value.value))
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
             yield Text(file, node.lineno, "test name", node.name.removeprefix("test_").replace("_", " "))
     inside: set[int] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             inside.update(id(part) for part in ast.walk(node) if part is not node)
-            words = "".join(str(part.value) if isinstance(part, ast.Constant) else "N" for part in node.values)
+            words = "".join(
+                str(part.value) if isinstance(part, ast.Constant) else "N" for part in node.values
+            )
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             words = node.value
         else:
@@ -193,53 +196,53 @@ def sentences(text: Text) -> list[str]:
     return [each for each in _SENTENCE_END.split(words) if len(_WORD.findall(each)) > 1]
 
 
-def findings(text: Text) -> Iterator[str]:
-    """Yields one line for each forbidden word or opening and each long sentence."""
+def findings(text: Text) -> Iterator[tuple[str, str]]:
+    """Yields the kind and the sentence of each finding: forbidden words and openings, and long sentences."""
     for pattern, instead in _FORBIDDEN:
         for found in pattern.finditer(text.words):
-            yield f"{text.file}:{text.line}: {text.kind}: \"{' '.join(found[0].split())}\"; write: {instead}"
+            word = " ".join(found[0].lower().split())
+            yield f'"{word}"', f'"{word}" is forbidden; write: {instead}'
     if text.kind in ("comment", "docstring", "message"):
         for pattern, instead in _OPENINGS:
             if found := pattern.match(text.words):
-                yield f"{text.file}:{text.line}: {text.kind}: opens with \"{found[0]}\"; write: {instead}"
+                yield f'opening "{found[0]}"', f'opens with "{found[0]}"; begin with {instead}'
     for sentence in sentences(text):
         if (count := len(_WORD.findall(sentence))) > MOST_WORDS:
             start = " ".join(sentence.split()[:8])
-            yield f"{text.file}:{text.line}: {text.kind}: {count} words, at most {MOST_WORDS}: \"{start} ...\""
+            yield "long sentence", f'{count} words, at most {MOST_WORDS}: "{start} ..."'
 
 
 READERS = {".py": python_texts, ".cpp": cpp_texts, ".hpp": cpp_texts, ".md": page_texts}
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("files", nargs="*", type=Path)
-    parser.add_argument("--count", action="store_true", help="print only the number for each kind and pattern")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("files", nargs="*", type=Path, help="files to check; all tracked files by default")
+    parser.add_argument("--count", action="store_true", help="print the number of each kind of finding only")
     options = parser.parse_args()
-    tracked = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=True).stdout.split("\n")
-    files = options.files or [Path(name) for name in tracked if name]
-    here = Path(__file__).resolve()
+    tracked = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=True).stdout
+    files = options.files or [Path(name) for name in tracked.splitlines()]
     counts: Counter[str] = Counter()
     lengths: dict[str, list[int]] = defaultdict(list)
     for file in files:
-        if file.suffix not in READERS or file.resolve() == here or not file.exists():
+        if file.suffix not in READERS or file.name == Path(__file__).name or not file.exists():
             continue
         for text in READERS[file.suffix](file):
             lengths[text.kind] += [len(_WORD.findall(each)) for each in sentences(text)]
-            for finding in findings(text):
-                counts[finding.split(": ", 2)[1] + ": " + re.sub(r"\d+ words.*", "long", finding.split(": ", 2)[2])] += 1
+            for kind, finding in findings(text):
+                counts[f"{text.kind}: {kind}"] += 1
                 if not options.count:
-                    print(finding)
+                    print(f"{file}:{text.line}: {text.kind}: {finding}")
     if options.count:
         for name, number in counts.most_common():
             print(f"{number:6} {name}")
-    failed = sum(counts.values())
+    too_long = False
     for kind, words in sorted(lengths.items()):
-        mean = sum(words) / len(words)
-        failed += mean > MEAN_WORDS
+        mean = sum(words) / max(len(words), 1)
+        too_long |= mean > MEAN_WORDS
         print(f"{kind}: {len(words)} sentences, {mean:.1f} words on average (at most {MEAN_WORDS:g})")
     print(f"{sum(counts.values())} findings")
-    return 1 if failed else 0
+    return 1 if counts or too_long else 0
 
 
 if __name__ == "__main__":

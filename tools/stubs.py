@@ -1,42 +1,50 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the type stubs of palpate._core, or checks that those in the tree are the ones it would write.
+"""Writes the type stubs of palpate._core and the structures in the schema of model files, or checks both.
 
 python tools/stubs.py [--check]
 """
 
 import argparse
 import difflib
+import json
+import re
 import subprocess
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 MODULE = "palpate._core"
 PACKAGE = Path(__file__).parents[1] / "python" / "palpate"
 ALLOWED = Path(__file__).with_name("stubtest_allowlist.txt")
+SCHEMA = "model/model.schema.json"
+STRUCTURES = re.compile(r'(?<="Structure": {"enum": )\[.*?\]')
 LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
 
 def generated() -> dict[str, str]:
-    """The stub files as pybind11-stubgen writes them now: name below the package -> text."""
+    """Returns stub files and schema of the compiled module: name below the package -> text."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
         subprocess.run(command, check=True)
         root = Path(folder) / "palpate"
-        return {
+        stubs = {
             str(path.relative_to(root)): LICENCE + path.read_text(encoding="utf-8")
             for path in sorted(root.rglob("_core*.pyi")) + sorted(root.glob("_core/**/*.pyi"))
         }
+    structures = json.dumps(import_module(f"{MODULE}.rendering").structure_names)
+    schema = (PACKAGE / SCHEMA).read_text(encoding="utf-8")
+    return stubs | {SCHEMA: STRUCTURES.sub(structures, schema)}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="change nothing, fail where the tree differs")
+    parser.add_argument("--check", action="store_true", help="change no file, fail if the tree differs")
     check = parser.parse_args().check
 
-    stubs = generated()
+    files = generated()
     stale = 0
-    for name, text in stubs.items():
+    for name, text in files.items():
         path = PACKAGE / name
         present = path.read_text(encoding="utf-8") if path.exists() else ""
         if not check:
@@ -53,9 +61,9 @@ def main() -> int:
             )
             print("\n".join(lines))
     if stale:
-        print("The stubs do not describe the compiled module: run `make stubs`.", file=sys.stderr)
+        print("Stubs or schema do not describe the compiled module: run `make stubs`.", file=sys.stderr)
         return 1
-    # The stubs of NumPy, on which ours build, are complete from Python 3.11 on.
+    # The stubs of NumPy, which these stubs use, are complete from Python 3.11.
     if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOWED)]
         return subprocess.run(command, check=False).returncode

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs the Debian or Ubuntu packages that this machine lacks, or says in one line which ones to install.
+# Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
 #   tools/system_packages.sh PYTHON build|test|guest
 set -euo pipefail
@@ -19,8 +19,8 @@ missing_packages() {
     python_says 'import venv, ensurepip' || echo python3-venv
     python_says 'import os, sysconfig
 assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' || echo python3-dev
-    # The compiled module needs its libraries when it is built: model files, USB and the WebSocket of a Haply Inverse3.
-    # A later installation would leave a module without them.
+    # The build of the compiled module needs the libraries for model files, USB and the WebSocket of a Haply Inverse3. If
+    # they are installed later, the module lacks these functions.
     command -v pkg-config >/dev/null || echo pkg-config
     compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
     compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
@@ -29,12 +29,12 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         compiles '#include <gtest/gtest.h>' || echo libgtest-dev
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
-        # The emulated USB device of the tests.
+        # for the emulated USB device of the tests
         [ -e /usr/include/umockdev-1.0/umockdev.h ] || echo libumockdev-dev
         command -v umockdev-run >/dev/null || echo umockdev
     fi
     if [ "$purpose" = guest ]; then
-        # The small Linux in which palpate-control meets a USB device through a real kernel's drivers.
+        # for the small Linux that runs palpate-control with the USB drivers of a real kernel
         command -v qemu-system-x86_64 >/dev/null || echo qemu-system-x86
         command -v busybox >/dev/null || echo busybox-static
         command -v cpio >/dev/null || echo cpio
@@ -52,7 +52,7 @@ install() {
         as_root=(sudo -n)
     fi
     local get=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 -o DPkg::Lock::Timeout=300)
-    # The package lists are fetched only where the ones at hand do not do.
+    # Updates the package lists only if the installation with the present ones fails.
     "${get[@]}" install --yes --no-install-recommends "$@" >/dev/null 2>&1 ||
         { "${get[@]}" update >/dev/null && "${get[@]}" install --yes --no-install-recommends "$@" >/dev/null; }
 }
@@ -61,7 +61,7 @@ mapfile -t missing < <(missing_packages)
 if [ "${#missing[@]}" -gt 0 ]; then
     wanted="sudo apt-get install ${missing[*]}"
     command -v apt-get >/dev/null ||
-        refuse "palpate needs what Debian and Ubuntu call: ${missing[*]}; install it, then call make again."
+        refuse "palpate needs these packages (names of Debian and Ubuntu): ${missing[*]}; install them, then call make again."
     [ "$(id -u)" -eq 0 ] || sudo -n true 2>/dev/null ||
         refuse "palpate needs system packages: run '$wanted', then call make again."
     echo "Installing system packages: ${missing[*]}"
@@ -75,4 +75,4 @@ python_says 'import sys; assert sys.version_info >= (3, 10)' ||
     refuse "$python is $("$python" --version 2>&1), palpate needs Python 3.10 or later: make PYTHON=python3.12, for instance."
 compiles '#include <concepts>
 static_assert(std::same_as<int, int>);' ||
-    refuse "${CXX:-g++} has no C++20, palpate needs g++ 11 or clang 14 or later: make CXX=g++-12, for instance."
+    refuse "${CXX:-g++} does not support C++20, palpate needs g++ 11 or clang 14 or later: make CXX=g++-12, for instance."

@@ -4,9 +4,9 @@
 python bench/identification/compare_methods.py [P1 ...] [--draws 12] [--json FILE] [--only NAME ...]
 
 Each draw has different positions and noise. Numbers are medians of the draws; error, wavelets and parameters
-have their range beside them. All methods take their turn in every draw, so a busy machine slows all of them;
-the slowest take part in the first draws only. "over ours" is a method's fit and tuning time over palpate's
-whole time, median of the draws.
+also have their range. All methods run one after the other in every draw, so a busy machine slows all of them.
+The slowest run in the first draws only. "over ours" is the median ratio of a method's fit and tuning time to
+the time of palpate.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from bench.studies import SCALE, count, write_results
 OURS = METHODS[0].name
 
 SLOW = 5.0
-"""A method that takes this many times as long as palpate takes part in the first FEW draws only."""
+"""Time relative to palpate above which a method runs in the first FEW draws only"""
 
 FEW = 3
 
 
 def skipped(method: Method, rows: Problem) -> str | None:
-    """Returns the reason why a method does not take part in a problem, or None."""
+    """Returns the reason why a method skips a problem, or None."""
     if rows.X.shape[1] not in method.inputs:
         return "one input only"
     if len(rows.y) > method.most_rows:
@@ -70,7 +70,7 @@ def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str
 
 
 def _sits_out(theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None) -> bool:
-    """True if a method is so slow that it takes part in the first draws only."""
+    """Returns true if a method is so slow that it runs in the first draws only."""
     return len(theirs) >= FEW and ours is not None and _medians(theirs, ours)["over_ours"] > SLOW
 
 

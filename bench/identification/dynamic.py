@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures published dynamic benchmarks, one step ahead and in free run, beside published figures.
+"""Measures dynamic benchmarks one step ahead and in free run, and prints the published errors.
 
 python bench/identification/dynamic.py [SET ...] [--json FILE]     PALPATE_DATA names the folder of recordings
 
 "physical": input force = m a + f(position) or m a + f(velocity), solved for the motion. "black box": the
 next output from the last outputs and inputs. In free run only the first outputs are measured. Published
-figures are free runs; where our rows are not theirs, the line says "other rows".
+errors are free runs; "other rows" marks errors that were measured on other rows.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Set:
     skip: int = 0
     """First rows of a test that are not scored"""
     comparable: bool = True
-    """True if the published figures are of the same rows"""
+    """True if the published errors are of the same rows"""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def scored(
 
 
 def silverbox(folder: Path) -> list[Row]:
-    """An electronic oscillator with a cubic spring. The amplitude of the arrow exceeds that of the data."""
+    """Measures an electronic oscillator with a cubic spring; the arrow has the largest amplitude."""
     table = pd.read_csv(folder / "silverbox" / "silverbox_snls80mv.csv")
     u, y = table.input_V1_V.to_numpy(), table.output_V2_V.to_numpy()
     multisine, last = slice(40_650, 127_410), 8_700
@@ -124,7 +124,7 @@ def cascaded_tanks(folder: Path) -> list[Row]:
 
 
 def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
-    """Returns the study of a file without a published split: fitted on one half, tested on the other."""
+    """Returns the study of a file without a published split; fits one half and tests the other."""
 
     def rows(folder: Path) -> list[Row]:
         table = pd.read_csv(folder / "sysid_benchmarks" / file)
@@ -143,8 +143,8 @@ def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callabl
 def emps(folder: Path) -> list[Row]:
     """Identifies force = m a + f(velocity) of a drive, then simulates the motion from the force.
 
-    The force is the motor's, in both files the same multiple of its voltage. The second file tells of pulses
-    beside it, the first has none: whether the voltage holds them is decided by the drive's controller.
+    The force is that of the motor, in both files the same multiple of its voltage. Only the second file has
+    additional pulses. The controller of the drive decides if the voltage includes them.
     """
     files = {"estimation": "emps_estimation_250hz.csv", "test": "emps_validation_pulses_250hz.csv"}
     tables = {name: pd.read_csv(folder / "sysid_benchmarks" / file) for name, file in files.items()}
@@ -177,10 +177,10 @@ def emps(folder: Path) -> list[Row]:
 
 
 def holds_pulses(learned: pd.DataFrame, table: pd.DataFrame, period: float) -> bool:
-    """True if the voltage of the motor rises with the pulses beyond the command of the controller.
+    """Returns true if the voltage of the motor rises with the pulses beyond the command of the controller.
 
-    The controller, voltage over position error and both velocities, is fitted to the file without pulses; no
-    model of the motion is asked. Pulses that act on the drive from outside leave its law as it is.
+    The controller, voltage over position error and both velocities, is fitted to the file without pulses,
+    without a model of the motion. Pulses that act on the drive from outside do not change its law.
     """
 
     def wanted(rows: pd.DataFrame) -> Array:
@@ -191,7 +191,7 @@ def holds_pulses(learned: pd.DataFrame, table: pd.DataFrame, period: float) -> b
     beyond = table.motor_voltage_V.to_numpy() - wanted(table) @ law
     pulses = table.pulse_force_N.to_numpy()
     share = float(np.polyfit(pulses, beyond, 1)[0])
-    print(f"{'':20}pulses stand in the motor's voltage with {share:.2f} V of each unit", flush=True)
+    print(f"{'':20}motor voltage includes {share:.2f} V for each unit of the pulses", flush=True)
     return share > 0.5
 
 
@@ -226,7 +226,7 @@ SETS: dict[str, Callable[[Path], list[Row]]] = {
 
 
 def with_published(folder: Path, row: Row) -> Row:
-    """Returns the row with the published figures of its test set, if there are any."""
+    """Returns the row with the published errors of its test set, if there are any."""
     table = pd.read_csv(folder / "sysid_benchmarks" / "published_results.csv")
     rows = table[(table.benchmark == row.benchmark) & (table.test_set == row.test_set)]
     found = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws error over size and over time beside the other methods, from the JSON files of `make bench`.
+"""Draws error over size and over time for all methods, from the JSON files of `make bench`.
 
 python bench/identification/figures.py build/bench --to docs
 
@@ -31,10 +31,10 @@ from bench.studies import fill_tables, markdown_table
 from palpate.plotting.look import grid
 
 ANY_SIGN, EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"
-"""Suffixes of sets that are another set, fitted or read with other options."""
+"""Suffixes of sets that repeat another set with other options."""
 
 LIMIT = 1.3
-"""A file is counted if its error is more than this many times that of its splines."""
+"""Ratio of the error to that of the splines above which a file is counted."""
 
 LOOKS = (
     ("o", "black"),
@@ -50,7 +50,7 @@ Row = Mapping[str, Any]
 
 
 def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
-    """Returns the results of NAME.py and where they were measured; None if it did not run."""
+    """Returns the results of NAME.py with machine and date; None if it did not run."""
     path = folder / f"{name}.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -66,7 +66,7 @@ def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
         return None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SystemExit(
-            f"{path} is no output of bench/identification/{name}.py ({error!r}); make bench writes it"
+            f"{path} is not from bench/identification/{name}.py ({error!r}); make bench writes it"
         ) from None
 
 
@@ -80,7 +80,7 @@ def problems(rows: Sequence[Row]) -> str:
             "parameters",
             "fit [s]",
             "tuning [s]",
-            "time over ours",
+            "time / palpate",
             "draws",
         ),
         [
@@ -124,7 +124,7 @@ def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
             if finite:
                 lines.append(set_row(f"{name}, {baseline}{of}", finite, ("", "")))
     over = "worst file over its splines", "over splines with h >= 0"
-    return markdown_table(("recordings, method", "NRMSE", "parameters", "s a file", *over), lines)
+    return markdown_table(("recordings, method", "NRMSE", "parameters", "s per file", *over), lines)
 
 
 def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
@@ -191,7 +191,7 @@ def set_row(name: str, each: Sequence[Row], worst: tuple[str, str]) -> tuple[str
 
 def counts(rows: Sequence[Row]) -> str:
     return markdown_table(
-        ("claim", "right", "of"), [(row["claim"], str(row["right"]), str(row["draws"])) for row in rows]
+        ("claim", "correct", "of"), [(row["claim"], str(row["right"]), str(row["draws"])) for row in rows]
     )
 
 
@@ -205,7 +205,7 @@ def dynamic(rows: Sequence[Row]) -> str:
                 number(row["one_step"]),
                 "diverges" if math.isnan(row["free_run"]) else number(row["free_run"]),
                 row["unit"],
-                row["published"] or ("" if row["comparable"] else "other rows than ours"),
+                row["published"] or ("" if row["comparable"] else "not the same rows"),
             )
             for row in rows
         ],
@@ -230,7 +230,7 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
 
 
 def draw_reached(path: Path, rows: Sequence[Row], label: str, spent: Callable[[Row], float]) -> None:
-    """Draws the error of each method over what it spent, one panel per problem; best is at the lower left."""
+    """Draws the error of each method over its size or time, one panel per problem; lower left is best."""
     good = [row for row in rows if "nrmse" in row]
     methods = list(dict.fromkeys(row["method"] for row in good))
     problems = list(dict.fromkeys(row["problem"] for row in good))
@@ -251,7 +251,7 @@ def draw_reached(path: Path, rows: Sequence[Row], label: str, spent: Callable[[R
                     markeredgewidth=0.7,
                     label=row["method"],
                     clip_on=False,
-                    # palpate is drawn above the others
+                    # above the others
                     zorder=3 if filling == "black" else 2,
                 )
             axes.set_xscale("log")
@@ -267,7 +267,7 @@ def draw_reached(path: Path, rows: Sequence[Row], label: str, spent: Callable[[R
             axes.set_visible(False)
         for axes in panels[max(0, len(problems) - 2) : len(problems)]:
             axes.set_xlabel(label)
-        panels[0].figure.supylabel("NRMSE against the truth", fontsize=8.0)
+        panels[0].figure.supylabel("NRMSE", fontsize=8.0)
         draw_legend(panels, methods)
 
 
@@ -308,12 +308,12 @@ def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
         axes.set_ylim(*decades(error for row in rows for error in row["nrmse"]))
         grid(axes)
         axes.set_xlabel("highest frequency of the hand [Hz]")
-        axes.set_ylabel("NRMSE of f against the truth")
+        axes.set_ylabel("NRMSE of f")
         axes.figure.legend(frameon=False, loc="outside lower center", ncols=1)
 
 
 def decades(values: Iterable[float]) -> tuple[float, float]:
-    """Returns whole decades that hold all values, at least one."""
+    """Returns whole decades that contain all values, at least one."""
     exponents = [math.log10(value) for value in values]
     low, high = math.floor(min(exponents)), math.ceil(max(exponents))
     return 10.0**low, 10.0 ** max(high, low + 1)
@@ -321,7 +321,7 @@ def decades(values: Iterable[float]) -> tuple[float, float]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="where make bench left its JSON files")
+    parser.add_argument("folder", type=Path, help="folder of the JSON files of make bench")
     parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
     given = parser.parse_args(arguments)
     methods = results_of(given.folder, "compare_methods")

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the filters of the paper with matched ones on moving objects with known truth.
+"""Compares the filters of the paper with matched filters on moving objects with known force.
 
 python bench/identification/filters.py [--json FILE]
 
-The mode of the paper gets the true mass and damping, which it has to assume. The matched one identifies them.
+The mode of the paper receives the true mass and damping, because it must assume them. The matched mode
+identifies them.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Difference equations with a wavelet network in them: one step ahead, and in free run."""
+"""Fits difference equations with a wavelet network and predicts one step ahead or in free run."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from palpate._core.model import wavelet_columns
 Array = NDArray[np.float64]
 
 SWEEPS = 8
-"""Alternations between the fits of the linear part and of the network."""
+"""Number of alternating fits of the linear part and of the network"""
 
 OUTSIDE = 3.0
-"""A free run has diverged beyond this many ranges of its data."""
+"""Distance from zero at which a free run counts as diverged [ranges of its data]"""
 
 
 class Lagged:
-    """y_k = a'(y_(k-1) ... y_(k-p)) + b'(u_k ... u_(k-q)) - f(state), f a wavelet network over some lags.
+    """Models y_k = a'(y_(k-1) ... y_(k-p)) + b'(u_k ... u_(k-q)) - f(state) with a wavelet network f.
 
     With the last output as state it is physical: a discretised m a + B v + f(y) = u. Without a state it is
-    one network over all lags, the black box.
+    a black box: one network over all lags.
     """
 
     def __init__(self, outputs: int, inputs: int, state: tuple[int, ...] | None) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Methods as functions of the rows of a problem: (X, y) -> Fitted; settings from a fifth of the rows."""
+"""Provides each method as a function (X, y) -> Fitted; a fifth of the rows chooses its settings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Fitted:
 
     @property
     def seconds(self) -> float:
-        """Fit and tuning time."""
+        """Returns the time of fit and tuning."""
         return self.fit_seconds + self.tuning_seconds
 
 
@@ -56,7 +56,7 @@ class Method:
 
 
 def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
-    """Returns the fit of palpate with some options; it chooses its size by itself and needs no tuning."""
+    """Returns the fit of palpate with some options; it chooses the size automatically, without tuning."""
 
     def fit(X: Array, y: Array) -> Fitted:
         start = time.perf_counter()
@@ -168,9 +168,8 @@ def frame_pursuit(X: Array, y: Array) -> Fitted:
     for atoms_taken in (8, 16, 24, 32, 48, 64, 96, 128):
         pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=min(atoms_taken, len(y) // 3))
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", RuntimeWarning
-            )  # it says where the dictionary has no more to give
+            # warns at the end of the dictionary
+            warnings.simplefilter("ignore", RuntimeWarning)
             pursuit.fit(table[~held], y[~held])
         scores.append((float(np.mean((pursuit.predict(table[held]) - y[held]) ** 2)), atoms_taken))
     tuned = time.perf_counter()
@@ -249,4 +248,4 @@ METHODS = (
     Method("Gaussian process", gaussian_process, most_rows=500),
     Method("MARS (pyearth)", mars, most_rows=100_000),
 )
-"""palpate first. A method that is not installed is skipped, and the output says so."""
+"""The compared methods, palpate first; a method that is not installed is skipped with a message."""

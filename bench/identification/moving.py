@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated recordings of a moving object with known mass, damping and hysteresis; the sample's sensors."""
+"""Simulates recordings of a moving object with known mass, damping and hysteresis."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def moved(
     slowest_hz: float = 0.2,
     fastest_hz: float = 2.0,
 ) -> Recording:
-    """F = f(x) + m a + B v + h s, f the sample's force, along a hand's sweep whose frequency wanders.
+    """Returns F = f(x) + m a + B v + h s, with the sample's force f, along a sweep with varying frequency.
 
     mass [N*m*s^2/rad], damping [N*m*s/rad], hysteresis h [N*m] over the play of PLAY.
     """

@@ -43,7 +43,7 @@ def velocity_is_there(model: Model) -> bool:
 
 
 def recovered(model: Model) -> bool:
-    """True if mass and damping are those of the object."""
+    """Returns true if mass and damping are those of the object."""
     return (
         model.mass is not None
         and model.damping is not None
@@ -58,14 +58,14 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
         spring,
         lambda model: model.n_wavelets == 0 and model.kind == "position" and not velocity_is_there(model),
     ),
-    "velocity present: taken": (100, lambda draw: moved(draw, damping=0.03), velocity_is_there),
-    "velocity absent: refused": (100, moved, lambda model: not velocity_is_there(model)),
-    "hysteresis present: taken": (
+    "velocity present: accepted": (100, lambda draw: moved(draw, damping=0.03), velocity_is_there),
+    "velocity absent: rejected": (100, moved, lambda model: not velocity_is_there(model)),
+    "hysteresis present: accepted": (
         100,
         lambda draw: moved(draw, hysteresis=0.1),
         lambda model: model.kind == "hysteresis",
     ),
-    "hysteresis absent: refused": (
+    "hysteresis absent: rejected": (
         100,
         lambda draw: moved(draw, damping=0.03),
         lambda model: model.kind != "hysteresis",
@@ -80,23 +80,23 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
 
 
 def is_right(claim: str, draw: int) -> bool:
-    """True if the model of one draw is right."""
+    """Returns true if the model of one draw is correct."""
     _, recording, right = CLAIMS[claim]
     return right(identify(recording(draw)))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--draws", type=int, default=None, help="of each claim at most")
+    parser.add_argument("--draws", type=int, default=None, help="largest number for each claim")
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
     results = []
-    print(f"{'':44}{'right':>7}{'of':>5}", flush=True)
+    print(f"{'':44}{'correct':>7}{'of':>5}", flush=True)
     for claim, (full, _, _) in CLAIMS.items():
         draws = min(options.draws or full, count(full))
         found = Parallel(n_jobs=-1)(delayed(is_right)(claim, draw) for draw in range(draws))
         wrong = [draw for draw, each in enumerate(found) if not each]
-        told = f"  not in draws {', '.join(map(str, wrong))}" if wrong else ""
+        told = f"  wrong in draws {', '.join(map(str, wrong))}" if wrong else ""
         print(f"{claim:44}{draws - len(wrong):7d}{draws:5d}{told}", flush=True)
         results.append({"claim": claim, "right": draws - len(wrong), "draws": draws})
     write_results(options.json, results)

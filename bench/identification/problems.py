@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Six identification problems with known truth: noisy rows for the fit, noise-free rows for the test."""
+"""Provides six identification problems with known force: noisy rows for the fit, exact rows for the test."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Problem:
 def problem(name: str, draw: int = 0) -> Problem:
     """Returns one of NAMES. Positions and noise differ between draws.
 
-    Draw 0 of P4 is the uniform grid; in the other draws each inner position moves by up to half a step. Its
-    ends stay, so that no test row needs extrapolation.
+    Draw 0 of P4 is the uniform grid; in the other draws each inner position moves by up to half a step. The
+    ends do not move, because test rows must not need extrapolation.
     """
     noise = np.random.default_rng([int(name[1]), draw])
     if name in ("P1", "P6"):
@@ -84,7 +84,7 @@ def _one_input(name: str, x: Array, force, sigma: float, noise: np.random.Genera
 
 
 def hand(random: np.random.Generator, n: int, low: float, high: float) -> Array:
-    """A hand at 1 kHz: slow sweeps of wandering frequency and width with jitter, reflected at the ends."""
+    """Returns positions of a hand at 1 kHz: slow sweeps with varying frequency and width and with jitter."""
     knots = max(8, n // 1500)
     at, knot = np.arange(n), np.linspace(0, n, knots)
     frequency = np.interp(at, knot, random.uniform(0.2, 0.9, knots))
@@ -95,7 +95,7 @@ def hand(random: np.random.Generator, n: int, low: float, high: float) -> Array:
 
 
 def spring_wall(x: Array) -> Array:
-    """2 N*m/rad up to 0.4 rad, then 60 N*m/rad, the change 0.01 rad wide."""
+    """Returns a force of 2 N*m/rad up to 0.4 rad, then 60 N*m/rad; the change is 0.01 rad wide."""
     return 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
 
 
@@ -105,7 +105,7 @@ _SWITCH = CubicHermiteSpline(
 
 
 def tactile_switch(x: Array) -> Array:
-    """N over mm: a bump whose slopes have kinks, and a stop of 20 N/mm at 3.8 mm."""
+    """Returns N over mm: a bump with kinks in the slope, and a stop of 20 N/mm at 3.8 mm."""
     return _SWITCH(x) + 20.0 * 0.01 * np.logaddexp(0.0, (x - 3.8) / 0.01)
 
 

@@ -41,7 +41,7 @@ MOST_FILES = 16
 
 
 AT_TURN = 0.01
-"""Share of the travel before its end, where the direction changes."""
+"""Share of the travel before the turn"""
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,11 @@ SETS = {
 
 @dataclass(frozen=True)
 class Crossing:
-    """Rows of a recording where release was measured above press. No passive model can follow them."""
+    """Rows of a recording with release above press, which a passive model cannot fit."""
 
     floor: float
-    """NRMSE of the best force with h >= 0: both strokes as measured, their mean where they cross. It is
-    fitted to the judged rows, noise included."""
+    """NRMSE of the best force with h >= 0: the measured strokes, replaced by their mean where they cross. It
+    is fitted to the judged rows with their noise."""
     above: float
     """Largest difference of release and press [force]"""
     at_turn: Rows
@@ -121,8 +121,8 @@ def ours(
 ) -> dict[str, Any]:
     """Identifies the kept rows and tests the held-out rows of the baselines.
 
-    It is led along the whole motion, since a velocity and a play need the rows between; of the rows that are
-    held out only the force is unknown.
+    The test uses the whole motion, because velocity and play need the rows between. Only the force of the
+    held-out rows is unknown to the model.
     """
     start = time.perf_counter()
     model = palpate.identify(train, **options)
@@ -157,14 +157,14 @@ def row_of(path: Path, kind: Set) -> dict[str, Any]:
     try:
         recording = palpate.read_recording(path, **reading)
     except palpate.InputError as first:
-        # files of one folder differ in a column: the reader chooses
+        # The files of one folder have different columns, so the reader chooses.
         reading.pop("position", None)
         try:
             recording = palpate.read_recording(path, **reading)
         except palpate.InputError:
             return {"file": path.stem, "refused": str(first)}
     if "velocity" in kind.options.get("inputs", ""):
-        # derived before rows are held out: a derivative needs its neighbours in time
+        # computed before rows are held out, because a derivative needs neighbouring rows
         speed, _ = velocity(recording)
         recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
     train, _ = recording.split(EVERY)
@@ -214,7 +214,7 @@ def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _report_line(method: str, each: Sequence[Mapping[str, Any]], of: int) -> None:
-    """Prints medians, with the number of files if it is not all of them."""
+    """Prints medians, with the number of files if some are missing."""
     if each:
         told = method if len(each) == of else f"{method} ({len(each)} files)"
         nrmse, size, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
@@ -241,7 +241,7 @@ def main() -> None:
     chosen = SETS if SCALE >= 0.1 else ("switch_springs",)
     parser.add_argument("sets", nargs="*", default=list(chosen), metavar="SET ...")
     parser.add_argument(
-        "--files", type=int, default=count(MOST_FILES), help="of each set at most, evenly spread"
+        "--files", type=int, default=count(MOST_FILES), help="largest number for each set, evenly spread"
     )
     parser.add_argument("--each", action="store_true", help="print a line for each file")
     parser.add_argument("--json", type=Path, default=None)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Searches motions that take out energy, for each line of the certificate: prints the largest damping or friction at
-// which one does, over the value that the certificate requires, one row for each line and delay.
+// Searches motions that take out energy, for each line of the certificate. Prints the largest damping or friction with
+// such a motion over the certified value, one row for each line and delay.
 //
 //   certificate_search [scenes of each line] [part of a line's name]
 

@@ -39,8 +39,8 @@ namespace palpate::bench {
     return map;
 }
 
-/// True if one of several objects behind a coupling gives energy in the steady state. Each object responds like a
-/// spring with a share of the coupling stiffness, or for a negative share like a mass.
+/// Returns true if one of several objects behind a coupling gives energy in the steady state. Each object responds like
+/// a spring with a share of the coupling stiffness, or for a negative share like a mass.
 [[nodiscard]] inline bool coupling_loses_balance(VirtualCoupling coupling, const DeviceProfile& device) {
     constexpr double reach = 0.01;  // [rad]
     const double period = device.period_s;
@@ -83,9 +83,9 @@ inline constexpr double coupling_time = 0.2e-3;
         })};
 }
 
-/// Steepest falling slope of an object behind a coupling over the coupling stiffness. The device has just the damping
-/// that the coupling needs, and its force limit is never reached. The bounds are sufficient: K_c + B_c/T without
-/// mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
+/// Steepest falling slope of an object behind a coupling over the coupling stiffness. The device has exactly the
+/// damping that the coupling needs, and its force limit is never reached. The bounds are sufficient: K_c + B_c/T
+/// without mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
 [[nodiscard]] inline FailureMap falling_map(int points) {
     constexpr double width = 0.1;  // of the snap [rad]
     const double period = smooth_knob().period_s;
@@ -130,8 +130,8 @@ inline constexpr double coupling_time = 0.2e-3;
     return map;
 }
 
-/// Work of a hand that throws a free mass [J]: it deflects the coupling, waits until the mass has passed the handle,
-/// then slows it down with a force just below the device's limit. The device clips the structure's force.
+/// Work of a hand on a free mass [J]. The hand deflects the coupling, waits until the mass has passed the handle, then
+/// slows it down with a force just below the device's limit. The device clips the structure's force.
 template <Structure S>
 [[nodiscard]] double work_of_a_throw(S structure, VirtualCoupling coupling, const DeviceProfile& device,
                                      double deflection) {
@@ -163,7 +163,7 @@ template <Structure S>
     return work;
 }
 
-/// Work of a hand that throws a mass behind a coupling, over the deflection of the coupling. The force limit acts
+/// Work of a hand that accelerates a mass behind a coupling, over the deflection of the coupling. The force limit acts
 /// inside the step, on device and object, or outside, on the device only. Below 0 the hand takes out energy.
 [[nodiscard]] inline FailureMap limit_map(int points) {
     constexpr double infinite = std::numeric_limits<double>::infinity();

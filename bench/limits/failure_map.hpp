@@ -11,22 +11,22 @@
 
 namespace palpate::bench {
 
-/// The limit of one method over one quantity: measured in simulation, and given by theory.
+/// Limit of one method over one quantity, measured in simulation and computed by theory.
 struct FailureLine {
     std::string name;
     std::vector<double> at;        ///< the quantity
     std::vector<double> measured;  ///< the largest value without failure; NaN: no value failed
-    std::vector<double> theory;    ///< NaN: theory gives no limit
+    std::vector<double> theory;    ///< NaN: unlimited or unknown
 };
 
-/// Lines that share their axes.
+/// Lines with common axes.
 struct FailureMap {
     std::string name;   ///< for file names
     std::string along;  ///< the quantity on the horizontal axis, with its unit
     std::string limit;  ///< the quantity that is limited, with its unit
     std::vector<FailureLine> lines;
-    double searched = 0.0;  ///< largest value that was tried, over the theory, where no value failed
-    bool linear = false;    ///< the limit has a linear axis and may be negative
+    double searched = 0.0;  ///< largest tested value over the theory, if no value failed
+    bool linear = false;    ///< linear axis of the limit, which may be negative
 };
 
 /// Values from `first` to `last`, evenly spaced on a logarithmic axis.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures where each method fails and draws the limits beside their theory.
+"""Measures where each method fails and draws the measured and the theoretical limits.
 
 python bench/limits/failure_maps.py --to docs [--points 9]      needs build/release/bench/failure_maps
 
-Every point is a bisection over closed loops with simulated devices and hands. Writes one picture for each map
+Every point is a bisection over closed loops with simulated devices and hands. Writes one figure for each map
 and failure-maps.json to FOLDER/figures. Writes the tables of FOLDER/where-each-method-fails.md if it exists.
 """
 
@@ -111,7 +111,7 @@ def in_print(text: str) -> str:
 
 
 def map_table(shown: Map) -> str:
-    """Returns measured over theory for each line, or measured values if the theory gives none."""
+    """Returns measured over theory for each line, or measured values if the theory is unknown."""
     lines = shown["lines"]
     if not shown["linear"] and any(np.isfinite(values(line, "theory")).any() for line in lines):
         return markdown_table(
@@ -126,7 +126,7 @@ def map_table(shown: Map) -> str:
 
 
 def spread(line: Map, searched: float) -> str:
-    """Returns the least and largest ratio of measured over theory, and where no value failed."""
+    """Returns smallest and largest ratio of measured over theory, or the largest value without failure."""
     measured, theory = values(line, "measured"), values(line, "theory")
     known = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
     ratio, none = measured[known] / theory[known], f"nothing failed up to {number(searched)}"
@@ -138,7 +138,7 @@ def spread(line: Map, searched: float) -> str:
 
 def guard_table(guards: Sequence[Mapping[str, Any]]) -> str:
     return markdown_table(
-        ("guard", "cost when nothing is wrong", "what is wrong", "without", "with"),
+        ("guard", "cost without a fault", "fault: measured quantity", "without guard", "with guard"),
         [
             (
                 row["guard"],
@@ -154,11 +154,11 @@ def guard_table(guards: Sequence[Mapping[str, Any]]) -> str:
 
 
 def write(printed: Mapping[str, Any], to: Path, seconds: float) -> None:
-    """Draws and writes what the program printed, and fills the tables of the page."""
+    """Draws the maps, writes the printed numbers, and fills the tables of the page."""
     measured = {
         **where(),
         "seconds": round(seconds, 1),
-        "simulated": "device and hands are simulated; nothing here was measured on hardware",
+        "simulated": "device and hands are simulated; no number was measured on hardware",
         **printed,
     }
     for each in printed["maps"]:

@@ -57,7 +57,7 @@ namespace palpate::bench {
                     squares += tick++ >= 2 * second ? handle.velocity * handle.velocity : 0.0;
                     return true;
                 });
-            // Slower than an encoder step a second is at rest.
+            // A speed below one encoder step a second counts as at rest.
             line.measured.push_back(
                 std::max(std::sqrt(squares / static_cast<double>(second)), device.encoder_step));
             line.theory.push_back(std::numeric_limits<double>::quiet_NaN());
@@ -137,8 +137,8 @@ template <SimulatedHand H>
             {{0.0}, {0.1}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }
 
-/// Measures every guard alone, with its default setting, on the default knob: a certified click that a hand sweeps
-/// through, and the fault that the guard is for.
+/// Measures every guard alone, with its default setting, on the default knob: a hand moves through a certified click,
+/// then the fault occurs that the guard is for.
 [[nodiscard]] inline std::vector<GuardEffect> guard_effects() {
     const DeviceProfile device;
     GuardSettings settings;

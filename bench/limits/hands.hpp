@@ -6,11 +6,11 @@
 
 #include "palpate/simulation/hand.hpp"
 
-// Hands that drive a rendering to its limits.
+// Hands that test the limits of a rendering.
 
 namespace palpate {
 
-/// A passive hand: a mass on the handle, a spring and a damper to a fixed point. All zero: no hand.
+/// Passive hand: a mass on the handle, a spring and a damper to a fixed point. Without a hand all values are zero.
 struct PassiveHand {
     double stiffness = 0.0;  ///< [N/m or N*m/rad]
     double damping = 0.0;    ///< [N*s/m or N*m*s/rad]
@@ -22,12 +22,12 @@ struct PassiveHand {
     }
 };
 
-/// A hand that shakes at a share of the Nyquist frequency, where a sampled wall is half a cycle late.
+/// Hand that oscillates at a share of the Nyquist frequency. At this frequency a sampled wall is half a cycle late.
 struct ShakingHand {
     double stiffness = 0.0;  ///< of the grip [N/m or N*m/rad]
     double centre = 0.0;     ///< [m or rad]
     double amplitude = 0.0;  ///< of the target [m or rad]
-    double share = 1.0;      ///< of the Nyquist frequency; 1: to and fro in every two ticks
+    double share = 1.0;      ///< of the Nyquist frequency; 1: one cycle in two ticks
     double period_s = 1e-3;  ///< of the tick [s]
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
@@ -37,10 +37,10 @@ struct ShakingHand {
     }
 };
 
-/// A hand that extracts energy: it crosses the object's steepest part at constant speed, to and fro. There the held
-/// force lags the object's force during each tick, in both directions.
+/// Hand that extracts energy: it crosses the object's steepest part at constant speed in both directions. There the
+/// held force lags the object's force during each tick.
 struct GreedyHand {
-    double grip_damping = 1.0;  ///< how firmly it keeps its speed [N*s/m or N*m*s/rad]
+    double grip_damping = 1.0;  ///< force for each error of the speed [N*s/m or N*m*s/rad]
     double centre = 0.0;        ///< of the steepest part [m or rad]
     double reach = 0.0;         ///< to either side [m or rad]
     double speed = 0.0;         ///< [m/s or rad/s]
@@ -54,19 +54,19 @@ struct GreedyHand {
     }
 };
 
-/// A hand so firm that it alone determines the motion of the handle: from sample to sample of a sinusoid,
+/// Hand so firm that it determines the motion of the handle, which follows the samples of a sinusoid:
 ///
 ///     x_k = x_0 + reach (1 - cos(pi k turns / ticks)) / 2.
 ///
-/// With 1 tick from turn to turn it moves at the Nyquist frequency, with many it is slow. Several turns give frequencies
-/// between those of whole ticks.
+/// A turn is a reversal. With 1 tick between turns the hand moves at the Nyquist frequency. Several turns in `ticks`
+/// give frequencies between those of whole ticks.
 struct PacingHand {
-    double reach = 0.0;      ///< from turn to turn [m or rad]
-    int ticks = 1;           ///< of `turns` turns, at least 1
-    double firmness = 1e6;   ///< far above every damping of device and object [N*s/m or N*m*s/rad]
-    double period_s = 1e-3;  ///< of the tick [s]
-    int rests = 1;           ///< ticks before the first way, while the object is put under the handle
-    int turns = 1;           ///< from 1 to ticks
+    double reach = 0.0;      ///< Distance between two turns [m or rad].
+    int ticks = 1;           ///< Number of ticks of `turns` turns, at least 1.
+    double firmness = 1e6;   ///< Far above every damping of device and object [N*s/m or N*m*s/rad].
+    double period_s = 1e-3;  ///< Of the tick [s].
+    int rests = 1;           ///< Ticks before the first motion, while the object is placed at the handle.
+    int turns = 1;           ///< From 1 to ticks.
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         const double tick = std::round(time / period_s) - rests;

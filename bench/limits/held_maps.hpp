@@ -25,8 +25,8 @@ namespace palpate::bench {
     return device;
 }
 
-/// True if a directly rendered spring oscillates with growing amplitude with a hand so heavy that the phase advances
-/// by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. It fails just above the bound.
+/// Returns true if a directly rendered spring oscillates with growing amplitude with a heavy hand. The phase advances
+/// by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails just above the bound.
 [[nodiscard]] inline bool spring_swings_up(const DeviceProfile& device, double stiffness) {
     constexpr double late_phase = 0.03;  // [rad]
     constexpr double radians = 1000.0;   // of the simulated oscillation
@@ -37,14 +37,14 @@ namespace palpate::bench {
     return oscillates_with(Direct{LinearObject{stiffness}}, device, heavy, stiffness, ticks);
 }
 
-/// Stiffness of the stiffest spring that is certified for a device without steps. The damping that it needs is
-/// proportional to its slope.
+/// Stiffness of the stiffest spring that is certified for a device without steps. The required damping is proportional
+/// to the slope.
 [[nodiscard]] inline double direct_limit(const DeviceProfile& device) {
     return device.viscous_damping / (device.longest_period_s() * device_need(device, {1.0, 0.0}));
 }
 
 /// Measures a limit over the damping of the device, one line for each delay. `limit(device)` is the theory;
-/// `fails(device, stiffness)` is searched up to `reach` times that.
+/// `fails(device, stiffness)` is searched up to `reach` times the theory.
 template <class Limit, class Fails>
 [[nodiscard]] std::vector<FailureLine> lines_over_damping(int points, double reach, Limit limit,
                                                           Fails fails) {
@@ -70,7 +70,7 @@ template <class Limit, class Fails>
             lines_over_damping(points, 10.0, direct_limit, spring_swings_up)};
 }
 
-/// Returns travels over the edge between two encoder counts, for which friction, damping or the encoder dominates.
+/// Returns lengths of a motion over the edge between two encoder counts. Friction, damping or the encoder dominates.
 /// Most are far below a count.
 [[nodiscard]] inline std::vector<double> ways_over_an_edge(const DeviceProfile& device) {
     const double balance = device.coulomb_friction * device.period_s / device.viscous_damping;
@@ -108,7 +108,7 @@ template <class Limit, class Fails>
 }
 
 /// Hysteresis h of a spring over the play radius. While the play operator sticks the slope is g' + h/r, and
-/// b >= T (g' + h/r) (1/2 + n_d). Without the term h/r there would be no limit.
+/// b >= T (g' + h/r) (1/2 + n_d). Without the term h/r the hysteresis would be unlimited.
 [[nodiscard]] inline FailureMap play_map(int points) {
     constexpr double spring = 10.0;  // g' [N*m/rad]
     FailureMap map{"play", "play radius r [rad]", "hysteresis h [N*m]", {}};
@@ -126,13 +126,12 @@ template <class Limit, class Fails>
     return map;
 }
 
-/// Stiffness of the stiffest spring that is certified for a device without steps if the force is that of a predicted
-/// position.
+/// Stiffness of the stiffest spring that is certified for a device without steps and the force at a predicted position.
 [[nodiscard]] inline double predicted_limit(const DeviceProfile& device, int predict) {
     return device.viscous_damping / (device.longest_period_s() * predicted_need(device, predict, {1.0, 0.0}));
 }
 
-/// True if a firm hand takes out energy in the steady state at one of 60 frequencies up to the Nyquist frequency.
+/// Returns true if a firm hand takes out energy in the steady state at one of 60 frequencies up to the Nyquist one.
 [[nodiscard]] inline bool predicted_spring_generates(const DeviceProfile& device, int predict,
                                                      double stiffness) {
     constexpr int frequencies = 60;
@@ -172,8 +171,8 @@ template <class Limit, class Fails>
     return map;
 }
 
-/// Stiffness of a spring that does not oscillate with growing amplitude, over the mass of a passive hand. The theory
-/// is the bound for every hand, so the map shows how much of it one known hand leaves unused.
+/// Stiffness of a spring without growing oscillation over the mass of a passive hand. The theory is the bound for every
+/// hand, so the map shows the margin of a given hand.
 [[nodiscard]] inline FailureMap hand_map(int points) {
     FailureMap map{"hand", "mass of the hand [kg*m^2]", "stiffness K [N*m/rad]", {}};
     map.searched = 40.0;

@@ -35,7 +35,7 @@ from palpate.plotting.look import grid
 from palpate.recording.sample import sample_recording
 
 PREDICTIONS = (0, 1, 2, 4, 8, 16)
-"""Numbers of samples that are compared; 0 is no prediction."""
+"""Compared numbers of samples; 0 is rendering without prediction"""
 
 ERRORS = ("mean", "band", "end", "work")
 STEEPEST = 45.0
@@ -67,7 +67,7 @@ class PredictionGain:
 
     @property
     def name(self) -> str:
-        """The number of samples, or "none"."""
+        """Returns the number of samples, or "none"."""
         return str(self.samples) if self.samples else "none"
 
     def as_json(self) -> dict[str, Any]:

@@ -13,7 +13,7 @@
 
 namespace palpate::bench {
 
-/// True if the branch of the solution depends on the start of the search.
+/// Returns true if the branch of the solution depends on the start of the search.
 [[nodiscard]] inline bool jumps_branches(double p, double falling) noexcept {
     constexpr int lines = 400;
     const SnappingObject object{falling, 0.1};
@@ -29,7 +29,7 @@ namespace palpate::bench {
     return false;
 }
 
-/// True if the fixed-point iteration y <- (q - f(y)) / p diverges for a spring.
+/// Returns true if the fixed-point iteration y <- (q - f(y)) / p diverges for a spring.
 [[nodiscard]] inline bool iteration_diverges(double p, double stiffness) noexcept {
     constexpr int most = 100'000;
     double y = 1.0;
@@ -72,7 +72,7 @@ namespace palpate::bench {
     constexpr double period = 1e-3;
     constexpr VirtualCoupling coupling;
     const double beta = coupling.damping / period;
-    FailureMap map{"pole", "stiffness K [N*m/rad]", "displacement over that a tick before", {}};
+    FailureMap map{"pole", "stiffness K [N*m/rad]", "ratio of the displacements of two ticks", {}};
     map.linear = true;
     const auto left = [](auto structure) {
         structure.reset(0.0);

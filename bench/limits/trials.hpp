@@ -17,7 +17,7 @@
 
 namespace palpate::bench {
 
-/// f = stiffness x. Every bound of it is known.
+/// f = stiffness x, an object with known bounds.
 struct LinearObject {
     using State = Stateless;
     double stiffness = 0.0;
@@ -56,19 +56,19 @@ struct StraightCurve {
     [[nodiscard]] bool extrapolated(double /*x*/) const noexcept { return false; }
 };
 
-/// f = g x + s h: a spring with an even loss.
+/// f = g x + s h: a spring with constant hysteresis.
 using EvenHysteresis = HysteresisPair<StraightCurve>;
 
 static_assert(Environment<LinearObject> && Environment<EvenHysteresis> && Environment<SnappingObject>);
 
 inline constexpr double not_finite = std::numeric_limits<double>::infinity();
 
-/// Detects a growing oscillation: the largest value of the last quarter of a motion exceeds that of the second.
+/// Detects a growing oscillation: the largest value in the last quarter of a motion exceeds that in the second quarter.
 class Growth {
   public:
     explicit Growth(std::size_t ticks) noexcept : ticks_{ticks} {}
 
-    /// Returns false if the motion need not be continued.
+    /// Returns false if the motion can be stopped.
     [[nodiscard]] bool add(double quantity) noexcept {
         const std::size_t quarter = std::min<std::size_t>(3, 4 * tick_ / ticks_);
         ++tick_;
@@ -90,7 +90,7 @@ class Growth {
     bool broke_ = false;
 };
 
-/// True if a structure that is driven by a force oscillates with growing amplitude after a push.
+/// Returns true if a structure that is driven by a force oscillates with growing amplitude after a push.
 template <Structure S>
 [[nodiscard]] bool oscillates_force_driven(S structure, std::size_t ticks) noexcept {
     structure.reset(0.0);
@@ -107,7 +107,7 @@ template <Structure S>
 
 inline constexpr Guards unguarded{.limit = {1e9}};
 
-/// True if a passive hand and the object, a spring of this stiffness around 0, oscillate with growing amplitude.
+/// Returns true if a passive hand and the object, a spring around 0, oscillate with growing amplitude.
 template <Structure S>
 [[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
                                    double stiffness, std::size_t ticks) {
@@ -129,7 +129,7 @@ struct PacedWork {
     double whole = 0.0;     ///< [J]
     double rounding = 0.0;  ///< bound of its rounding error [J]
 
-    /// True if the hand takes out energy in the steady state.
+    /// Returns true if the hand takes out energy in the steady state.
     [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
 };
 
@@ -157,7 +157,7 @@ template <Structure S>
 /// Ticks of half a period of the pacing hands, from the Nyquist frequency down.
 inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
 
-/// True if a hand takes out energy in the steady state at one of the paces.
+/// Returns true if a hand takes out energy in the steady state at one of the paces.
 template <class Build>
 [[nodiscard]] bool loses_balance(Build build, const DeviceProfile& device, double reach) {
     return std::any_of(paces.begin(), paces.end(), [&](int pace) {

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the plan of each object with the best structure that trial finds.
+"""Compares the plan of each object with the best structure of an exhaustive trial.
 
     python bench/plans/plan_against_trial.py --to docs [--seconds 2] [--switches 5] [--grid 4]
 
-Every structure, with and without compensation, over a grid of couplings, masses and dampings, is rendered on
-three devices in closed loop, with the identified model and with the one whose slopes the plan limited. The
-objects are a spring that meets a wall, a switch that snaps through and, if PALPATE_DATA names the measured
-data, real keyboard switches. The error is the RMS of the commanded force less the force of the identified
-model at the handle at the end of the tick, while a hand sweeps the domain to and fro. Then hands without
-damping press where the object is steepest.
+The trial renders every structure in closed loop on three devices, with and without compensation, over a grid
+of couplings, masses and dampings. It uses the identified model and, if the plan limited its slopes, also the
+limited model. The objects are a spring with a wall, a switch that snaps through and, if PALPATE_DATA names
+the measured data, real keyboard switches. The error is the RMS of the commanded force minus the force of the
+identified model at the handle at the end of the tick, while a hand moves through the domain. Then hands
+without damping press on the steepest part of the object.
 
 Prints the tables of FOLDER/plan-against-trial.md, writes them there if that page exists, and writes all
 numbers to FOLDER/figures/plan-against-trial.json. Exits with 1 if a plan does not come to rest or is worse
@@ -43,12 +43,12 @@ ERRORS = (
 WEAK = (
     "object",
     "device",
-    "loss, RMS [% of range]",
+    "force error, RMS [% of range]",
     "largest",
-    "travel left alone [%]",
-    "departure there",
-    "the plan",
-    "plain direct",
+    "travel with unchanged force [%]",
+    "largest error there",
+    "plan",
+    "direct",
 )
 
 
@@ -79,8 +79,8 @@ def tables(rows: list[Row], left_out: str) -> dict[str, str]:
                     f"{percent * row.loss_largest:.3g}",
                     f"{100.0 * row.kept:.0f}",
                     f"{percent * row.kept_departure:.2g}",
-                    "shakes" if row.shakes else "rests",
-                    "shakes" if row.direct_shakes else "rests",
+                    "oscillates" if row.shakes else "at rest",
+                    "oscillates" if row.direct_shakes else "at rest",
                 )
             )
     measured = where()
@@ -116,7 +116,8 @@ def main() -> int:
     fill_tables(given.to / "plan-against-trial.md", written)
     missed = [row for row in rows if not row.ratio <= WORST_RATIO or row.shakes]
     for row in missed:
-        print(f"{row.object} on {row.device}: the plan misses", file=sys.stderr)
+        why = "does not come to rest" if row.shakes else f"exceeds {WORST_RATIO} times the best error"
+        print(f"{row.object} on {row.device}: the plan {why}", file=sys.stderr)
     return 1 if missed else 0
 
 

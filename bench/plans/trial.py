@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the plan of one object on one device with the best structure that trial finds."""
+"""Compares the plan of one object on one device with the best structure of a trial."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from palpate._core.simulation import motion_driven, simulate
 from palpate._core.stability import certify, force_bounds
 from palpate.identification.network.constraints import slope_limited
 from palpate.planning import Plan
-from palpate.planning.choices import renderable_slopes
+from palpate.planning.limited_network import renderable_slopes
 from palpate.recording import Recording
 
 SAMPLES = 1001
@@ -62,7 +62,7 @@ class Row:
     kept: float | None
     """Share of the travel without a limited slope"""
     kept_departure: float | None
-    """Largest difference of rendered and identified force there"""
+    """Largest force error there"""
 
     @property
     def ratio(self) -> float:
@@ -86,7 +86,7 @@ def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ..
 
 
 def measured_switches(wanted: int) -> list[Path]:
-    """Returns files spread over the measured switches; none without measured data."""
+    """Returns evenly spaced files of the measured switches; an empty list without measured data."""
     given = os.environ.get("PALPATE_DATA")
     files = sorted((Path(given) / "keyswitches").glob("*.csv")) if given else []
     return files[:: max(1, len(files) // max(1, wanted))][:wanted]
@@ -100,7 +100,7 @@ def strokes(model: Model, x: np.ndarray) -> np.ndarray:
 
 
 def sweep(model: Model, device: DeviceProfile) -> Hand:
-    """Returns a hand that sweeps the domain to and fro, as far as the force of the device allows."""
+    """Returns a hand that moves through the domain, up to 80 % of the force limit of the device."""
     lower, upper = float(model.lower[0]), float(model.upper[0])
     x = np.linspace(lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower), 500)
     force = strokes(model, x)[0]
@@ -131,9 +131,9 @@ def error(
 
 
 def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile) -> bool:
-    """True if a push keeps a hand without damping moving that presses the steepest part of the object.
+    """Returns True if a hand without damping on the steepest part keeps oscillating after a push.
 
-    One hand has no mass, and one is so heavy that a force comes 0.03 rad of the swing late.
+    One hand is massless. The other is so heavy that the force is 0.03 rad of the oscillation late.
     """
     lower, upper = float(model.lower[0]), float(model.upper[0])
     x = np.linspace(lower, upper, SAMPLES)
@@ -179,8 +179,10 @@ def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) ->
 
 
 def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
-    """Returns the share of the travel where no slope is limited, and the largest difference of rendered and
-    identified force there. h / r counts as slope."""
+    """Returns the share of the travel without a limited slope, and the largest force error there.
+
+    h / r counts as slope.
+    """
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
     stick = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
     low, high = renderable_slopes(device, stick, model)
@@ -189,7 +191,7 @@ def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, floa
     for force in forces:
         nearest = slope_limited(x, force, low, high)
         unchanged &= np.abs(nearest - force) <= 1e-6 * np.ptp(force)
-    # Kinks are rounded over 0.5 % of the travel: six of these do not count as unchanged.
+    # Kinks are rounded over 0.5 % of the travel, so six times this length does not count as unchanged.
     margin = round(0.03 * SAMPLES)
     unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
     departure = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)
@@ -210,7 +212,7 @@ def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid
         try:
             known = not certify(shown, scheme, device).refused
         except ValueError:
-            continue  # impossible: a compensated model that is too steep for its coupling
+            continue  # a compensated model can be too steep for its coupling
         found = error(model, shown, scheme, device, hand, seconds), scheme.structure + words
         if known:
             proved = min(proved, found)

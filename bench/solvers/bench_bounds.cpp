@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time of a proved slope bound, and its excess over a dense search: networks of one and two inputs, also with weights
-// of a million that cancel.
+// Measures the time of a proved slope bound and its excess over a dense search, for networks of one and two inputs.
+// Some networks have weights of a million that cancel.
 
 #include <algorithm>
 #include <cmath>
@@ -65,7 +65,7 @@ void slope_bound(benchmark::State& state) {
     bound(state, random_network(static_cast<std::size_t>(state.range(0)), 1, 50.0));
 }
 
-/// Every other wavelet cancels the one before it up to a millionth.
+/// Returns a network in which every second wavelet cancels the previous one up to a millionth.
 NetworkParameters cancelling(NetworkParameters network) {
     const std::size_t d = network.dimension;
     for (std::size_t i = 0; i + 1 < network.weight.size(); i += 2) {

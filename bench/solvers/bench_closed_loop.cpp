@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ticks a second of object, guards, device and hand in virtual time with every joule accounted for, 20 substeps
-// a tick. A run whose account does not close to rounding is a wrong answer.
+// Measures simulated ticks for each second, with object, guards, device, hand and energy account, 20 substeps a tick.
+// A run fails if its energy account does not close up to rounding.
 
 #include <cmath>
 #include <utility>

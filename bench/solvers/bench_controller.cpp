@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole tick of the controller without its device: reading checked, force rendered, limited and slewed, with the
-// default solver of the loop. The device plays a recorded motion back and costs nothing. Beside the mean stand the
-// median and the 99.9th percentile of single ticks, less the time of the clock.
+// Measures a whole tick of the controller: check of the reading, force with the default solver, force and slew limit.
+// The device plays back a recorded motion and takes no time. Counters are the median and the 99.9th percentile of
+// single ticks, minus the time of the clock.
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,7 @@
 
 namespace {
 
-/// Plays a motion back repeatedly.
+/// Plays back a motion repeatedly.
 class Playback {
   public:
     explicit Playback(std::vector<double> motion) : motion_{std::move(motion)} {}

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Value and slope of a network: what one evaluation takes on a dependent chain, as a solver asks for it, and
-// what a sample costs in a batch. References: the plain loop over std::exp, a lookup table
-// with linear interpolation and a cubic spline, both of 4096 cells. Every line shows its largest error.
+// Measures value and slope of a network: time of one evaluation on a dependent chain, as in a solver, and time of a
+// sample in a batch. References: the plain loop over std::exp, a lookup table with linear interpolation and a cubic
+// spline, both with 4096 cells. Every line shows its largest error.
 
 #include <cmath>
 #include <string>
@@ -109,7 +109,7 @@ struct CubicSpline : Nodes {
     }
 };
 
-/// Largest deviation from the exp loop; the benchmark fails where it is more than the method promises.
+/// Checks the largest deviation from the exp loop; the benchmark fails above the error that the method promises.
 template <class Method>
 void assert_answer(benchmark::State& state, const palpate::WaveletNetwork& network, const Method& method) {
     const ExpLoop exact{network};
@@ -133,7 +133,7 @@ void latency(benchmark::State& state) {
         const Answer answer = method(x);
         x = 0.3 + 0.01 * (answer.value + 1e-9 * answer.slope);
     }
-    benchmark::DoNotOptimize(x);  // after the loop: within it, x would make its way through memory
+    benchmark::DoNotOptimize(x);  // not in the loop, because it would store x in memory at every step
     assert_answer(state, network, method);
 }
 
@@ -154,7 +154,7 @@ void throughput(benchmark::State& state) {
     assert_answer(state, network, method);
 }
 
-/// The batch that Python's arrays go through.
+/// Batch evaluation, which Python uses for arrays.
 void throughput_batch(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     const std::vector<double> motion = palpate::bench::hand_motion(4000);
@@ -176,7 +176,7 @@ void throughput_batch(benchmark::State& state) {
     }
 }
 
-/// A network of several inputs, value and gradient, and the plain loop.
+/// Network of several inputs, value and gradient, and the plain loop.
 struct Radial {
     palpate::RadialNetwork network;
 
@@ -238,7 +238,7 @@ void latency_of_inputs(benchmark::State& state) {
     }
 }
 
-/// Cost of loading a model: the table and its certificate.
+/// Time of loading a model: the table and its certificate.
 void compile(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     for (auto _ : state) {

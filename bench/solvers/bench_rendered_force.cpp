@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rendered force against time, for every structure and solver: a click and a wall on a simulated knob, a hand
-// that presses through both. Beside the time of a step along that motion stand the RMS force errors of
-// palpate/simulation/force_error.hpp: at the end of a tick, at its sampling instant, of its mean, and of that below 50 Hz.
+// Measures force error and time of every structure and solver. A hand presses through a click and a wall on a simulated
+// knob. Counters are the RMS force errors of palpate/simulation/force_error.hpp: at the end of a tick, at its sampling
+// instant, of its mean, and of the mean below 50 Hz.
 
 #include <cmath>
 #include <cstddef>
@@ -109,7 +109,7 @@ Felt closed_loop(S structure) {
     return felt;
 }
 
-/// `expected` is the error at the end of a tick [N*m] of the structure, for every solver.
+/// `expected` is the error of the structure at the end of a tick [N*m], equal for every solver.
 template <class S>
 void tick(benchmark::State& state, const S& initial, double expected) {
     const Felt felt = closed_loop(initial);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of every structure along a hand's motion, state carried from step to step, on a spring that meets a
-// wall and through two clicks that a soft coupling snaps through. Beside the time stand the error of the rendered
-// force against f at the handle, the evaluations a step, and how far the environment's position strays from that
-// of the same structure solved by a search over the network itself: more than 1e-12 of the travel is wrong.
+// Measures one step of every structure along the motion of a hand, with the state of the previous step. The objects are
+// a spring with a wall and two clicks that snap through with a soft coupling. Counters are the error of the rendered
+// force against f at the handle, the evaluations a step, and the position error against a search over the network.
+// A position error above 1e-12 of the travel is a failure.
 
 #include <algorithm>
 #include <cmath>
@@ -34,7 +34,7 @@ using palpate::WaveletNetwork;
 
 constexpr double period = 1e-3;
 
-/// An object with a coupling and an inertia. In the scene of the clicks only the explicit step has one solution.
+/// Object with a coupling and an inertia. In the scene of the clicks only the explicit step has one solution.
 struct SpringWall {
     static constexpr VirtualCoupling coupling{100.0, 0.02};
     static constexpr Inertia inertia{0.001, 0.5};
@@ -88,7 +88,7 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
     }
 }
 
-/// A search over the sum of wavelets with steps short enough to miss no root.
+/// Search over the sum of wavelets; the steps are short enough to find every root.
 LoadLineSolver reference_solver() {
     LoadLineSolver solver;
     solver.longest_step = 0.002;
@@ -121,11 +121,11 @@ void massless(benchmark::State& state, const WaveletNetwork& object, const Solve
          palpate::Massless{object, Scene::coupling, period, reference_solver()}, exactly);
 }
 
-/// The reference: nothing to solve, and the table of f that the others use.
+/// The reference: an explicit step, with the same table of f.
 template <class Scene>
 void explicit_step(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
-    // Whatever the scene, an inertia with which the explicit step is stable.
+    // With this inertia the explicit step is stable in every scene.
     const auto over = [&](const auto& environment) {
         return palpate::Explicit{environment, SpringWall::inertia, Scene::coupling, period};
     };
@@ -139,7 +139,7 @@ void implicit_table(benchmark::State& state) {
                     Resolvent{object.curve(), implicit_slope<Scene>()});
 }
 
-/// Newton's method in certified cells, with its predictor; through a snap-through in the brackets of the branches.
+/// Newton's method in certified cells, with predictor; at a snap-through in the brackets of the branches.
 template <class Scene>
 void implicit_newton(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
@@ -152,14 +152,14 @@ void implicit_newton(benchmark::State& state) {
     }
 }
 
-/// The same, over the sum of wavelets itself.
+/// The same, over the sum of wavelets.
 void implicit_newton_network(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, object,
                          CertifiedSolver{palpate::piecewise(object.curve()), implicit_slope<SpringWall>()});
 }
 
-/// Newton's method as in a textbook: from the last position until the step is small.
+/// Plain Newton's method, from the last position until the step is small.
 void implicit_textbook(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, CompiledNetwork{object}, LoadLineSolver{});
@@ -220,7 +220,7 @@ void substepped(benchmark::State& state) {
     step(state, object, over(CompiledNetwork{object}), over(object), exactly);
 }
 
-/// Cost of loading: the tables and their certificates.
+/// Time of loading: the tables and their certificates.
 template <class Scene>
 void build(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work against precision: a mass behind the coupling follows a hand's motion, by every time step, with periods
-// from 4 ms to 1/16 ms. The truth is the solution of m y'' = K_c (x - y) + B_c (x' - y') - f(y) - B_o y' by
-// Runge-Kutta steps of 1/1024 ms. Beside the time of a step stands the error of the motion; a time step
-// must diverge exactly where its limit lies.
+// Measures time and error of every integration method with periods from 4 ms to 1/16 ms. A mass behind the coupling
+// follows the motion of a hand. The exact motion is the solution of
+// m y'' = K_c (x - y) + B_c (x' - y') - f(y) - B_o y' by Runge-Kutta steps of 1/1024 ms. A method must diverge exactly
+// beyond its stability limit.
 
 #include <cmath>
 #include <cstddef>
@@ -29,17 +29,17 @@ using palpate::CompiledNetwork;
 constexpr palpate::VirtualCoupling coupling{100.0, 0.02};
 constexpr palpate::Inertia inertia{0.001, 0.5};
 constexpr double duration_s = 2.0;
-constexpr double settled_s = 0.2;  // what the start from rest leaves behind has died away by then
+constexpr double settled_s = 0.2;  // the transient of the start has decayed
 constexpr std::int64_t longest_ns = 4'000'000;
 constexpr std::int64_t shortest_ns = 62'500;
-constexpr int truth_steps = 64;  // of the truth, in each shortest period
+constexpr int truth_steps = 64;  // of the exact motion, in each shortest period
 
 const CompiledNetwork& object() {
     static const CompiledNetwork compiled{palpate::bench::spring_and_wall(16)};
     return compiled;
 }
 
-/// A hand that presses through the whole object, shaking a little: position and velocity.
+/// Returns position and velocity of a hand that presses through the whole object with a small oscillation.
 struct Motion {
     double position;
     double velocity;
@@ -84,7 +84,7 @@ const std::vector<double>& truth() {
     return solution;
 }
 
-/// RMS of y_k - y(t_k) once settled; infinity if the motion diverges.
+/// Returns the RMS of y_k - y(t_k) after settling; infinity if the motion diverges.
 template <class S>
 double motion_error(S structure, std::int64_t period_ns) {
     const auto stride = static_cast<std::size_t>(period_ns / shortest_ns);
@@ -128,7 +128,7 @@ void step(benchmark::State& state, Make make, double error_per_s, std::int64_t l
     for (auto _ : state) {
         benchmark::DoNotOptimize(structure.step(motion[k]));
         if (++k == motion.size()) {
-            // A motion that runs away must not end in numbers that are slow to compute with.
+            // A diverging motion must not reach values that slow down the computation.
             k = 0;
             structure.reset(motion.front());
         }

@@ -17,7 +17,7 @@ import scipy
 from bench.studies import SCALE, commit, write_json
 
 REPETITIONS = 9
-"""Blocks of each call; another load of the machine affects all calls alike."""
+"""Number of blocks of each call; the blocks of all calls alternate, so a changing load affects all calls."""
 
 
 def scaled(seconds: float) -> float:

@@ -3,8 +3,8 @@
 
 python bench/solvers/model_error.py FILE.json
 
-Wavelet networks grown to N wavelets, and the baselines over their settings, on two problems with known truth.
-An evaluation is one of 10^4 positions in an array, one thread.
+Compares wavelet networks of at most N wavelets and the baselines with several settings on two problems with
+known force. An evaluation is one of 10^4 positions in an array, on one thread.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures a prediction from Python beside NumPy and SciPy: python bench/solvers/python_calls.py FILE.json
+"""Compares the time of a prediction with NumPy and SciPy: python bench/solvers/python_calls.py FILE.json
 
-One position as a number, and 10^6 in an array. Yardsticks: a lookup table of 64 entries, and a cubic spline
-through them. The model's answer is compared with eq. 4 in NumPy.
+Predicts one position as a number, and 10^6 in an array. The references are a lookup table of 64 entries and a
+cubic spline through them. The prediction is checked against eq. 4 in NumPy.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints each required ratio beside its measured value: python bench/solvers/ratios.py build/bench
+"""Prints each measured ratio with the required one: python bench/solvers/ratios.py build/bench
 
-Times are medians over the interleaved repetitions of one run: both sides of a ratio have the same load.
+Times are medians over the interleaved repetitions of one run, so both sides of a ratio have the same load.
 """
 
 import sys
@@ -40,7 +40,7 @@ def spread(names: list[str]) -> Callable[[Runs], float]:
 
 
 def worst(prefix: str, key: str) -> Callable[[Runs], float]:
-    """Largest value of a counter over the benchmarks whose name begins with the prefix."""
+    """Returns the largest value of a counter over all benchmarks with this prefix."""
     return lambda run: max(row[key] for name, row in run.items() if name.startswith(prefix) and key in row)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the JSON files of `make bench`: one median of each benchmark."""
+"""Reads the JSON files of `make bench` and computes the median of each benchmark."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class BenchmarkResults:
     Raises
     ------
     SystemExit
-        The file is missing or has another format, or the answer of a benchmark was wrong.
+        The file is missing or has another format, or the result of a benchmark was wrong.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
@@ -33,35 +33,35 @@ class BenchmarkResults:
             raise SystemExit(f"{self.path} does not exist; make bench writes it") from None
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise SystemExit(
-                f"{self.path} is no output of Google Benchmark in JSON ({error}); make bench writes it"
+                f"{self.path} is not JSON output of Google Benchmark ({error}); make bench writes it"
             ) from None
         repetitions: dict[str, list[Row]] = {}
         for row in rows:
             if row.get("error_occurred"):
                 raise SystemExit(
-                    f"{self.path}: {row['name']} gave a wrong answer ({row.get('error_message')}); "
-                    "only right ones are drawn"
+                    f"{self.path}: {row['name']} gave a wrong result ({row.get('error_message')}); "
+                    "only correct results are drawn"
                 )
             if row.get("run_type", "iteration") == "iteration":
                 repetitions.setdefault(str(row.get("run_name", row["name"])), []).append(row)
         self.rows: list[Row] = [
             {**rows[0], **_medians(rows), "name": name} for name, rows in repetitions.items()
         ]
-        # in the order of the source: interleaved repetitions come in any order
+        # Interleaved repetitions come in any order.
         self.rows.sort(key=lambda row: (row.get("family_index", 0), row.get("per_family_instance_index", 0)))
 
     def number(self, row: Row, key: str) -> float:
         """Returns a counter of one benchmark."""
         value = row.get(key)
         if not isinstance(value, (int, float)):
-            raise SystemExit(f"{self.path}: {row.get('name')} has no number {key}; run make bench again")
+            raise SystemExit(f"{self.path}: {row.get('name')} lacks the number {key}; run make bench again")
         return float(value)
 
     def of(self, benchmark: str) -> list[Row]:
         """Returns the rows NAME/ARGUMENTS of one benchmark, in their order."""
         found = [row for row in self.rows if str(row["name"]).split("/")[0] == benchmark]
         if not found:
-            raise SystemExit(f"{self.path} has no benchmark {benchmark}; run make bench again")
+            raise SystemExit(f"{self.path} lacks the benchmark {benchmark}; run make bench again")
         return found
 
     def where(self) -> str:
@@ -84,7 +84,7 @@ class BenchmarkResults:
 
 
 def nanoseconds(row: Row) -> float:
-    """Processor time of one iteration [ns]."""
+    """Returns the processor time of one iteration [ns]."""
     return float(row["cpu_time"]) * NANOSECONDS.get(str(row.get("time_unit", "ns")), 1.0)
 
 

@@ -11,8 +11,8 @@
 
 namespace palpate::bench {
 
-/// A spring that meets a wall: a soft line, a kink and a steep line, drawn with `size` wavelets around the
-/// kink at 0.4 rad. Its slope lies between about 2 and 60 N*m/rad.
+/// Returns a spring with a wall: a soft line, a kink and a steep line, with `size` wavelets around the kink at 0.4 rad.
+/// Its slope is between about 2 and 60 N*m/rad.
 inline WaveletNetwork spring_and_wall(std::size_t size) {
     NetworkParameters network;
     network.linear = {20.0};
@@ -27,8 +27,8 @@ inline WaveletNetwork spring_and_wall(std::size_t size) {
     return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }
 
-/// Two clicks and a wall: the force falls with slopes to -23 N*m/rad, so that a soft coupling snaps through.
-/// `size` wavelets, eight of which matter.
+/// Returns two clicks and a wall. The force falls with slopes to -23 N*m/rad, so a soft coupling snaps through. Eight
+/// of the `size` wavelets contribute to the force.
 inline WaveletNetwork two_clicks(std::size_t size) {
     NetworkParameters network{1,
                               {30.0, 25.0, 15.0, 8.0, 40.0, 60.0, 45.0, 38.0},
@@ -45,7 +45,7 @@ inline WaveletNetwork two_clicks(std::size_t size) {
     return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }
 
-/// Waves over the unit box of several inputs.
+/// Returns waves over the unit box of several inputs.
 inline RadialNetwork several_inputs(std::size_t size, std::size_t inputs) {
     NetworkParameters network;
     network.dimension = inputs;
@@ -63,7 +63,7 @@ inline RadialNetwork several_inputs(std::size_t size, std::size_t inputs) {
              Continuation::Linear, std::nullopt}};
 }
 
-/// A hand pressing and letting go twice a second, sampled at 1 kHz: what a structure sees tick by tick.
+/// Returns the positions of a hand that presses and releases twice a second, sampled at 1 kHz.
 inline std::vector<double> hand_motion(std::size_t ticks) {
     std::vector<double> position(ticks);
     for (std::size_t k = 0; k < ticks; ++k) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws error against computing time from the JSON files of `make bench`.
+"""Draws error over computing time from the JSON files of `make bench`.
 
 python bench/solvers/speed.py build/bench --to docs/figures
 
@@ -83,7 +83,12 @@ def work_precision(results: BenchmarkResults, path: Path) -> str:
             axes.plot(bad, [ceiling] * len(bad), marker, markersize=4.0, color="black")
         if any(diverges for *_, diverges in points):
             axes.text(
-                0.99, 0.985, "filled, at the top: diverges", transform=axes.transAxes, ha="right", va="top"
+                0.99,
+                0.985,
+                "filled markers at the top: diverges",
+                transform=axes.transAxes,
+                ha="right",
+                va="top",
             )
         finish(axes, "computing time for 1 ms of motion [ns]", "error of the motion, RMS [rad]")
         axes.set_ylim(top=2.5 * ceiling)
@@ -112,12 +117,14 @@ def rendered_force(results: BenchmarkResults, path: Path) -> str:
     ]
     direct = next((each for each in shown if each[0].startswith("direct")), None)
     if direct is None:
-        raise SystemExit(f"{results.path} has no direct rendering to compare with; run make bench again")
+        raise SystemExit(
+            f"{results.path} contains no direct rendering for the comparison; run make bench again"
+        )
     _, _, _, hold, encoder, force = direct
     limits = {
-        f"felt: {100 * FORCE_JND:g} % of the force": FORCE_JND * force,
-        "the hold over a tick": hold,
-        "the encoder's step": encoder,
+        f"JND: {100 * FORCE_JND:g} % of the force": FORCE_JND * force,
+        "hold over a tick": hold,
+        "encoder step": encoder,
     }
     with figure_file(path, height_inches=4.3) as (axes,):
         for k, (name, time, _, error, *_) in enumerate(shown):
@@ -263,7 +270,7 @@ def over_wavelets(
     path: Path,
     quantities: Sequence[tuple[str, Callable[[Row], float]]],
 ) -> str:
-    """Draws quantities of benchmarks over the number of wavelets, one panel each."""
+    """Draws quantities of benchmarks over the number of wavelets, one panel for each quantity."""
     found = {name: results.of(benchmark) for benchmark, name in names.items()}
     height = 2.6 + 1.4 * (len(quantities) - 1)
     with figure_file(path, height_inches=height, rows=(1.0,) * len(quantities)) as panels:
@@ -287,7 +294,7 @@ def over_wavelets(
 
 def claims(folder: Path) -> str:
     return markdown_table(
-        ("ratio or number", "measured", "asked for, at most"),
+        ("ratio or number", "measured", "required, at most"),
         [
             (text, number(measured), number(most))
             for text, measured, most in measured_claims(folder)
@@ -305,33 +312,34 @@ def sections(folder: Path, to: Path) -> Iterable[str]:
     to.mkdir(parents=True, exist_ok=True)
     yield (
         "# Speed against accuracy\n\n"
-        "Drawn by `python bench/solvers/speed.py`; the numbers are those of `make bench`, medians over "
-        "interleaved repetitions of one run.\n"
+        "Drawn by `python bench/solvers/speed.py` from the results of `make bench`. Each number is the "
+        "median over interleaved repetitions of one run.\n"
     )
-    yield f"## What was asked for\n\n{claims(folder)}\n{steps.where()}\n"
+    yield f"## Required and measured values\n\n{claims(folder)}\n{steps.where()}\n"
     yield (
         "## Time steps: work against precision\n\n"
-        "A mass of 0.001 kg·m² with 0.5 N·m·s/rad behind a coupling of 100 N·m/rad and 0.02 N·m·s/rad, "
-        "in a spring that meets a wall; a hand's motion of 2 s. The truth is the exact solution.\n\n"
+        "The object is a mass of 0.001 kg·m² with a damping of 0.5 N·m·s/rad and the force of a spring with "
+        "a wall. The coupling has 100 N·m/rad and 0.02 N·m·s/rad. A hand moves for 2 s. The error is the "
+        "difference to the exact solution.\n\n"
         "![Error of the motion over computing time](work-precision.png)\n\n"
         f"{work_precision(steps, to / 'work-precision.png')}\n{steps.where()}\n"
     )
     yield (
         "## Structures and solvers: rendered force\n\n"
-        "A click and a wall on a simulated knob at 1 kHz, a hand that presses through both for 4 s. The "
-        "error is the rendered force less the object's own at the handle.\n\n"
+        "A hand presses through a click and a wall on a simulated knob for 4 s at 1 kHz. The error is the "
+        "rendered force minus the force of the object at the handle.\n\n"
         "![Force error over the time of a tick](rendered-force.png)\n\n"
         f"{rendered_force(forces, to / 'rendered-force.png')}\n{forces.where()}\n"
     )
     yield (
         "## A whole tick without its device\n\n"
-        "Reading judged, force rendered as the loop does by default, limited and slewed; single ticks "
-        f"are timed for the percentiles.\n\n{ticks(tick)}\n{tick.where()}\n"
+        "A tick checks the reading, renders the force with the default solver, and applies the force and "
+        f"slew limits. The percentiles are those of single ticks.\n\n{ticks(tick)}\n{tick.where()}\n"
     )
     yield (
         "## Models: error against size and time\n\n"
-        "A spring and a wall, and a tactile switch, each from 10⁴ noisy rows; NRMSE against the truth. "
-        "Each label gives the number of wavelets. Networks stop growing by themselves (BIC). An "
+        "The methods fit a spring with a wall and a tactile switch, each from 10⁴ noisy rows. The NRMSE is "
+        "relative to the exact force. Each label is the number of wavelets, which BIC chooses. An "
         "evaluation is one of 10⁴ positions in a NumPy array.\n\n"
         "![Model error over fitted parameters](model-error-size.png)\n\n"
         "![Model error over the time of an evaluation](model-error-time.png)\n\n"
@@ -342,8 +350,8 @@ def sections(folder: Path, to: Path) -> Iterable[str]:
     )
     yield (
         "## Evaluation: value and slope on a dependent chain\n\n"
-        "Spring and wall. The compiled network is right to 10⁻¹² of the largest force; table and spline "
-        "have 4096 cells.\n\n"
+        "The object is a spring with a wall. The error of the compiled network is at most 10⁻¹² of the "
+        "largest force. Table and spline have 4096 cells.\n\n"
         f"![Time of an evaluation over the number of wavelets](evaluation.png)\n\n{times}\n"
         f"{evaluations.where()}\n"
     )
@@ -351,7 +359,8 @@ def sections(folder: Path, to: Path) -> Iterable[str]:
     tight = over_wavelets(bounds, BOUNDS, to / "bounds.png", [("time of a bound [ns]", nanoseconds), excess])
     yield (
         "## Proved bounds of the slope\n\n"
-        "How much wider than what a dense search finds, of the steepest slope; random networks.\n\n"
+        "The excess is the proved bound minus the slope found by a dense search, relative to the steepest "
+        "slope. The networks are random.\n\n"
         f"![Time and excess of proved bounds over the number of wavelets](bounds.png)\n\n{tight}\n"
         f"{bounds.where()}\n"
     )
@@ -359,7 +368,7 @@ def sections(folder: Path, to: Path) -> Iterable[str]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="where make bench left its JSON files")
+    parser.add_argument("folder", type=Path, help="folder of the JSON files of make bench")
     parser.add_argument("--to", type=Path, required=True, help="folder of the figures and of speed.md")
     given = parser.parse_args(arguments)
     write_text(given.to / "speed.md", "\n".join(sections(given.folder, given.to)))

@@ -10,11 +10,11 @@
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
-// Time steps for the comparison; no device renders with them.
+// Integration methods for the comparison only.
 namespace palpate::bench {
 
 /// One step of Newton's method from the last position. With it `Implicit` is the linearly implicit Euler scheme. It
-/// evaluates once per step, is exact for a line, and has no certificate otherwise.
+/// needs one evaluation a step and is exact for a line only.
 struct OneNewtonStep {
     using Memory = WarmStart;
 
@@ -37,8 +37,8 @@ struct OneNewtonStep {
     }
 };
 
-/// The explicit structure with n steps of T/n in every tick, the device moving evenly in between: stable for
-/// slopes n^2 times as steep, at n times the cost.
+/// Explicit structure with n steps of T/n in every tick; the device moves with constant speed in the tick. It is stable
+/// for slopes n^2 times steeper and takes n times the computing time.
 template <Environment E>
 class Substepped {
   public:
@@ -84,12 +84,12 @@ class Substepped {
     double device_ = 0.0;  ///< x_{k-1}
 };
 
-/// m v' = F_c - f(x) - B_o v behind the coupling by the trapezoidal rule, of second order in T: with G the sum
-/// of the forces,
+/// Integrates m v' = F_c - f(x) - B_o v behind the coupling by the trapezoidal rule, of second order in T. G is the sum
+/// of the forces:
 ///
 ///     v_k = v_{k-1} + T (G_k + G_{k-1}) / (2m),   y_k = y_{k-1} + T (v_k + v_{k-1}) / 2,
 ///
-/// a load line with p = 4m/T^2 + 2(B_o + B_c)/T + K_c. It damps nothing and rings on stiff walls.
+/// The load line has p = 4m/T^2 + 2(B_o + B_c)/T + K_c. The rule adds no damping and rings on stiff walls.
 template <Environment E, class Solver = LoadLineSolver>
 class Trapezoidal {
   public:
@@ -112,7 +112,7 @@ class Trapezoidal {
         force_ = -own_;
     }
 
-    /// Behind the coupling: takes the measured position of the device, returns the force of the coupling.
+    /// Renders behind the coupling: takes the measured position of the device, returns the force of the coupling.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
         Rendered rendered = advance(coupling_, coupling_.force(device, device_velocity), force_);
@@ -125,7 +125,7 @@ class Trapezoidal {
         return rendered;
     }
 
-    /// Without the coupling: the force, held for the tick, drives the environment.
+    /// Renders without the coupling: the force is held for the tick and drives the environment.
     [[nodiscard]] Rendered drive(double force) noexcept {
         Rendered rendered = advance({0.0, 0.0}, force, force);
         rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;
@@ -133,7 +133,7 @@ class Trapezoidal {
     }
 
   private:
-    /// `push` is what the coupling would exert on an environment at rest at 0, `before` what it exerted.
+    /// `push` is the force of the coupling on an environment at rest at 0, `before` its force in the last tick.
     [[nodiscard]] Rendered advance(VirtualCoupling coupling, double push, double before) noexcept {
         const double inertia = 4.0 * inertia_.mass / (period_ * period_);
         const double damping = coupling.damping + inertia_.damping;

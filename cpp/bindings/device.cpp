@@ -12,11 +12,7 @@ void bind_device(py::module_& module) {
         module, "DeviceProfile",
         "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.");
     bind_fields(type, [](const DeviceProfile& made) { validate(made); });
-    type.def_property_readonly("whole_delay_samples", &DeviceProfile::whole_delay_samples,
-                               "n: number of whole samples in the delay.")
-        .def_property_readonly("delay_fraction", &DeviceProfile::delay_fraction,
-                               "tau: rest of the delay [samples].")
-        .def_property_readonly("late_samples", &DeviceProfile::late_samples,
+    type.def_property_readonly("late_samples", &DeviceProfile::late_samples,
                                "Smallest number of whole samples that is not shorter than the delay.")
         .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,
                                "period_s + jitter_s: what a certificate has to hold for [s].");

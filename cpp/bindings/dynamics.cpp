@@ -45,14 +45,8 @@ void bind_dynamics(py::module_& module) {
     module.def(
         "environment_filters",
         [](const std::string& pair, const std::string& design) {
-            if (pair != "implicit" && pair != "explicit") {
-                throw std::invalid_argument("pair is '" + pair + "', must be 'implicit' or 'explicit'");
-            }
-            if (design != "paper" && design != "matched") {
-                throw std::invalid_argument("design is '" + design + "', must be 'paper' or 'matched'");
-            }
-            return environment_filters(pair == "implicit" ? FilterPair::Implicit : FilterPair::Explicit,
-                                       design == "paper" ? FilterDesign::Paper : FilterDesign::Matched);
+            return environment_filters(named<FilterPair>(pair, "pair"),
+                                       named<FilterDesign>(design, "design"));
         },
         "pair"_a, "design"_a = "paper",
         "The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low "

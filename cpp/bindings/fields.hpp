@@ -129,13 +129,14 @@ void bind_fields(pybind11::class_<T>& type, Check check, bool with_repr = true) 
         [](const T& object) {
             py::dict values;
             for_each_field<T>([&](const auto& field) {
-                if (field.stored) {
-                    values[field.name] = to_python(field.of(object));
+                if (const py::object value = py::cast(to_python(field.of(object)));
+                    field.stored && !value.is_none()) {
+                    values[field.name] = value;
                 }
             });
             return values;
         },
-        "The fields that are written to a file, by name.");
+        "The fields that are written to a file, by name; without optional ones that are not given.");
     define_by_fields(type, names, with_repr);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -48,7 +49,7 @@ py::object to_python(const Json& value) {
     }
 }
 
-/// Converts a Python value to JSON. An integer of more than 64 bits becomes a double, as in a file.
+/// An integer of more than 64 bits becomes a double, as it does in a file; infinite if none is large enough.
 Json to_json(const py::handle& value, int depth = 0) {
     if (depth > deepest_json) {
         throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
@@ -67,7 +68,12 @@ Json to_json(const py::handle& value, int depth = 0) {
         try {
             return value < py::int_(0) ? Json(value.cast<std::int64_t>()) : Json(value.cast<std::uint64_t>());
         } catch (const py::cast_error&) {
-            return value.cast<double>();
+            const double number = PyLong_AsDouble(value.ptr());
+            if (PyErr_Occurred() == nullptr) {
+                return number;
+            }
+            PyErr_Clear();
+            return std::numeric_limits<double>::infinity();
         }
     }
     if (py::isinstance<py::str>(value)) {
@@ -101,6 +107,17 @@ void bind_io(py::module_& module) {
         "check_model", [](const py::object& content) { (void)parse_model(to_json(content)); }, "content"_a,
         "Checks the content of a model file; a certificate is computed again. ValueError: the path of the\n"
         "first wrong field, its value, what would be right.");
+    module.def(
+        "profile_of",
+        [](const py::object& content) {
+            const Json stored = to_json(content);
+            const auto read = detail::JsonField{stored, ""}.as<DeviceProfile>();
+            validate(read);
+            return read;
+        },
+        "content"_a,
+        "Device profile of the content of a file. ValueError: the first wrong field, its value, what would\n"
+        "be right.");
     module.def(
         "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
         "plan"_a, "Scheme of the plan of a model file.");

@@ -20,17 +20,7 @@ using namespace py::literals;
 
 namespace {
 
-Continuation continuation_named(const std::string& name, const char* field) {
-    detail::require(name == "linear" || name == "free",
-                    std::string(field) + " is '" + name + "', must be 'linear' or 'free'");
-    return name == "free" ? Continuation::Free : Continuation::Linear;
-}
-
-std::string name_of(Continuation continuation) {
-    return continuation == Continuation::Free ? "free" : "linear";
-}
-
-/// An optional argument with one value for all samples, or one value for each sample.
+/// The element k of an optional argument that is one value for all samples or one for each.
 class Broadcast {
   public:
     Broadcast(const std::optional<Array>& array, py::ssize_t samples, const char* name) {
@@ -156,8 +146,8 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
                               copied(weight),
                               copied(linear),
                               bias};
-    Domain domain{copied(lower), copied(upper), continuation_named(below, "below"),
-                  continuation_named(above, "above"), period};
+    Domain domain{copied(lower), copied(upper), named<Continuation>(below, "below"),
+                  named<Continuation>(above, "above"), period};
     const int given = int{weight_hysteresis.has_value()} + int{linear_hysteresis.has_value()} +
                       int{bias_hysteresis.has_value()};
     detail::require(
@@ -261,13 +251,36 @@ py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
     return result;
 }
 
-Interval bounds_of(Interval (*bounds)(const NetworkParameters&, double, double, double), const Array& alpha,
-                   const Array& beta, const Array& weight, double linear, double bias, double lower,
-                   double upper, double relative) {
-    const NetworkParameters network{1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+NetworkParameters network_of(const Array& alpha, const Array& beta, const Array& weight, double linear,
+                             double bias) {
+    return {1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+}
+
+std::pair<double, double> network_slope_bounds(const Array& alpha, const Array& beta, const Array& weight,
+                                               double linear, double bias, double lower, double upper,
+                                               double relative) {
+    const NetworkParameters network = network_of(alpha, beta, weight, linear, bias);
     validate(network, {{lower}, {upper}, {}, {}, std::nullopt});
     detail::require(relative > 0.0, "relative is " + std::to_string(relative) + ", must be > 0");
-    return bounds(network, lower, upper, relative);
+    return pair_of(slope_bounds(network, lower, upper, relative));
+}
+
+py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta, const Array& weight,
+                                           double linear, double bias, const Array& lower, const Array& upper,
+                                           std::size_t order) {
+    const NetworkParameters network = network_of(alpha, beta, weight, linear, bias);
+    validate(network, {{0.0}, {1.0}, {}, {}, std::nullopt});
+    require_vector(lower, "lower");
+    detail::require_size(copied(upper), view(lower).size(), "upper");
+    detail::require(order <= highest_derivative, "order is " + std::to_string(order) + ", must be at most " +
+                                                     std::to_string(highest_derivative));
+    py::array_t<double> result(lower.size());
+    double* out = result.mutable_data();
+    const py::gil_scoped_release unlocked;
+    for (std::size_t k = 0; k < view(lower).size(); ++k) {
+        out[k] = derivative_bounds(network, view(lower)[k], view(upper)[k])[order];
+    }
+    return result;
 }
 
 }  // namespace
@@ -308,13 +321,6 @@ void bind_model(py::module_& module) {
     type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),
              "State of the play operator along a motion (n,), started at rest unless told otherwise.");
     type.def(
-        "require_slopes_within",
-        [](const ForceModel& model, double least, double largest) {
-            model.require_slopes_within({least, largest});
-        },
-        "least"_a, "largest"_a,
-        "ValueError if stored slope bounds are narrower than the slopes of this model.");
-    type.def(
         "slope_range",
         [](const ForceModel& model, std::optional<double> radius) {
             require_one_input(model.parameters());
@@ -325,13 +331,6 @@ void bind_model(py::module_& module) {
         "Proved (smallest, largest) slope inside the domain, sliding either way, within 1 % of the "
         "steepest.\n"
         "With a play radius also while a hysteresis model sticks, where h / r adds to it.");
-    type.def(
-        "loss_range",
-        [](const ForceModel& model) {
-            detail::require(model.hysteresis() != nullptr, "the model has no hysteresis, so it has no loss");
-            return pair_of(model.hysteresis()->loss().value_bounds());
-        },
-        "Proved (smallest, largest) h inside the domain; within 1 % of the largest.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -358,8 +357,10 @@ void bind_model(py::module_& module) {
     });
     type.def_property_readonly("lower", [](const ForceModel& m) { return row(m.domain().lower); });
     type.def_property_readonly("upper", [](const ForceModel& m) { return row(m.domain().upper); });
-    type.def_property_readonly("below", [](const ForceModel& m) { return name_of(m.domain().below); });
-    type.def_property_readonly("above", [](const ForceModel& m) { return name_of(m.domain().above); });
+    type.def_property_readonly("below",
+                               [](const ForceModel& m) { return std::string(name_of(m.domain().below)); });
+    type.def_property_readonly("above",
+                               [](const ForceModel& m) { return std::string(name_of(m.domain().above)); });
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
 
@@ -368,24 +369,16 @@ void bind_model(py::module_& module) {
         "State (n,) of the play operator of a radius along a motion (n,), started at rest unless told\n"
         "otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).");
 
-    const auto bind_bounds = [&](const char* name, auto bounds, const char* doc) {
-        module.def(
-            name,
-            [bounds](const Array& alpha, const Array& beta, const Array& weight, double linear, double bias,
-                     double lower, double upper, double relative) {
-                return pair_of(bounds_of(bounds, alpha, beta, weight, linear, bias, lower, upper, relative));
-            },
-            py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a, "lower"_a, "upper"_a,
-            "relative"_a = 0.01, doc);
-    };
-    bind_bounds(
-        "value_bounds", &value_bounds,
-        "Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`\n"
-        "times max|f| wider than the true range.");
-    bind_bounds(
-        "slope_bounds", &slope_bounds,
+    module.def(
+        "slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a,
+        "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
         "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
         "times max|f'| wider than the true range.");
+    module.def(
+        "derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
+        "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
+        "Proved bounds (k,) of |f^(order)| of a network of one input, up to the ninth, over the cells\n"
+        "[lower, upper], each (k,).");
     module.def("fingerprint", &fingerprint, "model"_a,
                "16 hexadecimal digits that change with every number of which the model's force is made.");
 }

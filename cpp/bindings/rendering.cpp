@@ -58,16 +58,6 @@ void bind_rendering(py::module_& module) {
         "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
         "driven by a force.");
 
-    module.def(
-        "explicit_object",
-        [](double limit, double coupling_stiffness, double coupling_damping, double ratio, double period_s) {
-            const Inertia object =
-                explicit_object(limit, {coupling_stiffness, coupling_damping}, ratio, period_s);
-            return std::pair{object.mass, object.damping};
-        },
-        "limit"_a, py::kw_only(), "coupling_stiffness"_a, "coupling_damping"_a, "ratio"_a, "period_s"_a,
-        "(mass, damping) of the object with this slope limit in the explicit structure, with a damping of\n"
-        "ratio * mass / period_s: the inverse of explicit_slope_limit.");
     module.def("default_play_radius", &default_play_radius, "model"_a, "encoder_step"_a,
                "Play radius of a model that leaves it to the rendering, else 0.");
     module.attr("fewest_encoder_steps_in_play") = fewest_encoder_steps_in_play;

@@ -118,26 +118,10 @@ py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord
     return values;
 }
 
-/// Returns the keywords of `RunOptions`.
+/// Sets the options from keywords; checks what no other function checks.
 template <class T>
-Setters<T> run_setters() {
-    return {{"device", setter<T>(&RunOptions::device)},
-            {"wait_s", setter<T>(&RunOptions::wait_s)},
-            {"rate_hz", setter<T>(&RunOptions::loop, &LoopSettings::rate_hz)},
-            {"duration_s", setter<T>(&RunOptions::loop, &LoopSettings::duration_s)},
-            {"lowest_rate_share", setter<T>(&RunOptions::loop, &LoopSettings::lowest_rate_share)},
-            {"priority", setter<T>(&RunOptions::real_time, &RealTimeOptions::priority)},
-            {"cpu", setter<T>(&RunOptions::real_time, &RealTimeOptions::cpu)},
-            {"record", setter<T>(&RunOptions::record)},
-            {"force", setter<T>(&RunOptions::force)},
-            {"telemetry_port", setter<T>(&RunOptions::telemetry_port)},
-            {"telemetry_hz", setter<T>(&RunOptions::telemetry_hz)}};
-}
-
-/// Sets the options from keywords and checks those that other functions do not check.
-template <class T>
-void set_options(T& options, const py::kwargs& given, const Setters<T>& setters) {
-    set_fields(options, given, setters);
+void set_options(T& options, const py::kwargs& given) {
+    set_fields(options, given);
     options.created_by = std::string("palpate ") + PALPATE_VERSION;
     detail::require(!options.wait_s || (*options.wait_s > 0.0 && *options.wait_s <= 10.0),
                     "wait_s is " + readable(options.wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
@@ -149,16 +133,8 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
                           const std::optional<Certificate>& certificate, const std::string& position_unit,
                           const std::string& force_unit, const std::string& model_name,
                           const std::optional<py::function>& progress, const py::kwargs& given) {
-    static const auto setters = [] {
-        auto all = run_setters<RenderOptions>();
-        add_scheme_choices(all, &RenderOptions::scheme);
-        all["force_limit"] = setter<RenderOptions>(&RenderOptions::force_limit);
-        all["uncertified"] = setter<RenderOptions>(&RenderOptions::uncertified);
-        all["faults"] = setter<RenderOptions>(&RenderOptions::faults);
-        return all;
-    }();
     RenderOptions options;
-    set_options(options, given, setters);
+    set_options(options, given);
     options.rate_given = given.contains("rate_hz") && !given["rate_hz"].is_none();
     const PlannedModel planned{model_name, model, position_unit, force_unit, plan, limited, certificate};
     const auto device = open_device(options, planned);
@@ -179,23 +155,8 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
 py::dict measure_in_python(const std::optional<ForceModel>& object, const std::string& position_unit,
                            const std::string& force_unit, const std::optional<py::function>& progress,
                            const py::kwargs& given) {
-    using Options = MeasureOptions;
-    static const auto setters = [] {
-        auto all = run_setters<Options>();
-        all.insert({{"probe", setter<Options>(&Options::probe)},
-                    {"lower", setter<Options>(&Options::lower)},
-                    {"upper", setter<Options>(&Options::upper)},
-                    {"speed", setter<Options>(&Options::speed)},
-                    {"stiffness", setter<Options>(&Options::stiffness)},
-                    {"force_limit", setter<Options>(&Options::force_limit)},
-                    {"push", setter<Options>(&Options::push)},
-                    {"keep", setter<Options>(&Options::keep)},
-                    {"transducer", setter<Options>(&Options::transducer)},
-                    {"friction_share", setter<Options>(&Options::friction_share)}});
-        return all;
-    }();
-    Options options;
-    set_options(options, given, setters);
+    MeasureOptions options;
+    set_options(options, given);
     options.units = record_units(position_unit, force_unit);
     const auto device = device_to_measure(options, object);
     Watcher watcher{progress, &LoopProgress::object_force};
@@ -228,6 +189,8 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
 }  // namespace
 
 void bind_run(py::module_& module) {
+    module.attr("tolerated_change") = detail::tolerated_change;
+    module.attr("smallest_domain_share") = detail::smallest_domain_share;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
     py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and limits of a session.")
         .def(py::init<>())

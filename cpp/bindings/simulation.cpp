@@ -59,8 +59,15 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
         "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
 
-/// Returns the columns of a driven rendering.
-py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
+/// Arrays of what `render(samples, each)` gives along a recording (n,).
+template <class Render>
+py::dict rendered_along(const Array& samples, const char* name, double period_s, Render render) {
+    require_vector(samples, name);
+    require_period(period_s);
+    const std::vector<Rendered> rendered = [&] {
+        const py::gil_scoped_release unlocked;
+        return render(view(samples), Interruptible{});
+    }();
     std::vector<double> force;
     std::vector<double> position;
     std::vector<int> evaluations;
@@ -79,54 +86,25 @@ py::dict rendered_arrays(const std::vector<Rendered>& rendered) {
 }  // namespace
 
 void bind_simulation(py::module_& module) {
-    module.attr("most_simulated_ticks") = most_simulated_ticks;
-
-    const Hand usual;
-    py::class_<Hand> simulated_hand(
+    py::class_<Hand> hand(
         module, "Hand",
         "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.");
-    simulated_hand
-        .def(py::init<double, double, double, double, double>(), py::kw_only(),
-             "stiffness"_a = usual.stiffness, "damping"_a = usual.damping, "lower"_a = usual.lower,
-             "upper"_a = usual.upper, "frequency_hz"_a = usual.frequency_hz)
-        .def_readonly("stiffness", &Hand::stiffness, "[N/m or N*m/rad]")
-        .def_readonly("damping", &Hand::damping, "[N*s/m or N*m*s/rad]")
-        .def_readonly("lower", &Hand::lower, "[m or rad]")
-        .def_readonly("upper", &Hand::upper, "[m or rad]")
-        .def_readonly("frequency_hz", &Hand::frequency_hz, "[Hz]");
-    define_by_fields(simulated_hand, {"stiffness", "damping", "lower", "upper", "frequency_hz"});
+    bind_fields(hand);
 
     py::class_<TestRig> rig(module, "TestRig", "Simulated device and hand scaled to a model.");
-    rig.def(py::init([](const DeviceProfile& device, const Hand& hand, double length, double force) {
-                return TestRig{device, hand, {length, force}};
-            }),
-            py::kw_only(), "device"_a, "hand"_a, "length"_a = 1.0, "force"_a = 1.0)
-        .def_readonly("device", &TestRig::device)
-        .def_readonly("hand", &TestRig::hand)
-        .def_property_readonly(
-            "length", [](const TestRig& self) { return self.scale.length; },
-            "Positions, relative to those of the default knob.")
-        .def_property_readonly(
-            "force", [](const TestRig& self) { return self.scale.force; },
-            "Forces, relative to those of the default knob.")
-        .def(
-            "scheme",
-            [](const TestRig& self, const ForceModel& model, const py::kwargs& fields) {
-                static const auto setters = [] {
-                    Setters<SchemeChoices> all;
-                    add_scheme_choices(all);
-                    return all;
-                }();
-                SchemeChoices chosen;
-                set_fields(chosen, fields, setters);
-                return self.scheme(model, chosen);
-            },
-            "model"_a,
-            "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at "
-            "the "
-            "model's "
-            "scale.");
-    define_by_fields(rig, {"device", "hand", "length", "force"});
+    bind_fields<TestRig, 2>(rig);
+    rig.def(
+        "scheme",
+        [](const TestRig& self, const ForceModel& model, const py::kwargs& fields) {
+            SchemeChoices chosen;
+            set_fields(chosen, fields);
+            return self.scheme(model, chosen);
+        },
+        "model"_a,
+        "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at "
+        "the "
+        "model's "
+        "scale.");
     module.def(
         "rig_for", &rig_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
         "Returns the test rig for a model of position, or of position and velocity. An angle is rendered on\n"
@@ -139,7 +117,7 @@ void bind_simulation(py::module_& module) {
                "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
                "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
                "Ctrl-C\n"
-               "ends it as in Python; ValueError for more than most_simulated_ticks.\n\n"
+               "ends it as in Python; ValueError for more than 3 600 000 ticks.\n\n"
                "Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and\n"
                "handle_end (the true handle when sampled, and in the middle and at the end of the tick that "
                "holds the\n"
@@ -175,14 +153,9 @@ void bind_simulation(py::module_& module) {
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
-            require_vector(position, "position");
-            require_period(period_s);
-            std::vector<Rendered> rendered;
-            {
-                const py::gil_scoped_release unlocked;
-                rendered = motion_driven(model, s, view(position), period_s, Interruptible{});
-            }
-            return rendered_arrays(rendered);
+            return rendered_along(position, "position", period_s, [&](auto motion, auto each) {
+                return motion_driven(model, s, motion, period_s, each);
+            });
         },
         "model"_a, "scheme"_a, "position"_a, "period_s"_a,
         "The force that would have been rendered while a recorded motion (n,) moves the device.\n"
@@ -191,14 +164,9 @@ void bind_simulation(py::module_& module) {
         "force_driven",
         [](const ForceModel& model, const Scheme& s, const Array& force, double period_s,
            double start_position) {
-            require_vector(force, "force");
-            require_period(period_s);
-            std::vector<Rendered> rendered;
-            {
-                const py::gil_scoped_release unlocked;
-                rendered = force_driven(model, s, view(force), period_s, start_position, Interruptible{});
-            }
-            return rendered_arrays(rendered);
+            return rendered_along(force, "force", period_s, [&](auto forces, auto each) {
+                return force_driven(model, s, forces, period_s, start_position, each);
+            });
         },
         "model"_a, "scheme"_a, "force"_a, "period_s"_a, "start_position"_a = 0.0,
         "The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).\n"

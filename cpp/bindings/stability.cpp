@@ -12,6 +12,7 @@
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
+#include "settings.hpp"
 
 namespace palpate::bindings {
 
@@ -108,10 +109,23 @@ void bind_stability(py::module_& module) {
         "bounds"_a, "scheme"_a, "device"_a, "The same for any force within bounds.");
     module.def(
         "stiffest_coupling", &stiffest_coupling, py::kw_only(), "damping"_a, "falling"_a, "device"_a,
-        "share"_a = 1.0,
+        "share"_a = usual_coupling_share,
         "Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is "
         "none.\n"
         "`damping` is B_c; `falling` the steepest fall of the object's force.");
+    module.attr("usual_coupling_share") = usual_coupling_share;
+    module.def(
+        "explicit_scheme",
+        [](const ForceBounds& bounds, const DeviceProfile& device, const py::kwargs& fields) {
+            SchemeChoices chosen;
+            set_fields(chosen, fields);
+            return explicit_scheme(bounds, device, chosen);
+        },
+        "bounds"_a, "device"_a,
+        "Explicit structure with the stiffest coupling, then the least object damping, for which it is "
+        "stable; the\n"
+        "last one tried if none is. mass, damping, coupling_stiffness, coupling_damping and play_radius by\n"
+        "keyword, None: chosen.");
     module.def(
         "device_difference", &device_difference, "certified"_a, "device"_a,
         "The first field in which a device is not the certified one, as a sentence; empty where it is.");

@@ -124,8 +124,9 @@ using Columns = py::array_t<double, py::array::f_style>;
     return Columns({static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
 }
 
-Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
-    const Frame frame(x, alpha, beta);
+/// value(hats, wavelet, k in its block) at every sample and wavelet.
+template <class Value>
+Columns filled(const Frame& frame, Value value) {
     auto result = columns(frame.samples, frame.wavelets);
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
@@ -133,11 +134,16 @@ Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
         frame.radial(i, [&](const Hats& hats) {
             double* column = out + i * frame.samples + hats.first;
             for (std::size_t k = 0; k < hats.size; ++k) {
-                column[k] = hats.at(k).value;
+                column[k] = value(hats, i, k);
             }
         });
     }
     return result;
+}
+
+Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
+    return filled(Frame(x, alpha, beta),
+                  [](const Hats& hats, std::size_t /*i*/, std::size_t k) { return hats.at(k).value; });
 }
 
 std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian(const Array& x,
@@ -231,39 +237,14 @@ Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& b
     if (frame.dimension != 1) {
         throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,): this is for one input");
     }
-    auto result = columns(frame.samples, frame.wavelets);
-    double* out = result.mutable_data();
-    const py::gil_scoped_release unlocked;
-    for (std::size_t i = 0; i < frame.wavelets; ++i) {
-        frame.radial(i, [&](const Hats& hats) {
-            double* column = out + i * frame.samples + hats.first;
-            for (std::size_t k = 0; k < hats.size; ++k) {
-                column[k] =
-                    frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
-            }
-        });
-    }
-    return result;
+    return filled(frame, [&](const Hats& hats, std::size_t i, std::size_t k) {
+        return frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
+    });
 }
 
 }  // namespace
 
 void bind_wavelet(py::module_& module) {
-    module.attr("wavelet_slope_bound") = wavelet_slope_bound;
-    module.attr("wavelet_curvature_bound") = wavelet_curvature_bound;
-    module.attr("wavelet_jerk_bound") = wavelet_jerk_bound;
-
-    module.def("mexican_hat", py::vectorize([](double u) { return mexican_hat(u).value; }), "u"_a,
-               "The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.");
-    module.def("mexican_hat_slope", py::vectorize([](double u) { return mexican_hat(u).slope; }), "u"_a,
-               "psi'(u) = (3u - u^3) exp(-u^2 / 2).");
-    module.def("mexican_hat_curvature", py::vectorize([](double u) { return mexican_hat_curvature(u); }),
-               "u"_a, "psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).");
-    module.def("mexican_hat_jerk", py::vectorize([](double u) { return mexican_hat_jerk(u); }), "u"_a,
-               "psi'''(u) = (-u^5 + 10u^3 - 15u) exp(-u^2 / 2).");
-    module.def("mexican_hat_integral", py::vectorize([](double u) { return mexican_hat(u).integral; }), "u"_a,
-               "An antiderivative of psi: -u exp(-u^2 / 2).");
-
     module.def(
         "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
         "psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.\n\n"

@@ -36,6 +36,8 @@ void bind_wire(py::module_& module) {
                "Identity of a USB device from its answer to GET_INFO. InputError names the wrong field.\n\n"
                "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, "
                "transducer,\nmeasures_velocity, uid.");
+    module.def("usb_cause", &wire::usb_cause, "code"_a,
+               "Cause and cure for an error code of libusb; empty for a code that states no cause.");
     py::enum_<wire::Request>(module, "UsbRequest", "bRequest of a control transfer.")
         .value("GetInfo", wire::Request::GetInfo)
         .value("Enable", wire::Request::Enable)

@@ -10,7 +10,7 @@
 
 namespace emulator {
 
-/// One of the many devices that speak the protocol: whatever it leaves to a firmware, drawn by a seed.
+/// Returns a device of the protocol; a seed draws everything that the protocol leaves to the firmware.
 [[nodiscard]] inline Identity chosen_by(std::uint32_t seed) {
     std::mt19937 random{seed};
     const auto below = [&](std::uint64_t end) {
@@ -53,7 +53,7 @@ namespace emulator {
 
     device.first_sequence = static_cast<std::uint16_t>(below(0x10000));
     device.first_us = static_cast<std::uint32_t>(random());
-    // Close to where a count has no room left: such a handle has turned for long.
+    // Includes counts close to overflow, as after many turns.
     device.first_count = one_of(0, -7, INT32_MAX - 100, INT32_MIN + 1, static_cast<std::int32_t>(random()));
     device.first_out_sequence = static_cast<std::uint16_t>(below(0x10000));
     device.first_out_age_us = one_of(std::uint16_t{0}, std::uint16_t{0xFFFF});

@@ -25,8 +25,8 @@
 
 namespace emulator {
 
-/// Takes orders as datagrams and answers each: from a test to the device, past the library that is tested. The
-/// command finds the socket in PALPATE_EMULATOR.
+/// Receives the orders of a test as datagrams and answers each one, independent of the tested library. The environment
+/// variable PALPATE_EMULATOR names the socket.
 class Orders {
   public:
     explicit Orders(std::function<std::string(const std::string&)> obey)
@@ -38,7 +38,7 @@ class Orders {
         path_.string().copy(address.sun_path, sizeof address.sun_path - 1);
         ::unlink(path_.c_str());
         if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-            throw std::runtime_error("no socket at " + path_.string());
+            throw std::runtime_error("cannot open a socket at " + path_.string());
         }
         ::chmod(path_.c_str(), 0777);
         ::setenv("PALPATE_EMULATOR", path_.c_str(), 1);
@@ -81,10 +81,10 @@ class Orders {
     std::thread obeying_;
 };
 
-/// The command, as a child that gets the signals that end a program, and does not outlive this process.
+/// Runs the command as a child process. The child receives the signals that end a program and ends with this process.
 class Command {
   public:
-    /// `prepare` runs in the child.
+    /// Starts the command; `prepare` runs in the child.
     Command(std::vector<std::string> words, const std::function<void()>& prepare) {
         child() = ::fork();
         if (child() == 0) {
@@ -104,7 +104,7 @@ class Command {
         }
     }
 
-    /// Waits for its end; the exit code as a shell has it.
+    /// Waits for the end and returns the exit code like a shell.
     int wait() {
         int status = 0;
         while (::waitpid(child(), &status, 0) < 0 && errno == EINTR) {

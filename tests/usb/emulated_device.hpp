@@ -20,11 +20,11 @@
 
 namespace emulator {
 
-/// How a transaction ends on the bus.
+/// Result of a transaction on the bus.
 enum class Handshake : std::uint8_t { Ack, Nak, Stall };
 
-/// The device of protocol version 1: its memory and its mechanics, one millisecond a frame. It knows no transport
-/// and shares no code with the library that it tests.
+/// Emulates the device of protocol version 1: memory and mechanics, one frame for each millisecond. It is independent
+/// of the transport and shares no code with the tested library.
 class EmulatedDevice {
   public:
     EmulatedDevice(Identity identity, Plant plant, std::vector<Fault> script)
@@ -38,7 +38,7 @@ class EmulatedDevice {
 
     // ---------------------------------------------------------------------------------------- control requests
 
-    /// `setup`: the 8 bytes; `data`: what follows on the way out.
+    /// Answers a control transfer; `bytes` are the 8 setup bytes, `data` the outgoing data.
     Answer control(const Bytes& bytes, const Bytes& data) {
         const Setup setup{bytes};
         Answer answer = stalled();
@@ -60,7 +60,7 @@ class EmulatedDevice {
         return answer;
     }
 
-    /// Bus reset, suspend and SET_CONFIGURATION end every torque.
+    /// Ends the torque, as bus reset, suspend and SET_CONFIGURATION do.
     void disarm() {
         motor_.disarm();
         halts_ = {};
@@ -69,7 +69,7 @@ class EmulatedDevice {
 
     // ------------------------------------------------------------------------------------------------- frames
 
-    /// A millisecond passes: the mechanics move, the watchdog looks, the encoder is latched.
+    /// Advances by a millisecond: moves the mechanics, runs the watchdog, latches the encoder.
     void frame() {
         faults_.frame(out_seen_);
         unplugged_ = unplugged_ || faults_.used_last(FaultKind::Unplug);
@@ -97,12 +97,12 @@ class EmulatedDevice {
         latch();
     }
 
-    /// Whether an IN packet is one of this protocol, which a host can make sense of.
+    /// Returns true if an IN packet belongs to this protocol.
     [[nodiscard]] static bool is_whole(const Bytes& packet) {
         return packet.size() == 32 && packet[0] == 'H' && packet[1] == 1;
     }
 
-    /// The IN endpoint is polled.
+    /// Answers a poll of the IN endpoint.
     Handshake in(Bytes& packet) {
         if (naks_ || mute_ || packets_.empty()) {
             return Handshake::Nak;
@@ -129,7 +129,7 @@ class EmulatedDevice {
         return Handshake::Ack;
     }
 
-    /// The OUT endpoint is written to.
+    /// Accepts a packet at the OUT endpoint.
     Handshake out(const Bytes& packet) {
         if (naks_ || faults_.used(FaultKind::Busy)) {
             return Handshake::Nak;
@@ -150,12 +150,12 @@ class EmulatedDevice {
 
     void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
-    /// Refuses transfers for now: such frames take their time, since the host's timeouts do. One that
-    /// halted is no such device: the host is told, and clears it when it comes to it.
+    /// Returns true while transfers are refused. Such frames last a real millisecond, because the timeouts of the host
+    /// are in real time. A halted endpoint is different: the host receives the halt and clears it.
     [[nodiscard]] bool takes_its_time() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
-    // ----------------------------------------------------------------------------- what a test wants to know
+    // ----------------------------------------------------------------------------- values for the tests
 
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
     [[nodiscard]] std::uint16_t sequence() const { return sequence_; }
@@ -228,7 +228,7 @@ class EmulatedDevice {
     void latch() {
         const double counts = identity_.counts_per_rev / (2.0 * std::numbers::pi);
         const double moved = std::floor((plant_.position - zero_) * counts + 0.5);
-        // A count that has no room left goes on at the other end.
+        // The count wraps around.
         const std::int64_t jump = faults_.used(FaultKind::Jump) ? identity_.counts_per_rev / 4 : 0;
         const auto count = static_cast<std::int32_t>(zero_count_ + static_cast<std::int64_t>(moved) + jump);
         const bool frozen = faults_.used(FaultKind::FrozenEncoder);
@@ -269,9 +269,9 @@ class EmulatedDevice {
     std::uint64_t frames_ = 0;
     std::uint16_t sequence_ = 0;
     std::uint32_t clock_us_ = 0;
-    bool out_seen_ = false;  ///< the script's clock runs
+    bool out_seen_ = false;  ///< the frames of the script are counted
 
-    std::deque<Bytes> packets_;  ///< that nobody has read yet
+    std::deque<Bytes> packets_;  ///< not yet read
     Bytes last_sent_;
     std::int32_t last_count_ = 0;
     bool naks_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a test of UsbDevice does under the emulator: talk to it, and get a stream into a known state.
+// Functions for tests of UsbDevice with the emulator: send orders to it, and bring a stream into a known state.
 #pragma once
 
 #include <sys/socket.h>
@@ -18,13 +18,13 @@
 
 namespace palpate::test {
 
-/// A word to the emulator; its answer.
+/// Sends an order to the emulator and returns its answer.
 inline std::string tell(const std::string& order) {
     const int talk = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_un own{};
     own.sun_family = AF_UNIX;
     ::bind(talk, reinterpret_cast<const sockaddr*>(&own),
-           sizeof own.sun_family);  // a name of the kernel's choice
+           sizeof own.sun_family);  // the kernel chooses a name
     sockaddr_un emulator{};
     emulator.sun_family = AF_UNIX;
     std::string{std::getenv("PALPATE_EMULATOR")}.copy(emulator.sun_path, sizeof emulator.sun_path - 1);
@@ -36,7 +36,7 @@ inline std::string tell(const std::string& order) {
     return {answer.data(), static_cast<std::size_t>(length)};
 }
 
-/// One number of what the emulator says of its device.
+/// Returns one number of the device's state from the emulator.
 inline double state(const std::string& field) {
     const std::string all = tell("state");
     const std::string key = "\"" + field + "\": ";
@@ -44,7 +44,7 @@ inline double state(const std::string& field) {
     return value.rfind("true", 0) == 0 ? 1.0 : value.rfind("false", 0) == 0 ? 0.0 : std::stod(value);
 }
 
-/// Patient: a busy machine is no fault of the device.
+/// Returns a device with a long timeout, because the machine of the test may be busy.
 inline UsbDevice patient(const std::string& serial = "") {
     UsbOptions options;
     options.serial = serial;
@@ -52,8 +52,8 @@ inline UsbDevice patient(const std::string& serial = "") {
     return UsbDevice{options};
 }
 
-/// Exchanges until every command goes out, the last one is on the motor, the reading is the device's newest and only
-/// two reads are on their way: from there on, one exchange is one frame.
+/// Exchanges until every command is sent, the last one has reached the motor, the reading is the newest one and only
+/// two reads are in flight. From then on, one exchange is one frame.
 inline Reading settled(UsbDevice& device, double force = 0.0) {
     Reading reading;
     for (int k = 0; k < 4; ++k) {
@@ -66,7 +66,7 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
     };
     for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {
         std::this_thread::sleep_for(
-            std::chrono::milliseconds{2});  // one is still on its way, and will be waiting
+            std::chrono::milliseconds{2});  // a packet in flight then waits for the exchange
         if (!is_settled()) {
             reading = device.exchange({force});
         }

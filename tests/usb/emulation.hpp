@@ -14,47 +14,46 @@
 
 namespace emulator {
 
-/// What stands on the command line of either emulator.
+/// Options of the command line of both emulators.
 struct Settings {
     std::vector<Identity> devices{Identity{}};
     Plant plant;
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds patience{
-        3000};                  ///< how long lock-step waits for a host that does not do its part
-    std::string trace;          ///< CSV, one row a frame
-    std::string preload_first;  ///< a sanitizer's library
-    bool denied = false;        ///< the node can be opened by nobody
+    std::chrono::milliseconds patience{3000};  ///< longest wait of lock-step for the host
+    std::string trace;                         ///< CSV, one row for each frame
+    std::string preload_first;                 ///< a sanitizer's library
+    bool denied = false;                       ///< the node cannot be opened
     std::vector<std::string> command;
 };
 
 inline constexpr const char* options_text =
-    "  --lock-step            the host's transfers are the clock; else frames begin every 1/rate\n"
+    "  --lock-step            the host's transfers are the clock; otherwise frames begin every 1/rate\n"
     "  --rate-hz RATE         frames a second [1000]\n"
-    "  --patience-ms MS       lock-step waits so long for the host to do its part [3000]\n"
+    "  --patience-ms MS       longest wait of lock-step for the host [3000]\n"
     "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
-    "  --no-device            nothing is plugged in\n"
-    "  --chosen-by SEED       whatever the protocol leaves to a firmware is drawn; stands before all that it "
-    "overrides\n"
-    "  --says-rate-hz RATE    what GET_INFO says [1000]\n"
+    "  --no-device            no device is plugged in\n"
+    "  --chosen-by SEED       draws the choices of the firmware; must be before the options that change "
+    "them\n"
+    "  --says-rate-hz RATE    rate in GET_INFO [1000]\n"
     "  --no-transducer        capabilities without bit 0\n"
     "  --no-velocity          capabilities without bit 1\n"
     "  --somebody-elses       another magic in GET_INFO\n"
-    "  --info-bytes SIZE      of the answer to GET_INFO [32]\n"
-    "  --flipped              a torque that points the wrong way\n"
+    "  --info-bytes SIZE      size of the answer to GET_INFO [32]\n"
+    "  --flipped              torque with the wrong sign\n"
     "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
-    "  --from-zero            counters begin at 0, and not close to where they wrap around\n"
+    "  --from-zero            counters begin at 0, not close to their ends\n"
     "  --spring STIFFNESS     a real spring on the handle, N*m/rad [0]\n"
     "  --friction TORQUE      Coulomb friction of the handle, N*m [0]\n"
-    "  --max-torque-uNm TORQUE  what GET_INFO says [5000000]\n"
-    "  --no-hand              nobody holds the handle\n"
+    "  --max-torque-uNm TORQUE  largest torque in GET_INFO [5000000]\n"
+    "  --no-hand              the handle is free\n"
     "  --fault KIND@FRAME[xCOUNT]   repeatable; frames are counted from the first OUT packet\n"
-    "  --trace FILE.csv       what really happened, one row a frame\n"
-    "  --denied               the device can be opened by nobody\n"
-    "  --preload-first FILE   a sanitizer's library, which has to stand before umockdev's\n";
+    "  --trace FILE.csv       true state of the device, one row for each frame\n"
+    "  --denied               the device cannot be opened\n"
+    "  --preload-first FILE   library of a sanitizer, which must be loaded before umockdev\n";
 
-/// Throws std::invalid_argument with what is wrong.
+/// Reads the command line. Throws std::invalid_argument if an option is wrong.
 [[nodiscard]] inline Settings read_settings(int count, char** words) {
     Settings settings;
     Identity common;
@@ -118,7 +117,7 @@ inline constexpr const char* options_text =
         } else if (word == "--preload-first") {
             settings.preload_first = value();
         } else {
-            throw std::invalid_argument("no option is called '" + word + "'");
+            throw std::invalid_argument("unknown option '" + word + "'");
         }
     }
     settings.devices.assign(none ? 0 : 1, common);
@@ -132,7 +131,7 @@ inline constexpr const char* options_text =
     return settings;
 }
 
-/// A word from a test to the device, and its answer: fault KIND COUNT, state.
+/// Executes an order of a test (fault KIND COUNT, state) and returns the answer.
 [[nodiscard]] inline std::string obey(Port& port, const std::string& order) {
     const std::size_t space = order.find(' ');
     const std::string verb = order.substr(0, space);
@@ -158,7 +157,7 @@ inline constexpr const char* options_text =
                field("position_rad", std::to_string(device.plant().position)) + ", " +
                field("waiting", std::to_string(port.waiting())) + "}";
     }
-    throw std::invalid_argument("no order is called '" + verb + "'");
+    throw std::invalid_argument("unknown order '" + verb + "'");
 }
 
 }  // namespace emulator

@@ -13,30 +13,30 @@
 
 namespace emulator {
 
-/// What can be made to go wrong. The first six have numbers on the wire (request 0x7F, wValue 1 to 6).
+/// Kind of a fault. The first six have numbers on the wire (request 0x7F, wValue 1 to 6).
 enum class FaultKind : std::uint8_t {
-    StallIn,          ///< the IN endpoint halts, once for each
-    StallOut,         ///< the OUT endpoint halts, once for each
-    Short,            ///< IN packets cut to half
-    Freeze,           ///< frames in which every transfer is refused for now (NAK); the device's time goes on
-    Unplug,           ///< gone, after so many frames
-    Skip,             ///< sequence numbers left out
-    Repeat,           ///< the last IN packet again
-    Magic,            ///< a wrong first byte
-    Version,          ///< a version of the future
-    Long,             ///< 64 bytes
-    Deaf,             ///< OUT packets taken and thrown away
-    Mute,             ///< no IN packets; OUT packets are taken
-    OldEcho,          ///< the echo of an OUT packet from before
-    Encoder,          ///< status: encoder fault, torque off
-    OverTemperature,  ///< status: over-temperature, torque off
-    EmergencyStop,    ///< status: emergency stop, torque off until CLEAR
-    Reset,            ///< the device starts anew: disabled, torque off
-    Saturate,         ///< half the torque, and the status that says so
-    Jump,             ///< the count is off by a quarter turn
-    FrozenEncoder,    ///< the count repeats
-    Slow,             ///< frames that take three times as long
-    Busy,             ///< OUT packets refused for now (NAK), each a frame late; IN packets go on
+    StallIn,          ///< The IN endpoint halts, once for each count.
+    StallOut,         ///< The OUT endpoint halts, once for each count.
+    Short,            ///< IN packets have half the length.
+    Freeze,           ///< Every transfer is refused with NAK; the time of the device continues.
+    Unplug,           ///< The device is unplugged after this many frames.
+    Skip,             ///< Sequence numbers are skipped.
+    Repeat,           ///< The last IN packet is sent again.
+    Magic,            ///< The first byte is wrong.
+    Version,          ///< The version is 2.
+    Long,             ///< IN packets have 64 bytes.
+    Deaf,             ///< OUT packets are accepted and ignored.
+    Mute,             ///< IN packets are not sent; OUT packets are accepted.
+    OldEcho,          ///< The packet echoes an earlier OUT packet.
+    Encoder,          ///< Status encoder fault, torque off.
+    OverTemperature,  ///< Status over-temperature, torque off.
+    EmergencyStop,    ///< Status emergency stop, torque off until CLEAR.
+    Reset,            ///< The device restarts: disabled, torque off.
+    Saturate,         ///< Half the torque, with the status bit for it.
+    Jump,             ///< The count has an error of a quarter turn.
+    FrozenEncoder,    ///< The count repeats.
+    Slow,             ///< Frames last three times longer.
+    Busy,             ///< OUT packets are refused with NAK and are a frame late; IN packets continue.
 };
 
 inline constexpr std::array<std::string_view, 22> fault_names{
@@ -46,7 +46,7 @@ inline constexpr std::array<std::string_view, 22> fault_names{
     "emergency-stop", "reset",     "saturate", "jump",    "frozen-encoder",
     "slow",           "busy"};
 
-/// A fault: how many packets or frames it lasts, and from which frame on.
+/// Fault with its duration in packets or frames and its first frame.
 struct Fault {
     FaultKind kind = FaultKind::StallIn;
     std::uint32_t count = 1;
@@ -56,12 +56,12 @@ struct Fault {
 [[nodiscard]] inline FaultKind fault_named(std::string_view name) {
     const auto found = std::find(fault_names.begin(), fault_names.end(), name);
     if (found == fault_names.end()) {
-        throw std::invalid_argument("no fault is called '" + std::string(name) + "'");
+        throw std::invalid_argument("unknown fault '" + std::string(name) + "'");
     }
     return static_cast<FaultKind>(found - fault_names.begin());
 }
 
-/// Reads "KIND@FRAME" or "KIND@FRAMExCOUNT". Frames are counted from the first OUT packet on.
+/// Reads "KIND@FRAME" or "KIND@FRAMExCOUNT". Frames are counted from the first OUT packet.
 [[nodiscard]] inline Fault parse_fault(const std::string& text) {
     const std::size_t at = text.find('@');
     if (at == std::string::npos) {
@@ -76,14 +76,14 @@ struct Fault {
     return fault;
 }
 
-/// What is wrong now, and what will be by the script.
+/// Active faults, and the faults of the script.
 class Faults {
   public:
     explicit Faults(std::vector<Fault> script) : script_{std::move(script)} {}
 
     void inject(FaultKind kind, std::uint32_t count) { remaining(kind) = std::max(count, 1U); }
 
-    /// A frame begins, the next one of the script or one before it.
+    /// Begins a frame; it belongs to the script if `counts`.
     void frame(bool counts) {
         started_ += counts ? 1 : 0;
         for (const Fault& fault : script_) {
@@ -92,10 +92,10 @@ class Faults {
             }
         }
     }
-    /// Frames of the script.
+    /// Returns the number of frames of the script.
     [[nodiscard]] std::uint64_t started() const { return started_; }
 
-    /// Whether a fault is due; one less is left of it.
+    /// Returns true if a fault is active, and uses it once.
     bool used(FaultKind kind) {
         if (remaining(kind) == 0) {
             return false;
@@ -103,9 +103,9 @@ class Faults {
         --remaining(kind);
         return true;
     }
-    /// How often a fault is due; nothing is left of it.
+    /// Returns the remaining count of a fault and sets it to zero.
     std::uint32_t used_up(FaultKind kind) { return std::exchange(remaining(kind), 0); }
-    /// Whether a fault was due for the last time.
+    /// Returns true if a fault was used for the last time.
     bool used_last(FaultKind kind) { return used(kind) && remaining(kind) == 0; }
 
   private:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small Linux in QEMU in which commands meet the emulated USB device through a real kernel.
+"""Runs commands in a small Linux in QEMU, with the emulated USB device behind a real kernel.
 
-usbfs, usbcore, a host-controller driver (vhci_hcd), enumeration and unplugging are the kernel's own; the
-device is `usbip_emulator` behind them. The guest's clock counts instructions, so that its times are exact
-whatever the load of this machine. Everything stands in one initial file system; what the guest leaves behind
-comes back over its second serial line.
+usbfs, usbcore, the host-controller driver (vhci_hcd), enumeration and unplugging are those of the kernel; the
+device is `usbip_emulator`. The clock of the guest counts instructions, so its times do not depend on the load
+of this machine. All files are in one initial file system. The guest returns its results over a serial line.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ LONGEST_S = 1800
 
 
 def missing() -> str:
-    """What the guest lacks, as the reason of a skipped test; empty where it can be run."""
+    """Returns the missing packages as the reason of a skipped test; empty if the guest can run."""
     if platform.machine() != "x86_64":
         return f"needs a machine that is x86_64, not {platform.machine()}"
     lacking = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
@@ -44,7 +43,7 @@ def missing() -> str:
 
 
 def kernel() -> Path | None:
-    """The unpacked kernel package, fetched once; not installed."""
+    """Returns the unpacked kernel package, which is fetched once and not installed."""
     place = CACHE / "kernel"
     if not place.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
@@ -67,13 +66,13 @@ def kernel() -> Path | None:
 
 
 def libraries(program: Path) -> list[Path]:
-    """The shared libraries of a program, where it looks for them."""
+    """Returns the paths of the shared libraries of a program."""
     told = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
     return [Path(path) for path in re.findall(r"(/\S+) \(0x", told)]
 
 
 def install_module(driver: Path, folder: Path) -> None:
-    """Copy a driver, which newer kernels bring compressed."""
+    """Copies a driver, which is compressed in newer kernels."""
     packed = Path(f"{driver}.xz")
     content = driver.read_bytes() if driver.exists() else lzma.decompress(packed.read_bytes())
     (folder / driver.name).write_bytes(content)
@@ -81,18 +80,18 @@ def install_module(driver: Path, folder: Path) -> None:
 
 @dataclass
 class Left:
-    """What a guest left behind."""
+    """Results of a guest."""
 
     console: str
     files: dict[str, str]
-    """Text by name, of everything in its folder /out."""
+    """Text of each file in its folder /out, by name"""
 
 
 def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Left:
-    """Boot, run a shell script in the guest, come back with what it left in /out.
+    """Boots the guest, runs a shell script in it and returns the files in /out.
 
-    `programs` stand in /bin, with their libraries; `files` in /in. The script has to write down what it
-    finds: QEMU ends with 0 whatever happened inside.
+    The `programs` are in /bin with their libraries, the `files` in /in. The script must write its results to
+    files, because QEMU always ends with 0.
     """
     folder = CACHE / "work"
     shutil.rmtree(folder, ignore_errors=True)
@@ -164,5 +163,5 @@ poweroff -f
                 if content is not None:
                     left[member.name.removeprefix("./")] = content.read().decode(errors="replace")
     except tarfile.TarError:
-        pass  # the guest died before it could tell; its console shows how
+        pass  # the guest ended too early; its console shows the reason
     return Left(ran.stdout, left)

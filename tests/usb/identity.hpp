@@ -10,19 +10,19 @@
 
 namespace emulator {
 
-/// What a device is and how it goes about what the protocol leaves open; what is fixed stands in EmulatedDevice.
+/// Properties of a device, and its choices for everything that the protocol leaves open.
 struct Identity {
     // GET_INFO
-    std::uint8_t magic = 'I';  ///< another one makes it somebody else's device
+    std::uint8_t magic = 'I';  ///< Another value makes it a foreign device.
     std::uint16_t firmware = 0x0100;
     std::uint32_t counts_per_rev = 65536;
     std::int32_t max_torque_uNm = 5'000'000;
     std::uint16_t rate_hz = 1000;
     std::uint16_t watchdog_ms = 20;
-    std::uint32_t capabilities = 3;  ///< bit 0 force transducer, bit 1 measured velocity
+    std::uint32_t capabilities = 3;  ///< Bit 0 force transducer, bit 1 measured velocity.
     std::uint64_t uid = 0x5041'4C50'0001ULL;
-    std::size_t info_size = 32;              ///< another one makes it a device of another protocol
-    bool tells_watchdog_that_is_set = true;  ///< else the one that it starts with
+    std::size_t info_size = 32;              ///< Another value makes it a device of another protocol.
+    bool tells_watchdog_that_is_set = true;  ///< Otherwise it reports the initial one.
 
     // Descriptors
     std::u16string manufacturer = u"palpate";
@@ -39,25 +39,25 @@ struct Identity {
     bool has_second_interface = false;
     Bytes class_descriptor;  ///< between interface and endpoints
 
-    // Counters begin close to their ends, so that every run sees them wrap.
+    // Counters begin close to their ends, so that they wrap in every run.
     std::uint16_t first_sequence = 65'500;
     std::uint32_t first_us = 4'294'867'296U;
     std::int32_t first_count = 0;
-    std::uint16_t first_out_sequence = 0;     ///< echoed before there was an OUT packet
-    std::uint16_t first_out_age_us = 0xFFFF;  ///< the same
+    std::uint16_t first_out_sequence = 0;     ///< Echoed before the first OUT packet.
+    std::uint16_t first_out_age_us = 0xFFFF;  ///< Echoed before the first OUT packet.
 
-    // Habits
-    bool flipped = false;          ///< a firmware whose torque points the wrong way
-    bool takes_out_first = false;  ///< OUT packets act before the encoder of their frame is latched
-    bool tells_in_first = false;   ///< a controller that ends a frame's IN transfer before its OUT transfer
+    // Choices of the firmware
+    bool flipped = false;          ///< The torque has the wrong sign.
+    bool takes_out_first = false;  ///< OUT packets act before the encoder of their frame is latched.
+    bool tells_in_first = false;   ///< A frame ends its IN transfer before its OUT transfer.
     std::size_t held_packets =
-        0;  ///< that wait unread, as they were; 0: the newest takes the place of an unread one
-    bool hears_while_disabled = true;  ///< else OUT packets are accepted only while it is enabled
-    bool refuses_by_stall = true;      ///< else ENABLE after an emergency stop is taken, and does nothing
-    bool stop_disables = true;         ///< an emergency stop takes the enabled bit back as well
-    std::uint16_t spare_status = 0;    ///< bits that nobody has given a meaning
+        0;  ///< Number of packets that wait unread. With 0 the newest replaces an unread one.
+    bool hears_while_disabled = true;  ///< Otherwise OUT packets are accepted only while it is enabled.
+    bool refuses_by_stall = true;    ///< Otherwise ENABLE after an emergency stop is accepted without effect.
+    bool stop_disables = true;       ///< An emergency stop also clears the enabled bit.
+    std::uint16_t spare_status = 0;  ///< Bits without a meaning.
     std::uint16_t temperature_dC = 253;
-    std::int32_t torque_step_uNm = 1;  ///< of its current control
+    std::int32_t torque_step_uNm = 1;  ///< Resolution of the current control.
     std::uint32_t latch_jitter_us = 0;
 
     [[nodiscard]] Bytes device_descriptor() const {

@@ -10,7 +10,7 @@ namespace emulator {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Appends an integer, least byte first.
+/// Appends an integer, least significant byte first.
 template <class Integer>
 void put(Bytes& bytes, Integer value) {
     static_assert(std::is_integral_v<Integer>);
@@ -21,7 +21,7 @@ void put(Bytes& bytes, Integer value) {
     }
 }
 
-/// Reads an integer, least byte first.
+/// Reads an integer, least significant byte first.
 template <class Integer>
 [[nodiscard]] Integer get(const Bytes& bytes, std::size_t offset) {
     std::uint64_t bits = 0;

@@ -20,13 +20,13 @@ inline constexpr std::uint16_t encoder_fault = 16;
 inline constexpr std::uint16_t over_temperature = 32;
 inline constexpr std::uint16_t emergency_stop = 64;
 
-/// The part of a device that makes torque, and everything that ends one. Times are those of the device's clock.
+/// Motor of a device, with everything that ends a torque. Times are those of the device's clock.
 class Motor {
   public:
     explicit Motor(Identity identity)
         : identity_{std::move(identity)}, out_sequence_{identity_.first_out_sequence} {}
 
-    /// As after power-up, but for what its counters begin with.
+    /// Restarts like after power-up; only the first values of the counters differ.
     void start_anew() {
         const Identity identity = identity_;
         const std::uint64_t outs = outs_;
@@ -36,7 +36,7 @@ class Motor {
         outs_ = outs;
         bad_outs_ = bad_outs;
     }
-    /// Bus reset, suspend and SET_CONFIGURATION end every torque.
+    /// Ends the torque, as bus reset, suspend and SET_CONFIGURATION do.
     void disarm() {
         enabled_ = false;
         torque_uNm_ = 0;
@@ -65,13 +65,13 @@ class Motor {
         return {};
     }
 
-    /// A fault of the status; it stays until it is cleared.
+    /// Sets a fault of the status until CLEAR.
     void fail(std::uint16_t bit) {
         faults_ |= bit;
         torque_uNm_ = 0;
         enabled_ = enabled_ && !(bit == emergency_stop && identity_.stop_disables);
     }
-    /// Makes half the torque for now, and says so.
+    /// Halves the torque and sets the status bit.
     void saturate(bool now) { saturates_ = now; }
 
     void take(const Bytes& packet, std::uint32_t clock_us) {
@@ -96,7 +96,7 @@ class Motor {
             torque_uNm_ = 0;
         }
     }
-    /// The watchdog.
+    /// Runs the watchdog.
     void look(std::uint32_t clock_us) {
         if (has_heard_ && clock_us - heard_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, life_ms_)) {
             tripped_ = true;
@@ -118,7 +118,7 @@ class Motor {
                                           identity_.spare_status);
     }
     [[nodiscard]] std::uint16_t watchdog_ms() const { return watchdog_ms_; }
-    /// Of the last OUT packet that was accepted.
+    /// Returns the sequence number of the last accepted OUT packet.
     [[nodiscard]] std::uint16_t out_sequence() const { return out_sequence_; }
     [[nodiscard]] std::uint16_t out_age_us(std::uint32_t clock_us) const {
         const std::uint32_t age = std::min<std::uint32_t>(clock_us - heard_us_, 0xFFFF);
@@ -140,7 +140,7 @@ class Motor {
     std::int32_t torque_uNm_ = 0;
     std::uint16_t out_sequence_ = 0;
     std::uint32_t heard_us_ = 0;
-    bool has_heard_ = false;  ///< since it started
+    bool has_heard_ = false;  ///< since the start
     std::uint64_t outs_ = 0;
     std::uint64_t bad_outs_ = 0;
 };

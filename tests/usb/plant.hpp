@@ -7,8 +7,8 @@
 
 namespace emulator {
 
-/// The mechanics behind the emulated encoder: a handle with a motor, a hand that sweeps it, and, where one is
-/// asked for, a real spring on the same shaft.
+/// Mechanics of the emulated device: a handle with a motor, a hand that moves it, and optionally a real spring on the
+/// same shaft.
 ///
 ///     J dv/dt = torque - b v - k x + K_h (target(t) - x) - B_h v - f_c sgn v
 ///
@@ -17,10 +17,10 @@ struct Plant {
     double inertia = 2e-4;         ///< J, handle and motor [kg*m^2]
     double damping = 0.06;         ///< b [N*m*s/rad]
     double friction = 0.0;         ///< f_c, Coulomb [N*m]
-    double spring = 0.0;           ///< k, of the real object; 0 = none [N*m/rad]
-    double hand_stiffness = 15.0;  ///< K_h; 0 = nobody holds the handle [N*m/rad]
+    double spring = 0.0;           ///< k, of the real object; 0: none [N*m/rad]
+    double hand_stiffness = 15.0;  ///< K_h; 0: without a hand [N*m/rad]
     double hand_damping = 0.05;    ///< B_h [N*m*s/rad]
-    double hand_lower = 0.02;      ///< least target [rad]
+    double hand_lower = 0.02;      ///< smallest target [rad]
     double hand_upper = 0.47;      ///< largest target [rad]
     double hand_hz = 0.5;          ///< sweeps a second
 
@@ -28,7 +28,7 @@ struct Plant {
     double velocity = 0.0;  ///< [rad/s]
     double time = 0.0;      ///< [s]
 
-    /// Goes on by `seconds` under a constant motor torque [N*m].
+    /// Advances by `seconds` with a constant motor torque [N*m].
     void advance(double torque, double seconds) {
         constexpr int substeps = 20;
         const double step = seconds / substeps;
@@ -38,14 +38,14 @@ struct Plant {
             const double hand =
                 hand_stiffness > 0.0 ? hand_stiffness * (target - position) - hand_damping * velocity : 0.0;
             velocity += step / inertia * (torque + object_torque() + hand - damping * velocity);
-            // Coulomb friction stops the handle, but never turns it round.
+            // Coulomb friction stops the handle but does not reverse it.
             velocity = std::copysign(std::max(0.0, std::abs(velocity) - step / inertia * friction), velocity);
             position += step * velocity;
             time += step;
         }
     }
 
-    /// Of the real object on the handle [N*m].
+    /// Returns the torque of the real object on the handle [N*m].
     [[nodiscard]] double object_torque() const { return -spring * position; }
 };
 

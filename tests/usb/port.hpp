@@ -12,20 +12,20 @@
 
 namespace emulator {
 
-/// One transfer of the host, in the words of the kernel.
+/// Transfer of the host, with the terms of the kernel.
 struct Transfer {
-    std::uint64_t id = 0;  ///< the transport's own name for it
+    std::uint64_t id = 0;  ///< id of the transport
     const void* owner = nullptr;
     bool is_control = false;
     std::uint8_t endpoint = 0;
     Bytes setup;
-    Bytes data;              ///< on its way out, or what came in
-    std::size_t length = 0;  ///< room for what comes in
-    std::size_t actual = 0;  ///< bytes moved
+    Bytes data;              ///< outgoing or received data
+    std::size_t length = 0;  ///< largest size of received data
+    std::size_t actual = 0;  ///< transferred bytes
     int status = 0;          ///< 0 or a negative errno
 };
 
-/// Where the device is plugged in: transfers wait here until a frame serves them. Knows no transport.
+/// Port of the device: transfers wait here until a frame serves them. It is independent of the transport.
 class Port {
   public:
     explicit Port(EmulatedDevice device) : device_{std::move(device)} {}
@@ -33,7 +33,7 @@ class Port {
     [[nodiscard]] EmulatedDevice& device() { return device_; }
     [[nodiscard]] const EmulatedDevice& device() const { return device_; }
 
-    /// 0, or a negative errno. Control transfers are done at once.
+    /// Returns 0 or a negative errno. Control transfers end at once.
     int submit(Transfer transfer) {
         if (device_.is_unplugged()) {
             return -ENODEV;
@@ -58,7 +58,7 @@ class Port {
         return 0;
     }
 
-    /// Takes a waiting transfer back; false: it is not waiting. It still ends, with `status`.
+    /// Cancels a waiting transfer, which ends with `status`. Returns false if it is not waiting.
     bool cancel(std::uint64_t id, const void* owner, int status) {
         for (std::deque<Transfer>* queue : {&in_, &out_}) {
             const auto found = std::find_if(queue->begin(), queue->end(), [&](const Transfer& transfer) {
@@ -74,13 +74,13 @@ class Port {
         return false;
     }
 
-    /// Whoever held the device let it go: the next host begins anew.
+    /// Prepares for the next host after the device was closed.
     void let_go() {
         reads_ahead_ = false;
         owes_answer_ = true;
     }
 
-    /// The transfers of one that is gone.
+    /// Removes the transfers of a client that has ended.
     void forget(const void* owner) {
         for (std::deque<Transfer>* queue : {&in_, &out_, &done_}) {
             std::erase_if(*queue, [&](const Transfer& transfer) { return transfer.owner == owner; });
@@ -91,10 +91,10 @@ class Port {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
         owes_answer_ =
-            owes_answer_ && endpoint == 0x81;  // the answer was lost, whether the host knows or not
+            owes_answer_ && endpoint == 0x81;  // the answer was lost, even if the host does not know it
     }
 
-    /// One frame of the bus.
+    /// Runs one frame of the bus.
     void frame() {
         if (device_.is_unplugged()) {
             return;
@@ -126,15 +126,15 @@ class Port {
         }
     }
 
-    /// Whether the host has done its part of a frame: it reads, and has answered every packet that it could.
+    /// Returns true if the host has done its part of a frame: it reads, and has answered every packet that it could.
     [[nodiscard]] bool host_is_ready() const {
         return !in_.empty() && (!out_.empty() || !owes_answer_) && !in_held_ && !out_held_;
     }
-    /// Whether the host keeps reads queued, or does one thing after the other.
+    /// Returns true if the host keeps reads queued; false if it reads and writes one after the other.
     [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
-    /// Whether such a host has not come to queue the next one.
+    /// Returns true if such a host has not queued the next read.
     [[nodiscard]] bool lacks_reads() const { return reads_ahead_ && in_.empty(); }
-    /// Whether an OUT packet waits for a later frame than the one that it was sent for.
+    /// Returns true if an OUT packet has missed its frame.
     [[nodiscard]] bool is_behind() const { return out_refused_ && !out_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
@@ -182,20 +182,19 @@ class Port {
     std::deque<Transfer> in_;
     std::deque<Transfer> out_;
     std::deque<Transfer> done_;
-    bool in_held_ = false;  ///< a halted endpoint serves nothing until it is cleared
+    bool in_held_ = false;  ///< a halted endpoint serves no transfer until it is cleared
     bool out_held_ = false;
     bool out_refused_ = false;
     bool reads_ahead_ = false;
-    bool owes_answer_ = true;  ///< the host has a packet, and has sent nothing since
+    bool owes_answer_ = true;  ///< the host has received a packet and has not sent one since
 };
 
-/// When frames begin.
+/// Decides when a frame begins.
 ///
-/// Paced: every millisecond; up to three late ones are made up for. Lock-step: as soon as the host has done its part,
-/// so that nothing depends on how fast the machine is. Before the host's first command, and while the device itself
-/// takes its time, frames go by the clock in lock-step too, as long as the host reads. A host that does not do its
-/// part is waited for; when patience ends it misses one frame. One that does not keep two reads queued does one thing
-/// after the other, and is waited for a few milliseconds only.
+/// Paced: every millisecond; up to three late frames follow at once. Lock-step: when the host has done its part, so
+/// that the result does not depend on the speed of the machine. Before the host's first command, and while the device
+/// refuses transfers, frames follow the clock in lock-step too, while the host reads. Otherwise a frame waits for the
+/// host; after `patience` the host misses one frame. For a host without two queued reads it waits a few milliseconds.
 class FrameClock {
   public:
     using Clock = std::chrono::steady_clock;
@@ -212,7 +211,7 @@ class FrameClock {
     }
     void host_left() { in_conversation_ = false; }
 
-    /// Whether a frame begins now; else `until` is when to look again at the latest.
+    /// Returns true if a frame begins now; otherwise sets `until` to the latest time of the next call.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
         const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow() && !port.is_behind();
@@ -234,14 +233,14 @@ class FrameClock {
     }
 
   private:
-    /// What was sent before the conversation arrives before it begins: else the host stays a packet behind in it.
+    /// Time for earlier packets to arrive before lock-step begins; otherwise the host stays a packet behind.
     static constexpr std::chrono::milliseconds settling{20};
 
     bool lock_step_;
     Clock::duration period_;
     Clock::duration patience_;
     Clock::time_point last_ = Clock::now();
-    Clock::time_point first_ = last_;  ///< of the conversation
+    Clock::time_point first_ = last_;  ///< first frame in lock-step
     bool in_conversation_ = false;
 };
 

@@ -9,7 +9,7 @@
 
 namespace emulator {
 
-/// What a device says to a control transfer.
+/// Answer of a device to a control transfer.
 struct Answer {
     int status = 0;  ///< 0, or -EPIPE for a stall
     Bytes data;
@@ -19,7 +19,7 @@ struct Answer {
     return {-EPIPE, {}};
 }
 
-/// The eight bytes that a control transfer begins with.
+/// First eight bytes of a control transfer.
 struct Setup {
     std::uint8_t type;
     std::uint8_t request;
@@ -35,7 +35,7 @@ struct Setup {
           length{get<std::uint16_t>(bytes, 6)} {}
 };
 
-/// Endpoints that refuse everything until they are cleared.
+/// Endpoints that refuse every transfer until they are cleared.
 struct Halts {
     bool in = false;
     bool out = false;
@@ -43,7 +43,7 @@ struct Halts {
     void clear(std::uint8_t endpoint) { (endpoint == 0x81 ? in : out) = false; }
 };
 
-/// The requests that every USB device knows (chapter 9 of the specification), but for those that end a torque.
+/// Answers the standard requests (chapter 9 of the USB specification), except those that end a torque.
 [[nodiscard]] inline Answer standard_answer(const Setup& setup, const Identity& identity, Halts& halts) {
     switch (setup.request) {
         case 0: {  // GET_STATUS

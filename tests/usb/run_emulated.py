@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Run a command as if the emulated USB device were plugged in.
+"""Runs a command with the emulated USB device.
 
     tests/usb/run_emulated.py [OPTIONS] -- COMMAND...
 
-The emulator is built by CMake with the C++ tests (preset dev), or on demand by this script. Without options
-its frames are paced by the clock; `--lock-step` makes the transfers of the host the clock. All options:
-`--help`. Exit code: that of the command; 77 where something is missing.
+CMake builds the emulator with the C++ tests (preset dev); otherwise this script builds it. By default the
+clock paces the frames; with `--lock-step` the transfers of the host pace them. `--help` lists all options.
+The exit code is that of the command, or 77 if a package is missing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SOURCES = ROOT / "tests" / "usb"
 
 
 def emulator() -> Path | str:
-    """The program, built where it has to be; a sentence where it cannot be."""
+    """Returns the program, built if necessary, or the reason why it cannot be built."""
     given = os.environ.get("PALPATE_USB_EMULATOR")
     if given:
         return Path(given)
@@ -56,4 +56,4 @@ if __name__ == "__main__":
     if isinstance(found, str):
         print(f"skipped: {found}", file=sys.stderr)
         sys.exit(MISSING)
-    os.execv(found, [str(found), *sys.argv[1:]])  # so that a signal reaches the emulator, which passes it on
+    os.execv(found, [str(found), *sys.argv[1:]])  # the emulator receives the signals and forwards them

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sets the emulated device up through pyusb and libusb, and prints what came of it as one JSON object.
+"""Sets up the emulated device through pyusb and libusb, and prints the results as one JSON object.
 
 tests/usb/run_emulated.py -- python tests/usb/set_up_over_pyusb.py
 """
@@ -24,7 +24,7 @@ STREAM_IN = 0x81
 
 
 def order(words: str) -> str:
-    """A word to the emulated device itself, past the libraries."""
+    """Sends an order to the emulated device without the USB libraries and returns the answer."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
         asking.bind("")
         asking.sendto(words.encode(), os.environ["PALPATE_EMULATOR"])
@@ -56,7 +56,7 @@ def raw() -> usb.core.Device:
 
 
 def packet() -> tuple[int, int]:
-    """Count and status of a packet: one transfer, as pyusb can."""
+    """Returns count and status of one packet that pyusb reads."""
     device = raw()
     fields = struct.unpack("<BBHIiiiHHHHi", bytes(device.read(STREAM_IN, 64, timeout=1000)))
     usb.util.dispose_resources(device)
@@ -92,7 +92,7 @@ def main() -> dict[str, Any]:
         told["enabled after it was cleared"] = state()["enabled"]
         device.disable()
 
-    # The stream's endpoint halts; a halted endpoint says so until it is cleared.
+    # The endpoint of the stream halts; it reports the halt until it is cleared.
     order("fault stall-in 1")
     handle = raw()
     stalls = []

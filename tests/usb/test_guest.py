@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control on the emulated device behind a real kernel's USB stack, in a guest whose clock is exact.
+"""Tests palpate-control with the emulated device behind the USB stack of a real kernel, in a guest.
 
-`make test-full` runs it; by hand: .venv/bin/python -m pytest tests/usb -s
+The clock of the guest is exact. `make test-full` includes these tests.
+To run them alone: .venv/bin/python -m pytest tests/usb -s
 """
 
 from __future__ import annotations
@@ -37,17 +38,17 @@ SLOW_FROM = 2000
 DIRECT = "--uncertified --structure direct"
 UNSTOPPED = "--uncertified --lowest-rate-share 0"
 
-# What GET_INFO and the echoes say of the emulated device; mechanics and hand are the defaults of both.
+# Properties of the emulated device in GET_INFO and the echoes; mechanics and hand have the default values.
 KNOWN: dict[str, Any] = {"id": "EMU-1", "delay_s": 1.25e-3, "force_step": 1e-6}
 DEVICE = DeviceProfile(**KNOWN)
-# A certificate spends friction. The emulated device has none, but this is about what a certificate forbids.
+# A certificate needs friction. The emulated device is frictionless, but these tests only check the refusals.
 WITH_FRICTION = DeviceProfile(**KNOWN, coulomb_friction=1e-3)
 
 RENDER = """
 name=$1
 model=$2
 shift 2
-palpate-control /in/$model --device usb --record $name.csv --json "$@" > $name.json 2> $name.told
+palpate-control /in/$model --device usb --record $name.csv --json "$@" > $name.json 2> $name.stderr
 echo $? > $name.code
 """
 FACTS = """
@@ -60,11 +61,11 @@ done
 
 @dataclass
 class Told:
-    """What the guest left of its runs."""
+    """Results of the runs in the guest."""
 
     left: guest.Left
     felt: Plan
-    """What the run `whole` renders."""
+    """Plan of the run `whole`"""
 
     def text(self, name: str) -> str:
         assert name in self.left.files, f"no {name} came back\n{self.left.console[-3000:]}"
@@ -72,7 +73,7 @@ class Told:
 
     def summary(self, run: str) -> dict[str, Any]:
         told = self.text(f"{run}.json")
-        assert told, self.text(f"{run}.told")
+        assert told, self.text(f"{run}.stderr")
         summary: dict[str, Any] = json.loads(told)
         return summary
 
@@ -122,7 +123,7 @@ usbip_emulator --rate-hz 900 -- sh /in/render told_slow spring.json --duration-s
     return Told(left, felt)
 
 
-def test_the_kernel_enumerates_the_device(told: Told) -> None:
+def test_kernel_enumerates_the_device(told: Told) -> None:
     facts = dict(line.split(" ", 1) for line in told.text("facts").splitlines())
     assert facts["manufacturer"] == "palpate"
     assert facts["product"] == "emulated knob"
@@ -133,7 +134,7 @@ def test_the_kernel_enumerates_the_device(told: Told) -> None:
     assert "new full-speed USB device number 2" in told.text("dmesg")
 
 
-def test_the_loop_runs_at_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
+def test_loop_runs_at_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]) -> None:
     summary = told.summary("whole")
     with capsys.disabled():
         print(
@@ -141,20 +142,20 @@ def test_the_loop_runs_at_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]
             f"period {summary['period']}, round trip {summary['usb']['round_trip']}, "
             f"delay {summary['usb']['delay_samples']}, {summary['lost_samples']} samples lost"
         )
-    assert told.text("whole.code").strip() == "0", told.text("whole.told")
+    assert told.text("whole.code").strip() == "0", told.text("whole.stderr")
     assert summary["rate_hz"] == pytest.approx(1000.0, rel=5e-3)
     assert summary["lost_samples"] == summary["repeated_samples"] == 0
     assert summary["ticks"] == summary["recorded"] == round(1e3 * DURATION_S)
     assert summary["usb"]["bus_errors"] == summary["usb"]["timeouts"] == 0
 
 
-def test_the_force_is_as_close_to_the_model_as_on_the_simulated_device(
+def test_force_error_is_at_most_twice_that_of_the_simulated_device(
     told: Told, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sweeps = round(SWEEP_S / DEVICE.period_s) * int((DURATION_S - 1.0) / SWEEP_S)
     trace = told.table("whole.trace")
     trace = trace[(trace["status"] & 1).eq(1) & trace["started"].gt(0)][-sweeps - 1 - 10 : -10]
-    # A torque stands in the row of the frame in which it arrived, and acts in the next one.
+    # A torque is in the row of the frame in which it arrived, and acts in the next frame.
     emulated = force_error(told.felt, -trace["torque_Nm"].to_numpy()[:-1], trace["position_rad"].to_numpy())
     rendering = simulate(told.felt, DEVICE, Hand(), DURATION_S)
     ends = rendering.columns["handle_end_rad"]
@@ -164,44 +165,44 @@ def test_the_force_is_as_close_to_the_model_as_on_the_simulated_device(
             f"\nguest: force error {1e3 * emulated:.3f} mN*m RMS, simulated device {1e3 * simulated:.3f}, "
             f"ratio {emulated / simulated:.3f}; largest torque {trace['torque_Nm'].abs().max():.2f} N*m"
         )
-    assert trace["position_rad"].max() > 0.4  # the wall was felt
+    assert trace["position_rad"].max() > 0.4  # the handle reached the wall
     assert emulated <= 2.0 * simulated
 
 
 def force_error(plan: Plan, force: np.ndarray, ends: np.ndarray) -> float:
-    """RMS of what acted in each tick, less the model at the tick's end; `ends` has one more in front."""
+    """Returns the RMS of applied force minus model at the end of the tick; `ends` starts one tick earlier."""
     return float(np.sqrt(np.mean(np.square(force - force_at(plan, ends)[1:]))))
 
 
-def test_unplugged_it_ends_with_a_fault_and_a_complete_record_and_plugged_in_it_goes_on(told: Told) -> None:
+def test_unplugging_ends_with_a_fault_and_a_complete_record_and_replugging_works(told: Told) -> None:
     summary = told.summary("cut")
     assert told.text("cut.code").strip() == "1"
-    # The kernel notices by and by: until then, nothing answers.
+    # The device does not answer until the kernel has noticed it.
     assert summary["status"] in ("Fault", "Timeout")
     assert summary["ended"].startswith("stopped by a fault of the device")
     assert len(told.table("cut.csv")) == summary["ticks"] == summary["recorded"]
     assert summary["ticks"] == pytest.approx(UNPLUGGED_AT, abs=10)
     assert told.text("left") == ""
     assert "USB disconnect, device number" in told.text("dmesg")
-    assert told.text("again.code").strip() == "0", told.text("again.told")
+    assert told.text("again.code").strip() == "0", told.text("again.stderr")
     assert told.summary("again")["ticks"] == 1000
 
 
-def test_a_rate_lower_than_asked_stops_a_certified_run_within_a_second(told: Told) -> None:
+def test_low_rate_stops_a_certified_run_within_a_second(told: Told) -> None:
     for run, ticks_before, rate_hz in (("slow", 0, 900.0), ("slowed", SLOW_FROM, 1000.0 / 3.0)):
         summary = told.summary(run)
         assert told.text(f"{run}.code").strip() == "1"
         assert "did not hold its rate" in summary["ended"]
-        assert "did not hold its rate" in told.text(f"{run}.told")
+        assert "did not hold its rate" in told.text(f"{run}.stderr")
         assert summary["ticks"] <= ticks_before + rate_hz + 1
         assert len(told.table(f"{run}.csv")) == summary["ticks"]
 
 
-def test_a_rate_lower_than_asked_is_said_within_a_second_where_nothing_is_certified(told: Told) -> None:
+def test_low_rate_of_an_uncertified_run_is_reported_within_a_second(told: Told) -> None:
     summary = told.summary("told_slow")
-    assert summary["ticks"] == 900  # which take a second
+    assert summary["ticks"] == 900  # in one second
     assert told.text("told_slow.code").strip() == "0"
-    warned = re.search(r"warning: the loop runs at ([0-9.]+) Hz", told.text("told_slow.told"))
+    warned = re.search(r"warning: the loop runs at ([0-9.]+) Hz", told.text("told_slow.stderr"))
     assert warned
     assert float(warned[1]) == pytest.approx(900.0, rel=5e-3)
     assert summary["rate_hz"] == pytest.approx(900.0, rel=5e-3)

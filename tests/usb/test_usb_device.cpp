@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// UsbDevice over real libusb, on a device that is emulated below it, in lock-step: no assertion on wall-clock time.
+// Tests UsbDevice with the real libusb on an emulated device, in lock-step, without assertions on wall-clock time.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -11,6 +11,7 @@
 #include "../cpp/support.hpp"
 #include "emulated_machine.hpp"
 #include "palpate/device/usb.hpp"
+#include "palpate/guard/guard_settings.hpp"
 
 namespace palpate {
 namespace {
@@ -20,7 +21,7 @@ using test::patient;
 using test::settled;
 using test::state;
 
-TEST(UsbDevice, SaysWhoItIsAndWhatItCan) {
+TEST(UsbDevice, ReportsItsNameAndProperties) {
     UsbDevice device = patient();
     ASSERT_EQ(device.open().reason, "");
     EXPECT_EQ(device.name().manufacturer, "palpate");
@@ -33,10 +34,11 @@ TEST(UsbDevice, SaysWhoItIsAndWhatItCan) {
     EXPECT_EQ(profile.id, "EMU-1");
     EXPECT_EQ(profile.period_s, 1e-3);
     EXPECT_EQ(profile.force_limit, 5.0);
+    EXPECT_EQ(guards_for({}, profile).device_damping, 0.0) << "nobody measured it";
     EXPECT_NO_THROW(validate(profile));
 }
 
-TEST(UsbDevice, EveryControlRequestDoesWhatThePageSays) {
+TEST(UsbDevice, ControlRequestsFollowTheProtocol) {
     detail::UsbConnection connection;
     ASSERT_EQ(connection.open("").reason, "");
     EXPECT_EQ(connection.request(wire::Request::Enable, 1), 0);
@@ -81,12 +83,12 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     EXPECT_EQ(health.stalls, 0U);
     EXPECT_EQ(health.bus_errors, 0U);
     EXPECT_GE(health.stream.round_trip.count(), static_cast<std::uint64_t>(samples));
-    // A busy machine misses a frame now and then: that command comes late, or is left out.
+    // A busy machine sometimes misses a frame, so that a command is late or skipped.
     EXPECT_LE(health.skipped_commands - before.skipped_commands, static_cast<std::uint64_t>(samples / 2));
-    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);  // one sample, as exact as a histogram is
+    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);  // one sample; histogram resolution
 }
 
-TEST(UsbDevice, AForceThatPushesOutMovesTheHandleBack) {
+TEST(UsbDevice, APositiveForceMovesTheHandleBack) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     const Reading before = settled(device);
@@ -97,7 +99,7 @@ TEST(UsbDevice, AForceThatPushesOutMovesTheHandleBack) {
     EXPECT_LT(after.velocity, before.velocity - 0.1);
 }
 
-TEST(UsbDevice, ForcesBeyondTheDeviceAreClippedAndNoNumbersAreZero) {
+TEST(UsbDevice, ClipsLargeForcesAndReplacesNanByZero) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     settled(device, 1e9);
@@ -106,7 +108,7 @@ TEST(UsbDevice, ForcesBeyondTheDeviceAreClippedAndNoNumbersAreZero) {
     EXPECT_EQ(state("torque_uNm"), 0.0);
 }
 
-TEST(UsbDevice, ClosingLeavesZeroTorqueADisabledDeviceAndNothingInFlight) {
+TEST(UsbDevice, CloseSetsZeroTorqueDisablesTheDeviceAndEndsAllTransfers) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     settled(device, 0.3);
@@ -120,7 +122,7 @@ TEST(UsbDevice, ClosingLeavesZeroTorqueADisabledDeviceAndNothingInFlight) {
     device.close();
 }
 
-TEST(UsbDevice, StartsAndStopsFiftyTimesAndLeavesNothingBehind) {
+TEST(UsbDevice, OpensAndClosesFiftyTimesWithoutLeaks) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     device.close();
@@ -145,14 +147,14 @@ TEST(UsbDevice, IsUsedByOneProgramAtATime) {
     EXPECT_EQ(settled(first).status, Status::Ok);
 }
 
-TEST(UsbDevice, CanBeHandedOn) {
+TEST(UsbDevice, CanBeMoved) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     settled(device, 0.1);
     UsbDevice other = std::move(device);
     EXPECT_EQ(other.exchange({0.1}).status, Status::Ok);
     EXPECT_EQ(device.exchange({0.1}).status,
-              Status::Fault);  // NOLINT(bugprone-use-after-move): that is the claim
+              Status::Fault);  // NOLINT(bugprone-use-after-move): tested here
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What goes wrong on the wire and in the device, and what UsbDevice makes of it.
+// Tests UsbDevice with faults on the wire and in the device.
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -19,7 +19,7 @@ using test::settled;
 using test::state;
 using test::tell;
 
-TEST(UsbDevice, PacketsThatAreNotOfThisProtocolAreCountedAndNeverBelieved) {
+TEST(UsbDevice, CountsAndIgnoresPacketsOfAnotherProtocol) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     std::uint64_t malformed = 0;
@@ -27,7 +27,7 @@ TEST(UsbDevice, PacketsThatAreNotOfThisProtocolAreCountedAndNeverBelieved) {
         const Reading before = settled(device);
         const std::uint64_t lost = device.health().stream.lost;
         tell(std::string("fault ") + fault + " 1");
-        const Reading after = device.exchange({0.0});  // the one behind it
+        const Reading after = device.exchange({0.0});  // the next packet
         EXPECT_EQ(after.status, Status::Ok) << fault;
         EXPECT_EQ(after.sequence, before.sequence + 2) << fault;
         EXPECT_EQ(device.health().stream.malformed, ++malformed) << fault;
@@ -35,7 +35,7 @@ TEST(UsbDevice, PacketsThatAreNotOfThisProtocolAreCountedAndNeverBelieved) {
     }
 }
 
-TEST(UsbDevice, HaltedEndpointsAreClearedAndTheStreamGoesOn) {
+TEST(UsbDevice, ClearsHaltedEndpointsAndContinuesTheStream) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     std::uint64_t stalls = 0;
@@ -55,7 +55,7 @@ TEST(UsbDevice, HaltedEndpointsAreClearedAndTheStreamGoesOn) {
     }
 }
 
-TEST(UsbDevice, ADeviceThatDoesNotAnswerIsATimeoutAndNoMore) {
+TEST(UsbDevice, ReportsATimeoutWhileTheDeviceDoesNotAnswer) {
     UsbOptions options;
     options.wait = milliseconds{5};
     UsbDevice device{options};
@@ -75,8 +75,8 @@ TEST(UsbDevice, ADeviceThatDoesNotAnswerIsATimeoutAndNoMore) {
     EXPECT_EQ(status, Status::Ok);
 }
 
-// A certified run ends with the first late command, so none may be late because an earlier one was.
-TEST(UsbDevice, ACommandThatMissesItsFrameDoesNotMakeAllThatFollowLate) {
+// A certified run ends with the first late command, so a late command must not delay the next ones.
+TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
     constexpr int rounds = 20;
     constexpr int commands = 40;
     UsbOptions options;
@@ -86,7 +86,7 @@ TEST(UsbDevice, ACommandThatMissesItsFrameDoesNotMakeAllThatFollowLate) {
     ASSERT_EQ(device.open().reason, "");
     int late = 0;
     int in_time_again = 0;
-    for (int round = 0; round < rounds; ++round) {  // the first is that of the stream's first command
+    for (int round = 0; round < rounds; ++round) {  // the first includes the first command of the stream
         tell("fault busy 1");
         int in_a_row = 0;
         for (int k = 0; k < commands; ++k) {
@@ -97,10 +97,10 @@ TEST(UsbDevice, ACommandThatMissesItsFrameDoesNotMakeAllThatFollowLate) {
         in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
     EXPECT_GE(late, rounds);
-    EXPECT_GE(in_time_again, rounds / 2);  // all of them, where this machine is not late by itself
+    EXPECT_GE(in_time_again, rounds / 2);  // all rounds, if this machine is fast enough
 }
 
-TEST(UsbDevice, SamplesLeftOutShowInTheSequence) {
+TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     const Reading before = settled(device);
@@ -114,7 +114,7 @@ TEST(UsbDevice, SamplesLeftOutShowInTheSequence) {
     EXPECT_EQ(device.health().stream.repeated, 1U);
 }
 
-TEST(UsbDevice, AnEchoFromBeforeIsCounted) {
+TEST(UsbDevice, CountsLateEchoes) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     settled(device);
@@ -124,12 +124,12 @@ TEST(UsbDevice, AnEchoFromBeforeIsCounted) {
     EXPECT_EQ(device.health().stream.late_echoes, 1U);
 }
 
-TEST(UsbDevice, TheWatchdogEndsATorqueAndTheNextCommandBringsItBack) {
+TEST(UsbDevice, WatchdogEndsTheTorqueUntilTheNextCommand) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     settled(device, 0.2);
     EXPECT_EQ(state("torque_uNm"), -200'000.0);
-    tell("fault freeze 15");  // longer than a command lives
+    tell("fault freeze 15");  // longer than the lifetime of a command
     const Reading tripped = device.exchange({0.2});
     EXPECT_EQ(tripped.status, Status::Timeout);
     EXPECT_EQ(tripped.applied, 0.0);
@@ -138,7 +138,7 @@ TEST(UsbDevice, TheWatchdogEndsATorqueAndTheNextCommandBringsItBack) {
     EXPECT_EQ(state("torque_uNm"), -200'000.0);
 }
 
-TEST(UsbDevice, EveryFaultOfTheDeviceIsAFault) {
+TEST(UsbDevice, ReportsEveryFaultOfTheDevice) {
     for (const char* fault : {"encoder", "over-temperature", "emergency-stop", "reset"}) {
         UsbDevice device = patient();
         ASSERT_EQ(device.open().reason, "") << fault;
@@ -160,7 +160,7 @@ TEST(UsbDevice, EveryFaultOfTheDeviceIsAFault) {
     }
 }
 
-TEST(UsbDevice, ASaturatedTorqueIsLimited) {
+TEST(UsbDevice, ReportsASaturatedTorqueAsLimited) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     settled(device, 0.2);
@@ -168,7 +168,7 @@ TEST(UsbDevice, ASaturatedTorqueIsLimited) {
     EXPECT_EQ(device.exchange({0.2}).status, Status::Limited);
 }
 
-TEST(UsbDevice, UnpluggedItIsGoneForGoodAndPluggedInItGoesOn) {
+TEST(UsbDevice, ReportsAFaultAfterUnpluggingAndOpensAgainAfterPluggingIn) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     device.close();
@@ -186,7 +186,7 @@ TEST(UsbDevice, UnpluggedItIsGoneForGoodAndPluggedInItGoesOn) {
         device.close();
         EXPECT_EQ(device.in_flight(), 0);
         EXPECT_EQ(open_files(), files);
-        const std::string reason = device.open().reason;  // depends on whether the system knows already
+        const std::string reason = device.open().reason;  // the system may not have noticed yet
         EXPECT_TRUE(reason.find("is plugged in") != std::string::npos ||
                     reason.find("unplugged meanwhile") != std::string::npos)
             << reason;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// UsbDevice on machines with other devices than the usual one: two, none, a foreign one, one that may not be opened.
+// Tests UsbDevice on machines with two devices, no device, a foreign device, and a device that cannot be opened.
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -19,7 +19,7 @@ using test::settled;
 using test::state;
 using test::tell;
 
-TEST(UsbTwoDevices, AreToldApartByTheirSerialNumbers) {
+TEST(UsbTwoDevices, AreDistinguishedBySerialNumber) {
     const std::string both = patient().open().reason;
     EXPECT_NE(both.find("2 USB devices could be meant (LEFT, RIGHT): choose with usb:SERIAL"),
               std::string::npos)
@@ -41,17 +41,17 @@ TEST(UsbTwoDevices, AreToldApartByTheirSerialNumbers) {
     EXPECT_NE(neither.find("serial number MIDDLE; there is LEFT, RIGHT"), std::string::npos) << neither;
 }
 
-TEST(UsbNoDevice, SaysWhatToLookFor) {
+TEST(UsbNoDevice, MessageNamesTheCommandThatListsTheDevice) {
     EXPECT_NE(patient().open().reason.find("lsusb -d 1209:0001"), std::string::npos);
 }
 
-TEST(UsbForeignDevice, IsLeftAlone) {
+TEST(UsbForeignDevice, IsRefusedWithoutAnOutPacket) {
     const std::string reason = patient().open().reason;
     EXPECT_NE(reason.find("is 1209:0001 but not of this protocol"), std::string::npos) << reason;
     EXPECT_EQ(state("outs"), 0.0);
 }
 
-TEST(UsbDeniedDevice, NamesDeviceReasonAndCure) {
+TEST(UsbDeniedDevice, MessageNamesDeviceReasonAndCure) {
     const std::string reason = patient().open().reason;
     EXPECT_NE(reason.find("USB device (bus 1, address 2) cannot be opened: permission denied"),
               std::string::npos)
@@ -59,7 +59,7 @@ TEST(UsbDeniedDevice, NamesDeviceReasonAndCure) {
     EXPECT_NE(reason.find("sudo palpate devices --install-udev-rule"), std::string::npos) << reason;
 }
 
-TEST(UsbPlainDevice, WithoutTransducerAndTachometerHasNoMeasuredForceAndDifferencesItsPosition) {
+TEST(UsbPlainDevice, MeasuredForceIsNanAndVelocityIsThePositionDifference) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());
     Reading last = settled(device);
@@ -71,9 +71,9 @@ TEST(UsbPlainDevice, WithoutTransducerAndTachometerHasNoMeasuredForceAndDifferen
     }
 }
 
-// Every one of these is another device: whatever the protocol leaves to a firmware is drawn by chance.
+// Each run has another device, with random choices of the firmware.
 
-TEST(UsbOtherFirmware, IsTheSameDevice) {
+TEST(UsbOtherFirmware, BehavesLikeTheUsualDevice) {
     UsbDevice device = patient();
     ASSERT_EQ(device.open().reason, "");
     Reading last = settled(device);
@@ -87,7 +87,7 @@ TEST(UsbOtherFirmware, IsTheSameDevice) {
         last = reading;
     }
     const double step = wire::position_of(1, device.info().counts_per_rev);
-    EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);  // a sample or two ago
+    EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);  // one or two samples late
     EXPECT_EQ(device.health().stream.lost, before.stream.lost);
     EXPECT_EQ(device.health().stream.late_echoes, 0U);
     EXPECT_EQ(device.health().stream.watchdog_trips, 0U);
@@ -110,7 +110,7 @@ TEST(UsbOtherFirmware, IsFoundAgainByItsSerialNumber) {
     EXPECT_NE(patient("another").open().reason.find("there is " + serial), std::string::npos);
 }
 
-TEST(UsbOtherFirmware, IsNotTakenForWhatItWasBefore) {
+TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     UsbDevice rendering = patient();
     ASSERT_EQ(rendering.open().reason, "");
     settled(rendering, 0.2);
@@ -129,7 +129,7 @@ TEST(UsbOtherFirmware, IsNotTakenForWhatItWasBefore) {
     ASSERT_EQ(connection.open("").reason, "");
     ASSERT_EQ(connection.request(wire::Request::Clear, 0), 0);
     ASSERT_EQ(connection.request(wire::Request::Enable, 1),
-              0);  // and left so, as by a program that was killed
+              0);  // stays enabled, like after a killed program
     connection.close();
     UsbOptions options;
     options.makes_force = false;
@@ -141,7 +141,7 @@ TEST(UsbOtherFirmware, IsNotTakenForWhatItWasBefore) {
     }
 }
 
-TEST(UsbText, IsReadFromAllOfUnicodeAndFromNothingElse) {
+TEST(UsbText, AcceptsAllOfUnicodeAndRefusesInvalidText) {
     const auto text = [](const std::u16string& units) {
         std::vector<std::uint8_t> bytes;
         for (const char16_t unit : units) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a command on a machine that has the emulated device at its USB, by umockdev:
+// Runs a command with the emulated device at the USB of the machine, by umockdev:
 //
 //   umockdev_emulator [OPTIONS] -- COMMAND...
 //
-// The command finds a socket in PALPATE_EMULATOR that takes orders as datagrams: fault KIND COUNT, plug, state.
+// PALPATE_EMULATOR names a socket that receives orders as datagrams: fault KIND COUNT, plug, state.
 // The exit code is that of the command.
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -62,7 +62,7 @@ class Emulation {
         changed_.notify_all();
         frames.join();
         if (trace_.is_open() && !places_.empty()) {
-            trace_ << places_.back()->node->port().device().trace_row();  // how the command left it
+            trace_ << places_.back()->node->port().device().trace_row();  // state after the command
         }
         return code;
     }
@@ -91,7 +91,7 @@ class Emulation {
         places_.push_back(std::move(place));
     }
 
-    /// Everything is everybody's, the node nobody's.
+    /// Gives all permissions on every file except the node, which cannot be opened.
     void deny(const std::string& node) {
         namespace fs = std::filesystem;
         gchar* root = umockdev_testbed_get_root_dir(testbed_);
@@ -105,7 +105,7 @@ class Emulation {
         fs::permissions(node, fs::perms::none);
     }
 
-    /// In the child: what stands before the command's own libraries, and who runs it.
+    /// Sets the preloaded libraries and the user of the command, in the child.
     void prepare() {
         const std::string first = settings_.preload_first;
         ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
@@ -117,7 +117,7 @@ class Emulation {
         }
     }
 
-    /// Every frame that is due; when to look again. Under the mutex.
+    /// Runs every due frame and returns the time of the next call. The caller holds the mutex.
     FrameClock::Clock::time_point begin_frames() {
         auto next = FrameClock::Clock::now() + std::chrono::milliseconds{50};
         for (const std::unique_ptr<Place>& place : places_) {
@@ -177,7 +177,7 @@ class Emulation {
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::unique_ptr<Place>> places_;
-    FrameClock::Clock::time_point wakes_at_{};  ///< of the frames' own thread
+    FrameClock::Clock::time_point wakes_at_{};  ///< wake-up time of the thread of the frames
     int next_address_ = 2;
     bool over_ = false;
 };
@@ -186,7 +186,7 @@ class Emulation {
 }  // namespace emulator
 
 int main(int count, char** words) {
-    // The emulator speaks to the testbed through the same library as the command.
+    // The emulator uses the testbed through the same library as the command.
     const char* preloaded = std::getenv("LD_PRELOAD");
     if (preloaded == nullptr || std::string(preloaded).find(emulator::preload) == std::string::npos) {
         ::setenv("LD_PRELOAD", emulator::preload, 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Started as it is, the program of the tests runs itself under the emulator, once for each kind of machine.
+// The test program starts itself again with the emulator, once for each kind of machine.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,7 +21,7 @@ struct Machine {
     std::vector<std::string> options;
 };
 
-/// This program again, under the emulator; the exit code.
+/// Runs this program with the emulator and returns the exit code.
 int run_under_emulator(const std::string& self, const Machine& machine, std::vector<std::string> words) {
     std::vector<std::string> command{PALPATE_USB_EMULATOR, "--lock-step"};
     command.insert(command.end(), machine.options.begin(), machine.options.end());

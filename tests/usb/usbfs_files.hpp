@@ -14,11 +14,10 @@
 
 namespace emulator {
 
-/// What a program finds of a device in the file system of a umockdev testbed: its folder in /sys, and its node in
-/// /dev/bus/usb, whose ioctls go to a handler.
+/// Files of a device in a umockdev testbed: its folder in /sys, and its node in /dev/bus/usb with a handler of ioctls.
 ///
-/// umockdev passes on ioctls but no poll(). The node is therefore a FIFO with room for one byte: full, and so not
-/// writable, while there is nothing to reap, and empty when there is. libusb waits for just that.
+/// umockdev forwards ioctls but not poll(). The node is therefore a FIFO for one byte, because libusb waits until it is
+/// writable. It is empty if a transfer can be reaped, otherwise full.
 class UsbfsFiles {
   public:
     UsbfsFiles(UMockdevTestbed* testbed, UMockdevIoctlBase* handler, const Identity& identity, int address)
@@ -43,10 +42,10 @@ class UsbfsFiles {
     UsbfsFiles(const UsbfsFiles&) = delete;
     UsbfsFiles& operator=(const UsbfsFiles&) = delete;
 
-    /// Where the node really is.
+    /// Returns the real path of the node.
     [[nodiscard]] const std::string& node_file() const { return node_file_; }
 
-    /// Whether there is something to reap.
+    /// Makes the node writable if a transfer can be reaped.
     void show(bool ready) {
         if (ready == shown_ready_) {
             return;
@@ -55,7 +54,7 @@ class UsbfsFiles {
         char byte = 0;
         const ssize_t moved = ready ? ::read(fifo_, &byte, 1) : ::write(fifo_, &byte, 1);
         if (moved != 1) {
-            throw std::runtime_error("the FIFO of the device node does not do as it should");
+            throw std::runtime_error("the FIFO of the device node failed");
         }
     }
 
@@ -78,7 +77,7 @@ class UsbfsFiles {
         return text;
     }
 
-    /// Files of /sys are not asked for names: what is not ASCII need not be right there.
+    /// Replaces other characters by '?', because names are not read from /sys.
     static std::string ascii(const std::u16string& text) {
         std::string letters;
         for (const char16_t unit : text) {
@@ -87,7 +86,7 @@ class UsbfsFiles {
         return letters;
     }
 
-    /// As umockdev reads it.
+    /// Returns the description in the format of umockdev.
     [[nodiscard]] std::string description(const Identity& identity, int address) const {
         const Bytes configuration = identity.configuration_descriptor();
         Bytes descriptors = identity.device_descriptor();
@@ -113,7 +112,7 @@ class UsbfsFiles {
         g_free(root);
         ::unlink(node_file_.c_str());
         if (::mkfifo(node_file_.c_str(), 0666) != 0) {
-            throw std::runtime_error("no FIFO at " + node_file_);
+            throw std::runtime_error("cannot create a FIFO at " + node_file_);
         }
         ::chmod(node_file_.c_str(), 0666);
         fifo_ = ::open(node_file_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);

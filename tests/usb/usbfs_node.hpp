@@ -21,7 +21,7 @@
 
 namespace emulator {
 
-/// A device in a umockdev testbed: its files, and the ioctls of its node, which are those of usbfs.
+/// Device in a umockdev testbed: its files, and the usbfs ioctls of its node.
 class UsbfsNode {
   public:
     UsbfsNode(UMockdevTestbed* testbed, EmulatedDevice device, int address, std::mutex& mutex,
@@ -41,7 +41,7 @@ class UsbfsNode {
     UsbfsNode(const UsbfsNode&) = delete;
     UsbfsNode& operator=(const UsbfsNode&) = delete;
 
-    // All of these under the mutex.
+    // The caller of these functions holds the mutex.
     [[nodiscard]] Port& port() { return port_; }
     [[nodiscard]] FrameClock& clock() { return *clock_; }
     void set_clock(FrameClock& clock) { clock_ = &clock; }
@@ -50,7 +50,7 @@ class UsbfsNode {
         port_.frame();
         show_readiness();
     }
-    /// A client that ended without a word takes its transfers along.
+    /// Removes the transfers of clients that ended without closing the device.
     void look_after_clients() {
         for (auto& [client, is_there] : clients_) {
             if (is_there && umockdev_ioctl_client_get_connected(client) == FALSE) {
@@ -60,7 +60,7 @@ class UsbfsNode {
         }
     }
 
-    /// Not under the mutex: the testbed may be answering an ioctl that waits for it.
+    /// Must be called without the mutex, because the testbed may be in an ioctl that waits for it.
     void tell_removal() { files_->tell_removal(); }
     void tell_arrival() { files_->tell_arrival(); }
 
@@ -80,7 +80,7 @@ class UsbfsNode {
         return TRUE;
     }
 
-    /// A client that is seen for the first time. It is kept, so that it can be asked whether it is still there.
+    /// Keeps a reference to a new client, so that its end can be detected.
     void notice(UMockdevIoctlClient* client) {
         if (clients_.insert({client, true}).second) {
             g_object_ref(client);
@@ -92,7 +92,7 @@ class UsbfsNode {
         if (claimed_by_ == client) {
             let_go();
         }
-        // Their data went with the client: nobody is left to give it back to.
+        // The data of these transfers ended with the client.
         std::erase_if(urbs_, [&](const auto& urb) { return urb.first.first == client; });
         show_readiness();
     }
@@ -103,17 +103,17 @@ class UsbfsNode {
         clock_->host_left();
     }
 
-    /// The argument of an ioctl, copied from the client; changes reach the client when the ioctl is completed.
+    /// Returns the argument of an ioctl, copied from the client; changes reach the client when the ioctl is completed.
     template <class Struct>
     static Struct* argument(UMockdevIoctlClient* client, UMockdevIoctlData*& data) {
         data = resolved(umockdev_ioctl_client_get_arg(client), 0, sizeof(Struct));
         return reinterpret_cast<Struct*>(data->data);
     }
 
-    /// The client ended in the middle of an ioctl.
+    /// Exception for a client that ended during an ioctl.
     struct Gone {};
 
-    /// What a pointer in the client's memory points to.
+    /// Returns the target of a pointer in the client's memory.
     static UMockdevIoctlData* resolved(UMockdevIoctlData* data, std::size_t offset, std::size_t length) {
         UMockdevIoctlData* target = umockdev_ioctl_data_resolve(data, offset, length, nullptr);
         if (target == nullptr) {
@@ -122,7 +122,7 @@ class UsbfsNode {
         return target;
     }
 
-    /// A result >= 0, or a negative errno.
+    /// Returns a result >= 0, or a negative errno.
     int answer(UMockdevIoctlClient* client, unsigned long request) {
         UMockdevIoctlData* data = nullptr;
         int result = -EFAULT;
@@ -279,7 +279,7 @@ class UsbfsNode {
     std::unique_ptr<UsbfsFiles> files_;
     std::mutex& mutex_;
     std::function<void()> woken_;
-    std::map<UMockdevIoctlClient*, bool> clients_;  ///< and whether they are there
+    std::map<UMockdevIoctlClient*, bool> clients_;  ///< true while the client exists
     const UMockdevIoctlClient* claimed_by_ = nullptr;
     std::map<std::pair<const UMockdevIoctlClient*, std::uint64_t>, UMockdevIoctlData*>
         urbs_;  ///< by client, address

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a command on a machine whose kernel has the emulated device at a virtual host controller (vhci_hcd): the whole
-// stack above the wire is real. Needs root, and is meant for the guest of tests/usb/guest.py:
+// Runs a command with the emulated device at a virtual host controller (vhci_hcd) of the kernel, so the whole USB stack
+// of the host is real. Needs root; for the guest of tests/usb/guest.py:
 //
 //   usbip_emulator [OPTIONS] -- COMMAND...
 //
@@ -31,15 +31,15 @@ namespace {
 
 constexpr const char* controller = "/sys/devices/platform/vhci_hcd.0/";
 
-/// The device's end of the wire: the messages of USB/IP (Documentation/usb/usbip_protocol.rst of the kernel), in
-/// which everything is 32 bits wide and big endian.
+/// Device side of the connection: messages of USB/IP (Documentation/usb/usbip_protocol.rst of the kernel). All fields
+/// are 32 bits wide and big endian.
 class UsbIp {
   public:
-    /// Plugs the device in, at full speed; throws where there is no controller.
+    /// Plugs the device in at full speed; throws without a controller.
     explicit UsbIp(Port& port) : port_{port} {
         std::array<int, 2> ends{};
         if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()) != 0) {
-            throw std::runtime_error("no pair of sockets");
+            throw std::runtime_error("cannot create a pair of sockets");
         }
         wire_ = ends[0];
         std::ofstream attach{std::string(controller) + "attach"};
@@ -47,14 +47,14 @@ class UsbIp {
                << std::flush;  // port, socket, device, full speed
         ::close(ends[1]);
         if (!attach) {
-            throw std::runtime_error("vhci_hcd does not take the device; is its module loaded?");
+            throw std::runtime_error("vhci_hcd refuses the device; check that its module is loaded");
         }
     }
     ~UsbIp() { unplug(); }
     UsbIp(const UsbIp&) = delete;
     UsbIp& operator=(const UsbIp&) = delete;
 
-    /// The kernel sees the device go.
+    /// Unplugs the device from the kernel.
     void unplug() {
         if (wire_ >= 0) {
             ::close(std::exchange(wire_, -1));
@@ -62,7 +62,7 @@ class UsbIp {
     }
     [[nodiscard]] int file() const { return wire_; }
 
-    /// One message of the kernel; false: it let the device go. `wrote`: an OUT packet was in it.
+    /// Handles a message of the kernel; sets `wrote` for an OUT packet. Returns false if the kernel closed the device.
     [[nodiscard]] bool receive(bool& wrote) {
         std::array<std::uint8_t, 48> header{};
         if (!read_all(header.data(), header.size())) {
@@ -74,7 +74,7 @@ class UsbIp {
         };
         const std::uint32_t number = word(4);
         if (word(0) == unlink_command) {
-            // Zero: it had ended, and its answer is on the way.
+            // Zero means that it had ended and its answer is already sent.
             const bool waited = port_.cancel(word(20), this, 0);
             if (waited) {
                 port_.done().pop_back();
@@ -108,7 +108,7 @@ class UsbIp {
         return true;
     }
 
-    /// Everything that has ended since.
+    /// Answers all ended transfers.
     void answer_all() {
         while (!port_.done().empty()) {
             const Transfer transfer = std::move(port_.done().front());
@@ -221,7 +221,7 @@ int run(Settings settings) {
     over = true;
     bus.join();
     if (trace.is_open()) {
-        trace << port.device().trace_row();  // how the command left it
+        trace << port.device().trace_row();  // state after the command
     }
     return code;
 }

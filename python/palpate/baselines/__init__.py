@@ -7,9 +7,7 @@ acceleration.
 """
 
 from .comparison import PASSIVE, Compared, baselines, comparable, compare
-from .curves import LookupTable, SmoothingSpline
-from .estimator import PerStroke
-from .mechanical import HuntCrossley, LinearZones, TissueParameters
+from .methods import HuntCrossley, LinearZones, LookupTable, PerStroke, SmoothingSpline, TissueParameters
 
 __all__ = [
     "PASSIVE",

@@ -15,9 +15,15 @@ from ..errors import InputError
 from ..recording import Recording
 from ..recording.motion import velocity
 from ..verification.metrics import normalised, root_mean_square
-from .curves import LookupTable, SmoothingSpline
-from .estimator import Estimator, PerStroke
-from .mechanical import HuntCrossley, LinearZones, TissueParameters
+from .methods import (
+    Estimator,
+    HuntCrossley,
+    LinearZones,
+    LookupTable,
+    PerStroke,
+    SmoothingSpline,
+    TissueParameters,
+)
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from ..planning import DeviceProfile
 from ..verdict import Verdict, no
 from .exit_status import end_with
 from .live import device_options, live_line
-from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
-from .verb import PATH, verb
+from .printing import number, print_json, print_numbers, print_verdict, talk
+from .verb import PATH, json_option, require_writable, verb
 
 _MARKS = {True: "ok", False: "WRONG", None: "-"}
 
@@ -48,7 +48,7 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
     help="Friction of the device in N or N*m, if the pushes cannot show it; at most the true one.",
 )
 @click.option("--yes", is_flag=True, help="Push without asking.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option
 def check_device(
     device: str,
     object_file: Path | None,
@@ -71,7 +71,6 @@ def check_device(
     while the drive is disabled: with --push, and only where the rest is right, the device is enabled for
     pushes of half a percent of its force. Do not render before that. Exit code 1: not suitable.
     """
-
     if write_profile is not None:
         if not push:
             raise InputError("--write-profile needs --push: the mechanics show only in motion")

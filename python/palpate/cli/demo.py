@@ -30,10 +30,9 @@ from .printing import (
     print_numbers,
     print_table,
     print_verdict,
-    require_writable,
     talk,
 )
-from .verb import PATH, json_option, verb
+from .verb import PATH, json_option, require_writable, verb
 
 IDENTIFY_SEED, FRESH_SEED = 1, 2
 """The two recordings of the sample: one to identify, one that the model has not seen."""

@@ -41,11 +41,8 @@ _STYLE: Any = {
     "hatch.linewidth": 0.5,
 }
 
-_FORMATS = (".png", ".pdf", ".svg")
-
 _LIGHTER = 0.01
 """Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
-
 
 _MOST_NAMES = 2
 """Source files that a title names."""
@@ -54,12 +51,6 @@ _DRIVEN = {
     "motion-driven": "recorded motion drives the device",
     "force-driven": "recorded force drives the object",
 }
-
-
-def require_figure_name(path: Path) -> None:
-    """Refuse a name whose ending is no figure format, before the work begins."""
-    if path.suffix.lower() not in _FORMATS:
-        raise InputError(f"{path} is no figure file; its name must end in {', '.join(_FORMATS)}")
 
 
 @contextmanager

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, fields
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import click
 import numpy as np
@@ -16,16 +17,15 @@ import numpy as np
 from ..baselines import Compared, compare
 from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
-from ..identification.options import RESERVED_INPUTS
-from ..identification.search.criteria import reporting_to
+from ..identification.identify_files import identify_files
+from ..identification.options import CHOICES, RESERVED_INPUTS, IdentifyOptions, SearchOptions, default_of
+from ..identification.search.evidence import reporting_to
 from ..recording import Recording
 from ..verdict import Verdict
 from ..verification import Verification, verify
 from ..verification.verification import circumstances
 from .exit_status import end_with, finishing
-from .figures import picture_verification, require_figure_name
-from .identify_options import identify_options
-from .large_files import LargeFiles, large_file_options
+from .figures import picture_verification
 from .printing import (
     number,
     print_json,
@@ -34,11 +34,79 @@ from .printing import (
     print_table,
     print_verdict,
     progress,
-    require_distinct,
-    require_writable,
     talk,
 )
-from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, verb
+from .verb import (
+    PATH,
+    ReadingOptions,
+    json_option,
+    options,
+    plot_option,
+    reading_options,
+    require_writable,
+    verb,
+)
+
+_READ_BY_PARTS = ("position", "force", "time", "direction", "units", "negate", "invalid")
+"""Reading options that make sense without all rows at once."""
+
+
+def _text(value: Any) -> str:
+    """A default as it is written after NAME=."""
+    if isinstance(value, tuple):
+        return ",".join(f"{number:g}" for number in value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+HELP = {
+    "inputs": "auto, or names joined by commas: position, then hysteresis, velocity or columns.",
+    "max_wavelets": "Largest network tried.",
+    "criterion": "When to stop adding wavelets.",
+    "loss": "Least squares, or rows far from the others weighed down.",
+    "hysteresis_nonnegative": "Impose that every loop loses energy.",
+    "slope_bounds": "Least and largest slope imposed, in force per position.",
+    "monotone": "Impose that the force never falls with position.",
+    "fixed_force": "Position and force that the model goes through.",
+    "coupling_stiffness": "Keep the slope below 0.9 of it, in force per position.",
+    "period": "Period of a periodic environment, in its position unit.",
+    "search": "Further setting of the search, repeatable: "
+    + ", ".join(f"{each.name}={_text(each.default)}" for each in fields(SearchOptions))
+    + ".",
+}
+
+_METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE"}
+"""What the numbers of an option are."""
+
+
+def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> SearchOptions:
+    """Settings of the search, each as NAME=VALUE."""
+    for value in values:
+        if "=" not in value:
+            raise click.BadParameter(f"{value!r} must be NAME=VALUE", ctx, param)
+    return SearchOptions.parsed(dict(value.split("=", 1) for value in values))
+
+
+def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
+    flag = "--" + name.replace("_", "-")
+    text: dict[str, Any] = {"default": default, "help": HELP.get(name)}
+    alternatives = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    kinds = [kind for kind in alternatives if kind is not NoneType]
+    if kinds == [bool]:
+        return click.option(f"{flag}/--no-{flag[2:]}", name, **text)
+    if kinds == [SearchOptions]:
+        text |= {"default": (), "metavar": "NAME=VALUE", "callback": _search}
+        return click.option(flag, name, multiple=True, **text)
+    if len(kinds) == 1 and get_args(kinds[0]):
+        text |= {"nargs": len(get_args(kinds[0])), "metavar": _METAVAR.get(name)}
+        return click.option(flag, name, type=float, **text)
+    kind = click.Choice(CHOICES[name]) if name in CHOICES else kinds[0]
+    return click.option(flag, name, type=kind, **text)
+
+
+_HINTS = get_type_hints(IdentifyOptions)
+_IDENTIFY_OPTIONS = [
+    _option(each.name, _HINTS[each.name], default_of(each)) for each in fields(IdentifyOptions)
+]
 
 
 @verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png")
@@ -59,21 +127,37 @@ from .verb import PATH, ReadingOptions, json_option, plot_option, reading_option
     is_flag=True,
     help="Fit the usual methods to the same rows and compare; needs --hold-out-every.",
 )
-@large_file_options
+@click.option(
+    "--out-of-core", is_flag=True, help="Read files larger than memory part by part, each row once."
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    default=1,
+    help="Processes that read the files; more than one implies --out-of-core.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    default=None,
+    help="Dask scheduler whose workers read the files (tcp://host:8786); implies --out-of-core.",
+)
 @plot_option("measured and modelled force over position, residuals beneath")
 @json_option
 @reading_options
-@identify_options
+@options(*_IDENTIFY_OPTIONS)
 def identify(
     recording_files: tuple[Path, ...],
     output: Path,
     hold_out_every: int | None,
     beside: bool,
-    large: LargeFiles,
+    out_of_core: bool,
+    jobs: int,
+    scheduler: str | None,
     plot: Path | None,
     as_json: bool,
     reading: ReadingOptions,
-    options: dict[str, Any],
+    **settings: Any,
 ) -> None:
     """Identify a model of force over position from recordings.
 
@@ -82,17 +166,14 @@ def identify(
     first line printed says which. The model is as simple as the data allows: a constant, a line, a wavelet
     network, and hysteresis where press and release differ.
     """
-
-    if plot is not None:
-        require_figure_name(plot)
-    for target in filter(None, (output, plot)):
-        require_writable(target, inputs=recording_files)
-    require_distinct(output, plot)
+    require_writable(output, plot, inputs=recording_files)
     recordings: list[Recording] = []
-    if large.wanted:
-        large.require_alone({"--hold-out-every": hold_out_every, "--baselines": beside, "--plot": plot})
+    by_parts = out_of_core or jobs != 1 or scheduler is not None
+    if by_parts:
+        left = {name: value for name, value in reading.options.items() if name not in _READ_BY_PARTS}
+        _require_unused(hold_out_every=hold_out_every, baselines=beside, plot=plot, **left)
     else:
-        columns = [name for name in options["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+        columns = [name for name in settings["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
         recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
     others = _fit_baselines(recordings, hold_out_every) if beside else []
     judged_on = recordings
@@ -102,10 +183,23 @@ def identify(
     talk("identifying ...")
     start = time.perf_counter()
     with progress("identifying") as shown, reporting_to(lambda name, n: shown(f"{name}, {n} wavelets")):
-        if large.wanted:
-            model = large.identify(recording_files, reading, options)
+        if by_parts:
+            chosen = {name: reading.options[name] for name in _READ_BY_PARTS}
+            model = identify_files(
+                list(recording_files),
+                jobs=jobs,
+                scheduler=scheduler,
+                progress=lambda done, total: shown(
+                    f"read {done} of {total} parts ({100 * done / total:.0f} %)"
+                ),
+                **{name: value for name, value in chosen.items() if value is not None},
+                **settings,
+            )
         else:
-            model = identify_model(recordings if len(recordings) > 1 else recordings[0], **options)
+            model = identify_model(recordings if len(recordings) > 1 else recordings[0], **settings)
+    if by_parts:
+        chosen_columns = ", ".join(f"{role} is {column}" for role, column in model.data.columns.items())
+        talk(f"read {model.data.rows} rows; {chosen_columns}")
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
     for note in model.notes.get("identification", ()):
@@ -134,7 +228,7 @@ def identify(
     compared = sum(verification.n for _, verification in verified)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
     judged = "the rows it was identified on" if hold_out_every is None else f"{of_rows} rows held out"
-    if hold_out_every is None and options["loss"] == "huber":
+    if hold_out_every is None and settings["loss"] == "huber":
         judged += ", those far from the others weighed down"
     with finishing():
         if plot is not None:
@@ -142,22 +236,31 @@ def identify(
         model.save(output)
         if as_json:
             print_json(result)
-            end_with(verdict)
-            return
-        print_verdict(verdict)
-        print_numbers(
-            {
-                "model": str(output),
-                "wavelets": str(model.n_wavelets),
-                "parameters": str(model.n_parameters),
-                "kind": f"{model.fit.model_class}, stopped by {model.stop_reason}",
-                "nrmse": f"{number(nrmse)} on {judged}",
-                "seconds": f"{seconds:.2f}",
-            }
-        )
-        if beside:
-            _print_beside(nrmse, model.n_parameters, seconds, others)
-        end_with(verdict)
+        else:
+            print_verdict(verdict)
+            print_numbers(
+                {
+                    "model": str(output),
+                    "wavelets": str(model.n_wavelets),
+                    "parameters": str(model.n_parameters),
+                    "kind": f"{model.fit.model_class}, stopped by {model.stop_reason}",
+                    "nrmse": f"{number(nrmse)} on {judged}",
+                    "seconds": f"{seconds:.2f}",
+                }
+            )
+            if beside:
+                _print_beside(nrmse, model.n_parameters, seconds, others)
+    end_with(verdict)
+
+
+def _require_unused(**others: Any) -> None:
+    """Refuses options that need all rows at once."""
+    for name, value in others.items():
+        if value:
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} needs all rows at once, and these files are read part by part; "
+                "palpate verify compares the model with a recording"
+            )
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import click
 
@@ -15,39 +15,30 @@ from ..errors import InputError
 from ..verdict import Verdict
 from .exit_status import terminated_as_interrupted
 from .printing import OverwrittenLine, number, talk
-from .verb import PATH
+from .verb import PATH, options
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def device_options(command: F) -> F:
-    """Adds the options of the measured device and of the object on the simulated one."""
-    described: Any = command
-    for option in reversed(
-        (
-            click.option("--device", default="simulated", help="simulated, or usb[:SERIAL]."),
-            click.option(
-                "--object",
-                "object_file",
-                type=PATH,
-                metavar="MODEL.json",
-                help="The object mounted on the simulated device.",
-            ),
-            click.option(
-                "--wait-ms",
-                type=click.FloatRange(0.1, 10000),
-                show_default="5",
-                help="How long to wait for a packet of a USB device.",
-            ),
-            click.option(
-                "--transducer/--no-transducer",
-                default=True,
-                help="The simulated device has a force transducer.",
-            ),
-        )
-    ):
-        described = option(described)
-    return cast(F, described)
+device_options = options(
+    click.option("--device", default="simulated", help="simulated, or usb[:SERIAL]."),
+    click.option(
+        "--object",
+        "object_file",
+        type=PATH,
+        metavar="MODEL.json",
+        help="The object mounted on the simulated device.",
+    ),
+    click.option(
+        "--wait-ms",
+        type=click.FloatRange(0.1, 10000),
+        show_default="5",
+        help="How long to wait for a packet of a USB device.",
+    ),
+    click.option(
+        "--transducer/--no-transducer",
+        default=True,
+        help="The simulated device has a force transducer.",
+    ),
+)
+"""The measured device, and the object on the simulated one."""
 
 
 @contextmanager

@@ -13,9 +13,10 @@ from .._core.stability import Certificate
 from ..model import load_model
 from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, profile_file
+from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
-from .figures import figure_file, require_figure_name, source_name
+from .figures import figure_file, source_name
 from .printing import (
     Verb,
     number,
@@ -24,11 +25,9 @@ from .printing import (
     print_numbers,
     print_paragraph,
     print_verdict,
-    require_distinct,
-    require_writable,
     talk,
 )
-from .verb import PATH, json_option, plot_option, verb
+from .verb import PATH, json_option, plot_option, require_writable, verb
 
 
 class Samples(click.ParamType[int | str]):
@@ -55,9 +54,21 @@ class _PlanVerb(Verb):
         return super().parse_args(ctx, args)
 
 
+_HELP = """Choose the structure that renders a model on a device, and certify it.
+
+The first of these structures that is certified is taken:
+
+\b
+{}
+
+Every refusal names the inequality that failed and by how much. The identified network stays in the file; a
+limited network stands under plan. Exit code 1: no structure holds, or the force error is larger than
+accepted. Nothing is written then.
+""".format("\n".join(f"  {name}: {candidate.use}" for name, candidate in CANDIDATES.items()))
+
+
 def _list_examples(*, as_json: bool) -> None:
     """Print every example profile with its file and its sources."""
-
     examples = example_profiles()
     if as_json:
         print_json(
@@ -70,7 +81,7 @@ def _list_examples(*, as_json: bool) -> None:
             print_paragraph(paragraph, indent="  ")
 
 
-@verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb)
+@verb("palpate plan press.json --device knob.toml -o press.json", cls=_PlanVerb, help=_HELP)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
@@ -111,22 +122,10 @@ def _list_examples(*, as_json: bool) -> None:
 def plan(
     model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
 ) -> None:
-    """Choose the structure that renders a model on a device, and certify it.
-
-    The simplest certified structure is taken: direct; direct with its slope limited to the device's limit;
-    massless behind a coupling; implicit; energy-consistent; explicit, which is stable at best. Every refusal
-    names the inequality that failed and by how much. The identified network stays in the file; a limited
-    network stands under plan. Exit code 1: no structure holds, or the force error is larger than accepted.
-    Nothing is written then.
-    """
-
+    """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
-    if plot is not None:
-        require_figure_name(plot)
-        require_writable(plot, inputs=(model_file, profile_path))
-    if output is not None:  # the model's own file may be written anew
-        require_writable(output, inputs=(profile_path,))
-    require_distinct(output, plot)
+    require_writable(plot, inputs=(model_file, profile_path))
+    require_writable(output, plot, inputs=(profile_path,))  # the model's own file may be written anew
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")

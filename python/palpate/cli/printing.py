@@ -14,17 +14,14 @@ import math
 import os
 import shutil
 import sys
-import tempfile
 import textwrap
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import InputError
 from ..verdict import Verdict
 
 WIDEST = 80
@@ -213,38 +210,6 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 def print_paragraph(text: str, *, indent: str = "") -> None:
     """Print text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
     print_line(indent + text, elsewhere=WIDEST)
-
-
-def require_writable(target: Path, *, inputs: Sequence[Path] = ()) -> None:
-    """Refuse a file that could not be written at the end, before the work begins.
-
-    Raises
-    ------
-    InputError
-        Its folder does not exist or cannot be written, it is a folder, or it is one of the inputs.
-    """
-    if not target.parent.is_dir():
-        raise InputError(f"{target} cannot be written: there is no folder {target.parent}")
-    if target.is_dir():
-        raise InputError(f"{target} cannot be written: it is a folder")
-    for given in inputs:
-        if given.exists() and target.exists() and target.samefile(given):
-            raise InputError(f"{target} is an input as well; writing the result there would destroy it")
-    try:
-        with tempfile.TemporaryFile(dir=target.parent):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"{target} cannot be written: its folder takes no new file ({error.strerror})"
-        ) from None
-
-
-def require_distinct(*targets: Path | None) -> None:
-    """Refuse two results that would be written to one file."""
-    given = [target.absolute() for target in targets if target is not None]
-    for target in given:
-        if given.count(target) > 1:
-            raise InputError(f"two results would both be written to {target}")
 
 
 class OverwrittenLine:

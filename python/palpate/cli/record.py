@@ -14,8 +14,8 @@ from ..model import load_model
 from ..recording.files import require_absent
 from .exit_status import end_with
 from .live import device_options, live_line, session_verdict
-from .printing import number, print_json, print_numbers, print_verdict, require_writable, talk
-from .verb import PATH, json_option, verb
+from .printing import number, print_json, print_numbers, print_verdict, talk
+from .verb import PATH, json_option, require_writable, verb
 
 
 @verb("palpate record press.csv --device simulated --object press.json --probe", ends_at_once=False)
@@ -64,8 +64,7 @@ def record(
     object holds the force limit. The force is the transducer's; without one it is what the motor holds, the
     friction of the device included. Ctrl-C ends it in an orderly way.
     """
-
-    require_writable(recording, inputs=() if object_file is None else (object_file,))
+    require_writable(recording, inputs=(object_file,))
     if not force:
         require_absent(recording)
     given = [name for name, value in sweep.items() if value is not None]

@@ -15,9 +15,8 @@ from ..planning import Plan
 from ..recording.files import require_absent
 from .exit_status import end_with
 from .live import live_line, session_verdict
-from .printing import print_json, print_numbers, print_verdict, require_writable, talk
-from .scheme_options import scheme_options
-from .verb import PATH, json_option, verb
+from .printing import print_json, print_numbers, print_verdict, talk
+from .verb import PATH, json_option, require_writable, scheme_options, verb
 
 _LOOP = LoopSettings()
 
@@ -83,11 +82,9 @@ def render(
     requires a plan with a certificate for it. Ctrl-C stops the loop: it sends zero force, closes the device
     and the recording, and prints the summary.
     """
-
-    if record is not None:
-        require_writable(record, inputs=(model_file,))
-        if not force:
-            require_absent(record)
+    require_writable(record, inputs=(model_file,))
+    if record is not None and not force:
+        require_absent(record)
     model = load_model(model_file)
     plan = None if model.plan is None else Plan.of(model)
     units = (model.units["position"], model.units["force"])

@@ -13,7 +13,7 @@ from ..planning import Plan
 from ..verdict import GOOD, Verdict, usable
 from ..verification import Stroke, compare
 from .exit_status import end_with, finishing
-from .figures import figure_file, picture_path, require_figure_name
+from .figures import figure_file, picture_path
 from .printing import (
     number,
     print_json,
@@ -21,9 +21,8 @@ from .printing import (
     print_numbers,
     print_table,
     print_verdict,
-    require_writable,
 )
-from .verb import PATH, json_option, verb
+from .verb import PATH, json_option, plot_option, require_writable, verb
 
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
           "slope_bounds", "data")  # fmt: skip
@@ -38,22 +37,14 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
     type=PATH,
     help="Another model: print how far it is from the first, in shares of the just noticeable difference.",
 )
-@click.option(
-    "--plot",
-    metavar="PNG",
-    type=PATH,
-    help="Draw every network that was considered; with --beside both models and their difference.",
-)
+@plot_option("every network that was considered; with --beside both models and their difference")
 @json_option
 def show(model_file: Path, beside: Path | None, plot: Path | None, as_json: bool) -> None:
     """Print a model: its verdict, terms, domain and units, how it was identified, and its plan.
 
     Exit code 1: the verdict of the model is "no".
     """
-
-    if plot is not None:
-        require_figure_name(plot)
-        require_writable(plot, inputs=tuple(filter(None, (model_file, beside))))
+    require_writable(plot, inputs=(model_file, beside))
     model = load_model(model_file)
     if beside is not None:
         _compare(model, model_file, load_model(beside), beside, plot=plot, as_json=as_json)
@@ -101,7 +92,6 @@ def _compare(
     model: Model, model_file: Path, other: Model, other_file: Path, *, plot: Path | None, as_json: bool
 ) -> None:
     """Print how far two models are from each other, with a verdict on both and on their difference."""
-
     strokes = compare(model, other)
     verdict = model.verdict + other.verdict + _noticed(strokes)
     with finishing():

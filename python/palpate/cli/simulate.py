@@ -4,29 +4,28 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..model import load_model
-from ..planning import force_error, force_range, judge, rig_for
+from .._core.simulation import TestRig
+from ..model import Model, load_model
+from ..planning import Plan, force_error, force_range, judge, rig_for
 from ..planning import simulate as render
 from ..recording.files import require_absent
 from .exit_status import end_with, finishing
-from .figures import picture_rendering, require_figure_name
+from .figures import picture_rendering
 from .printing import (
     number,
     print_json,
     print_numbers,
     print_verdict,
     progress,
-    require_distinct,
-    require_writable,
     talk,
 )
-from .scheme_options import chosen_plan, scheme_options
-from .verb import PATH, json_option, plot_option, verb
+from .verb import PATH, json_option, plot_option, require_writable, scheme_options, verb
 
 
 @verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
@@ -54,16 +53,12 @@ def simulate(
     This shows what happens, and proves nothing.
     """
 
-    if plot is not None:
-        require_figure_name(plot)
-    for target in filter(None, (output, plot)):
-        require_writable(target, inputs=(model_file,))
-    require_distinct(output, plot)
+    require_writable(output, plot, inputs=(model_file,))
     if output is not None and not force:
         require_absent(output)
     model = load_model(model_file)
     rig = rig_for(model)
-    plan = chosen_plan(model, rig, scheme)
+    plan = _chosen_plan(model, rig, scheme)
     device = rig.device if plan.certificate is None else plan.certificate.device
     talk(f"read {model_file}: {model!r}; rendering on a {device.id}, which is simulated")
     ticks = max(duration_s / device.period_s, 1.0)
@@ -98,23 +93,35 @@ def simulate(
             picture_rendering(plot, plan, rendered)
         if as_json:
             print_json(result)
-            end_with(verdict)
-            return
-        print_verdict(verdict)
-        unit = rendered.units["force"]
-        print_numbers(
-            {
-                "structure": plan.structure,
-                "duration": f"{number(duration_s)} s",
-                "force error, end of tick": f"{number(error.end)} {unit} RMS"
-                + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
-                "force error, mean of a tick": f"{number(error.mean)} {unit} RMS",
-                "force error, below 50 Hz": f"{number(error.band)} {unit} RMS",
-                "force error, sampled": f"{number(error.instant)} {unit} RMS",
-                "work of the force error": f"{number(error.work)}{' J' if unit else ''}"
-                + ("" if error.work >= 0.0 else ", given to the hand"),
-                "extrapolated": f"{100 * extrapolated:.3g} %",
-                "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
-            }
-        )
-        end_with(verdict)
+        else:
+            print_verdict(verdict)
+            unit = rendered.units["force"]
+            print_numbers(
+                {
+                    "structure": plan.structure,
+                    "duration": f"{number(duration_s)} s",
+                    "force error, end of tick": f"{number(error.end)} {unit} RMS"
+                    + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
+                    "force error, mean of a tick": f"{number(error.mean)} {unit} RMS",
+                    "force error, below 50 Hz": f"{number(error.band)} {unit} RMS",
+                    "force error, sampled": f"{number(error.instant)} {unit} RMS",
+                    "work of the force error": f"{number(error.work)}{' J' if unit else ''}"
+                    + ("" if error.work >= 0.0 else ", given to the hand"),
+                    "extrapolated": f"{100 * extrapolated:.3g} %",
+                    "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
+                }
+            )
+    end_with(verdict)
+
+
+def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
+    """What was asked for; else the plan that stands in the model; else the default, which is told."""
+    if all(value is None or value is False for value in scheme.values()):
+        if model.plan is not None:
+            return Plan.of(model)
+        if not model.of_velocity:
+            talk(
+                "no plan in the model: rendered behind the default coupling, which is felt; "
+                "'palpate plan' finds the simplest rendering that is not"
+            )
+    return Plan(model, rig.scheme(model, **scheme))

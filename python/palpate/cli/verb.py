@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What verbs share: the command itself, how a recording is read, where a figure goes, JSON."""
+"""Parts that verbs share: the command, its options, how a recording is read, checks of its outputs."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import click
 
+from .._core.rendering import Scheme, most_prediction_taps, structure_names
+from ..errors import InputError
 from ..recording import Recording, read_recording
 from .exit_status import interrupted_at_once
 from .printing import Verb, talk
@@ -18,6 +21,15 @@ from .printing import Verb, talk
 F = TypeVar("F", bound=Callable[..., Any])
 
 PATH = click.Path(path_type=Path)
+
+_FIGURES = (".png", ".pdf", ".svg")
+"""Endings of figure files."""
+
+_READ = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows", "zero",
+         "force_late_s", "invalid")  # fmt: skip
+"""Arguments of `read_recording` that are options."""
+
+_SCHEME = Scheme()
 
 
 def verb(
@@ -42,6 +54,17 @@ def verb(
         return click.command(cls=cls, **given)(interrupted_at_once()(function) if ends_at_once else function)
 
     return command
+
+
+def options(*each: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Gives several options to a verb; its help lists them in this order."""
+
+    def decorate(command: F) -> F:
+        for option in reversed(each):
+            command = option(command)
+        return command
+
+    return decorate
 
 
 def _names_and_units(
@@ -89,109 +112,152 @@ class ReadingOptions:
         return recording
 
 
+_column = partial(click.option, metavar="COLUMN", default=None)
+_rows = partial(click.option, metavar="START:STOP", callback=_row_range, default=None)
+
+_READING = options(
+    _column("--position", help="Column of the position; else chosen by name and unit."),
+    _column("--force", help="Column of the force; else chosen by name and unit."),
+    _column("--time", help="Column of the time; else chosen by name and unit."),
+    _column("--direction", help="Column of the stroke's direction (press, release)."),
+    click.option(
+        "--units",
+        metavar="NAME=UNIT",
+        callback=_names_and_units,
+        multiple=True,
+        help="Unit of a column whose name has none. Repeat for several.",
+    ),
+    click.option(
+        "--negate",
+        metavar="COLUMN",
+        multiple=True,
+        help="Turn the sign of position, force or a column. Repeat for several.",
+    ),
+    click.option(
+        "--torque-constant-Nm-per-A",
+        "torque_constant",
+        type=float,
+        default=None,
+        help="Turns a force column in A into N*m.",
+    ),
+    _rows("--rows", help="Use these rows only, counted from 0."),
+    _rows("--zero", help="Rows in which the tool touches nothing: their mean force is taken off."),
+    click.option(
+        "--force-late-s",
+        type=float,
+        default=0.0,
+        help="How long after its position each force was recorded [s]; needs time.",
+    ),
+    click.option(
+        "--invalid",
+        type=click.Choice(["refuse", "drop"]),
+        default="refuse",
+        help="What to do with rows without a number.",
+    ),
+)
+
+
 def reading_options(command: F) -> F:
-    """Give a verb the options of `read_recording`, as one argument `reading`."""
+    """Gives a verb the options of `read_recording`, as one argument `reading`."""
 
     @wraps(command)
-    def invoke(
-        *args: Any,
-        position: str | None,
-        force: str | None,
-        time: str | None,
-        direction: str | None,
-        units: dict[str, str] | None,
-        negate: tuple[str, ...],
-        torque_constant: float | None,
-        rows: tuple[int | None, int | None] | None,
-        zero: tuple[int | None, int | None] | None,
-        force_late_s: float,
-        invalid: str,
-        **others: Any,
-    ) -> Any:
-        reading = ReadingOptions(
-            {
-                "position": position,
-                "force": force,
-                "time": time,
-                "direction": direction,
-                "units": units,
-                "negate": negate,
-                "torque_constant": torque_constant,
-                "rows": rows,
-                "zero": zero,
-                "force_late_s": force_late_s,
-                "invalid": invalid,
-            }
-        )
-        return command(*args, reading=reading, **others)
+    def invoke(*args: Any, **given: Any) -> Any:
+        reading = ReadingOptions({name: given.pop(name) for name in _READ})
+        return command(*args, reading=reading, **given)
 
-    column: dict[str, Any] = {"metavar": "COLUMN", "default": None}
-    described: Any = invoke
-    for option in reversed(
-        (
-            click.option(
-                "--position", **column, help="Column of the position; else chosen by name and unit."
-            ),
-            click.option("--force", **column, help="Column of the force; else chosen by name and unit."),
-            click.option("--time", **column, help="Column of the time; else chosen by name and unit."),
-            click.option("--direction", **column, help="Column of the stroke's direction (press, release)."),
-            click.option(
-                "--units",
-                metavar="NAME=UNIT",
-                callback=_names_and_units,
-                multiple=True,
-                help="Unit of a column whose name has none. Repeat for several.",
-            ),
-            click.option(
-                "--negate",
-                metavar="COLUMN",
-                multiple=True,
-                help="Turn the sign of position, force or a column. Repeat for several.",
-            ),
-            click.option(
-                "--torque-constant-Nm-per-A",
-                "torque_constant",
-                type=float,
-                default=None,
-                help="Turns a force column in A into N*m.",
-            ),
-            click.option(
-                "--rows",
-                metavar="START:STOP",
-                callback=_row_range,
-                default=None,
-                help="Use these rows only, counted from 0.",
-            ),
-            click.option(
-                "--zero",
-                metavar="START:STOP",
-                callback=_row_range,
-                default=None,
-                help="Rows in which the tool touches nothing: their mean force is taken off.",
-            ),
-            click.option(
-                "--force-late-s",
-                type=float,
-                default=0.0,
-                help="How long after its position each force was recorded [s]; needs time.",
-            ),
-            click.option(
-                "--invalid",
-                type=click.Choice(["refuse", "drop"]),
-                default="refuse",
-                help="What to do with rows without a number.",
-            ),
-        )
-    ):
-        described = option(described)
-    return cast(F, described)
+    return cast(F, _READING(invoke))
 
 
-def json_option(command: F) -> F:
-    """--json: one object on standard output."""
-    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(command)
+scheme_options = options(
+    click.option(
+        "--structure",
+        type=click.Choice(structure_names),
+        default=None,
+        show_default=f"the model's plan, else {_SCHEME.structure}",
+        help="How the force is computed.",
+    ),
+    click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model."),
+    click.option(
+        "--coupling-stiffness",
+        type=float,
+        show_default=f"{_SCHEME.coupling_stiffness:g} N*m/rad, scaled to the model",
+        help="K_c, in force per position of the model's units.",
+    ),
+    click.option(
+        "--coupling-damping",
+        type=float,
+        show_default=f"{_SCHEME.coupling_damping:g} N*m*s/rad, scaled",
+        help="B_c, in force per velocity.",
+    ),
+    click.option(
+        "--mass",
+        type=float,
+        show_default=f"{_SCHEME.mass:g} kg*m^2, scaled",
+        help="Mass of the object, where it has mass, in force per acceleration.",
+    ),
+    click.option(
+        "--damping",
+        type=float,
+        show_default=f"{_SCHEME.damping:g} N*m*s/rad, scaled",
+        help="Damping of the object, where it has mass, in force per velocity.",
+    ),
+    click.option(
+        "--play-radius",
+        type=float,
+        show_default="the model's, or 1 % of its travel",
+        help="r of a model with hysteresis, in its position unit.",
+    ),
+    click.option(
+        "--predict",
+        type=click.IntRange(0, most_prediction_taps),
+        metavar="M",
+        show_default=f"{_SCHEME.predict}",
+        help="Samples used to predict the position half a sample ahead, direct only; 0 = none.",
+    ),
+)
+"""How a model is rendered: the fields of `Scheme`. What is not given is None and follows the model."""
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+
+
+def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
+    """Refuses, before the work, a name whose ending is no figure format."""
+    if value is not None and value.suffix.lower() not in _FIGURES:
+        raise InputError(f"{value} is no figure file; its name must end in {', '.join(_FIGURES)}")
+    return value
 
 
 def plot_option(shows: str, name: str = "--plot") -> Callable[[F], F]:
-    """--plot PNG: draw a figure."""
-    return click.option(name, type=PATH, metavar="PNG", default=None, help=f"Draw {shows}.")
+    """--plot PNG: draws a figure."""
+    return click.option(
+        name, type=PATH, metavar="PNG", default=None, callback=_figure_name, help=f"Draw {shows}."
+    )
+
+
+def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) -> None:
+    """Refuses, before the work, results that could not be written at its end. None stands for no file.
+
+    Raises
+    ------
+    InputError
+        A folder does not exist or cannot be written, a target is a folder or one of the inputs, or two
+        targets are one file.
+    """
+    wanted = [target for target in targets if target is not None]
+    for target in wanted:
+        if not target.parent.is_dir():
+            raise InputError(f"{target} cannot be written: there is no folder {target.parent}")
+        if target.is_dir():
+            raise InputError(f"{target} cannot be written: it is a folder")
+        for given in inputs:
+            if given is not None and given.exists() and target.exists() and target.samefile(given):
+                raise InputError(f"{target} is an input as well; writing the result there would destroy it")
+        try:
+            with tempfile.TemporaryFile(dir=target.parent):
+                pass
+        except OSError as error:
+            raise InputError(
+                f"{target} cannot be written: its folder takes no new file ({error.strerror})"
+            ) from None
+        if [each.absolute() for each in wanted].count(target.absolute()) > 1:
+            raise InputError(f"two results would both be written to {target}")

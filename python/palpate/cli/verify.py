@@ -17,18 +17,15 @@ from .figures import (
     picture_closed_loops,
     picture_verification,
     print_closed_loops,
-    require_figure_name,
 )
 from .printing import (
     number,
     print_json,
     print_numbers,
     print_verdict,
-    require_distinct,
-    require_writable,
     talk,
 )
-from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, verb
+from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, require_writable, verb
 
 
 @verb("palpate verify press.json fresh.csv --plot residuals.png")
@@ -61,13 +58,9 @@ def verify(
     the recorded force drives the object and the resulting position is compared. The exit code is 1 if the
     verdict is no.
     """
-
     if recording_file.suffix == ".json" != model_file.suffix:
         raise InputError(f"the model comes first: palpate verify {recording_file} {model_file}")
-    for figure in filter(None, (plot, plot_closed_loop)):
-        require_figure_name(figure)
-        require_writable(figure, inputs=(model_file, recording_file))
-    require_distinct(plot, plot_closed_loop)
+    require_writable(plot, plot_closed_loop, inputs=(model_file, recording_file))
     model = load_model(model_file)
     recording = reading.read(recording_file, columns_of(model))
     verification = verify_model(model, recording, play_radius=play_radius)
@@ -92,23 +85,22 @@ def verify(
                 }
                 | {"verdict": str(verification.verdict), "units": verification.units}
             )  # fmt: skip
-            end_with(verification.verdict)
-            return
-        print_verdict(verification.verdict)
-        unit = recording.units["force"]
-        print_numbers(
-            {
-                "nrmse": number(verification.nrmse),
-                "rmse": f"{number(verification.rmse)} {unit}",
-                "r2": f"{verification.r2:.6f}",
-                "worst": f"{number(verification.worst)} {unit}",
-                "within what a hand can tell": f"{100 * verification.within_jnd:.3g} % of rows",
-                "rows": f"{verification.n} of {len(recording)}",
-                "fresh": "yes" if verification.fresh else "no: the model was identified on this data",
-                "outside the model's domain": f"{verification.extrapolated} rows",
-            }
-        )
-        if loops:
-            click.echo()
-            print_closed_loops(loops)
-        end_with(verification.verdict)
+        else:
+            print_verdict(verification.verdict)
+            unit = recording.units["force"]
+            print_numbers(
+                {
+                    "nrmse": number(verification.nrmse),
+                    "rmse": f"{number(verification.rmse)} {unit}",
+                    "r2": f"{verification.r2:.6f}",
+                    "worst": f"{number(verification.worst)} {unit}",
+                    "within what a hand can tell": f"{100 * verification.within_jnd:.3g} % of rows",
+                    "rows": f"{verification.n} of {len(recording)}",
+                    "fresh": "yes" if verification.fresh else "no: the model was identified on this data",
+                    "outside the model's domain": f"{verification.extrapolated} rows",
+                }
+            )
+            if loops:
+                click.echo()
+                print_closed_loops(loops)
+    end_with(verification.verdict)

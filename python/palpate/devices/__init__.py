@@ -5,8 +5,7 @@ from .check import Check, check_device, judge, with_pushes
 from .measuring import measure, record
 from .observations import Observation
 from .pushes import Push, push_response
-from .udev import install_rule
-from .usb import DeviceError, Found, UsbSetup, find_devices, open_usb
+from .usb import DeviceError, Found, UsbSetup, find_devices, install_rule, open_usb
 
 __all__ = [
     "Check",

@@ -113,13 +113,6 @@ def record(
     InputError
         Refused before any motion.
     """
-    if device == "simulated" and object is None:
-        raise InputError("nothing is mounted on the simulated device; give it an object, a model file")
-    if not probe and not transducer:
-        raise InputError(
-            "this device has no force transducer, and its motor does not show a force while a hand moves the "
-            "handle: probe instead"
-        )
     if not probe:
         lowest_rate_share = 0.0  # no force is made: a low rate is reported, and no reason to stop
     if lowest_rate_share is not None:

@@ -1,38 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists USB devices over pyusb, reads their identity and sets them up before a run.
+"""Lists USB devices over pyusb, reads their identity, sets them up, and installs their udev rule.
 
 The stream of samples needs both directions at once, which pyusb cannot do: the core reads it.
 """
 
 from __future__ import annotations
 
-import errno
-from collections.abc import Iterator
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any
 
 from .._core import device as core
 from .._core.device import UsbRequest
 from ..errors import InputError
+from ..recording.files import replacing
 
 _TIMEOUT_MS = 500
-
-_PERMISSION = (
-    "permission denied",
-    "run `sudo palpate devices --install-udev-rule` once, then plug it in again",
-)
-_GONE = ("it is gone", "plug it in again")
-_REASONS = {
-    errno.EACCES: _PERMISSION,
-    errno.EPERM: _PERMISSION,
-    errno.EBUSY: ("another program holds it", "close palpate-control or whatever else uses it"),
-    errno.ENODEV: _GONE,
-    errno.ENOENT: _GONE,
-    errno.EPIPE: ("it refuses the request (stall)", "its firmware may be of another version"),
-    errno.ETIMEDOUT: ("it does not answer", "plug it in again; look at its power supply"),
-    errno.EIO: ("the transfer failed", "try another cable or port"),
-}
 
 
 class DeviceError(Exception):
@@ -41,9 +31,9 @@ class DeviceError(Exception):
 
 def device_error(device: str, doing: str, error: Any) -> DeviceError:
     """The sentence for an error of pyusb while `doing` something with `device`."""
+    cause = core.usb_cause(getattr(error, "backend_error_code", None) or 0)
     said = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    reason, cure = _REASONS.get(getattr(error, "errno", None) or 0, (said, "plug it in again"))
-    return DeviceError(f"{device}, {doing}: {reason}; {cure}")
+    return DeviceError(f"{device}, {doing}: {cause or f'{said}; plug it in again'}")
 
 
 def _pyusb() -> ModuleType:
@@ -241,3 +231,49 @@ def open_usb(serial: str = "") -> UsbSetup:
         raise DeviceError("; ".join(problems))
     wanted = f" with serial number {serial}" if serial else ""
     raise DeviceError(f"no haptic USB device{wanted} is plugged in; `palpate devices` lists what there is")
+
+
+RULE = "60-palpate.rules"
+FOLDER = Path("/etc/udev/rules.d")
+
+_RELOAD = (("udevadm", "control", "--reload-rules"), ("udevadm", "trigger", "--subsystem-match=usb"))
+
+
+def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
+    """Writes the rule and makes udev read it.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with a sentence for each step.
+    folder : Path
+        Folder of the rules of this machine.
+
+    Raises
+    ------
+    DeviceError
+        Without root, or if the system refuses; the message states the cure.
+    """
+    target = folder / RULE
+    if not folder.is_dir():
+        raise DeviceError(
+            f"this machine has no folder {folder}: udev, which gives users their rights, is not here"
+        )
+    if not os.access(folder, os.W_OK):
+        again = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
+        raise DeviceError(f"writing {target} needs root; run: {again}")
+    text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
+    with replacing(target) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    tell(f"wrote {target}:")
+    tell(text.splitlines()[-1])
+    for command in _RELOAD:
+        if shutil.which(command[0]) is None:
+            tell(f"there is no {command[0]} here: plug the device in again, or restart the machine")
+            return
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            tell(f"{' '.join(command)}: {done.stderr.strip() or 'failed'}; restart the machine instead")
+            return
+        tell(f"ran {' '.join(command)}")
+    tell("plug the device in again")

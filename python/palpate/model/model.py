@@ -21,8 +21,7 @@ from ..errors import InputError
 from ..recording import Source
 from ..recording.files import require_file
 from ..verdict import Verdict
-from .model_file import Fit, PathStep, write_json
-from .text import describe
+from .model_file import Fit, PathStep, describe, write_json
 
 _HELD_OUT = "held_out_every"
 """Note under which a file says that every k-th row of the data was not used."""

@@ -10,16 +10,24 @@ from dataclasses import dataclass
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
 from .._core.rendering import Scheme, compensated_share, default_play_radius
-from .._core.stability import Certificate, balancing_shift, certify, force_bounds, steepest_stick
-from .choices import (
-    LONGEST_PLAY,
-    SPARE,
-    coupling_for,
+from .._core.stability import (
+    Certificate,
+    balancing_shift,
+    certify,
     explicit_scheme,
+    force_bounds,
+    steepest_stick,
+    stiffest_coupling,
+    usual_coupling_share,
+)
+from .limited_network import (
+    LONGEST_PLAY,
+    limit_slopes,
     play_radius_for,
     renderable_slopes,
+    scale_hysteresis,
+    sliding_slopes,
 )
-from .limited_network import limit_slopes, scale_hysteresis, sliding_slopes
 from .static_error import static_force_error, with_network
 
 _COUPLING_DAMPING = 0.2
@@ -182,9 +190,9 @@ def _massless(task: Task) -> Candidate | Refusal:
     if stiffness is None:
         static = damping == 0.0 and not model.hysteretic
         falling = 0.0 if static else max(0.0, -force_bounds(model, task.usual_play).slope_min)
-        stiffness = coupling_for(device, damping, falling)
+        stiffness = stiffest_coupling(damping=damping, falling=falling, device=device)
         if static:
-            stiffness = min(stiffness, SPARE * high)
+            stiffness = min(stiffness, usual_coupling_share * high)
     if stiffness <= 0.0:
         return _no_slope(device)
     scheme = Scheme(
@@ -218,7 +226,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
         damping = _COUPLING_DAMPING * task.device.viscous_damping
     stiffness = task.coupling_stiffness
     if stiffness is None:
-        stiffness = coupling_for(task.device, damping)
+        stiffness = stiffest_coupling(damping=damping, falling=0.0, device=task.device)
     if stiffness <= 0.0:
         return Refusal(f"the device's damping {task.device.viscous_damping:.4g} holds no coupling")
     return task.certified(
@@ -265,13 +273,31 @@ def _of_position(propose: Propose) -> Propose:
     return guarded
 
 
-CANDIDATES: Mapping[str, Propose] = {
-    "direct": _direct,
-    "direct, slope limited": _of_position(_direct_limited),
-    "massless": _of_position(_massless),
-    "implicit": _of_position(lambda task: _with_mass("implicit", task)),
-    "energy-consistent": _of_position(lambda task: _with_mass("energy-consistent", task)),
-    "explicit": _of_position(_explicit),
+@dataclass(frozen=True)
+class CandidateStructure:
+    """A structure that a plan can choose."""
+
+    use: str
+    """Its rendering or its purpose, in a few words"""
+    propose: Propose
+
+
+CANDIDATES: Mapping[str, CandidateStructure] = {
+    "direct": CandidateStructure("the model as it was identified", _direct),
+    "direct, slope limited": CandidateStructure(
+        "the nearest force that the device can render", _of_position(_direct_limited)
+    ),
+    "massless": CandidateStructure(
+        "behind a virtual coupling, if a coupling is required", _of_position(_massless)
+    ),
+    "implicit": CandidateStructure(
+        "if the object has mass or damping", _of_position(lambda task: _with_mass("implicit", task))
+    ),
+    "energy-consistent": CandidateStructure(
+        "if the force falls too steeply for implicit",
+        _of_position(lambda task: _with_mass("energy-consistent", task)),
+    ),
+    "explicit": CandidateStructure("stable at best", _of_position(_explicit)),
 }
 """Candidate structures in the order in which they are tried"""
 

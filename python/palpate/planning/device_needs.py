@@ -52,7 +52,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 
     def fits(changed: DeviceProfile) -> bool:
         for name in names:
-            outcome = CANDIDATES[name](replace(task, device=changed))
+            outcome = CANDIDATES[name].propose(replace(task, device=changed))
             if isinstance(outcome, Refusal) or outcome.certificate.refused:
                 continue
             if certified and not outcome.certificate.certified:
@@ -82,7 +82,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 def _candidates(task: Task) -> tuple[str, ...]:
     """The candidate structures that render the identified model as the caller requires."""
     if task.dynamic:
-        return ("implicit", "energy-consistent", "explicit")
+        return tuple(CANDIDATES)  # those without mass do not apply
     if task.coupling:
         return ("massless", "explicit") if task.model.hysteretic else ("massless",)
     return ("direct",)

@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import tomli_w
 
@@ -62,7 +61,7 @@ class DeviceProfile(_core.device.DeviceProfile):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> DeviceProfile:
-        """Read a profile from a TOML file: every field, and no other.
+        """Read a profile from a TOML file: every field that is not optional, and no others.
 
         Raises
         ------
@@ -85,16 +84,8 @@ class DeviceProfile(_core.device.DeviceProfile):
             if "integer string conversion" in reason:
                 reason = f"a number has more than {sys.get_int_max_str_digits()} digits; write 17 or fewer"
             raise InputError(f"{file}: a value cannot be read: {reason}") from None
-        expected = _core.device.DeviceProfile().to_dict()
-        for name in content:
-            if name not in expected:
-                raise InputError(f"{file}: {name} is not a field of a device profile")
-        for name, example in expected.items():
-            if name not in content:
-                raise InputError(f"{file}: {name} is missing")
-            content[name] = _typed(file, name, content[name], example)
         try:
-            return cls(**content)
+            return cls(**_core.io.profile_of(content).to_dict())
         except ValueError as error:
             raise InputError(f"{file}: {error}") from None
 
@@ -113,24 +104,3 @@ class DeviceProfile(_core.device.DeviceProfile):
         with replacing(file) as temporary:
             temporary.write_text(comment + tomli_w.dumps(self.to_dict()), encoding="utf-8")
         return file
-
-
-def _typed(file: Path, name: str, value: Any, example: Any) -> Any:
-    """A value of the profile as the type of its field."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if isinstance(example, str):
-        right, fits = "text", isinstance(value, str)
-    elif isinstance(example, int):
-        right, fits = "a whole number", number and isinstance(value, int) and abs(value) < 2**31
-    else:
-        right, fits = "a number", number and (isinstance(value, float) or abs(value) < 2**1023)
-    if not fits:
-        raise InputError(f"{file}: {name} is {_shown(value)}, must be {right}")
-    return float(value) if isinstance(example, float) else value
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, int) and value.bit_length() > 64:
-        return f"an integer of {value.bit_length()} bits"
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."

@@ -17,7 +17,10 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from .._core import stability
+from .._core.device import DeviceProfile
 from .._core.model import ForceModel, wavelet_columns, wavelet_slope_columns
+from .._core.rendering import fewest_encoder_steps_in_play
 from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
 from ..identification.network.basis import Basis
@@ -25,6 +28,12 @@ from ..identification.network.constraints import domain_bounds, impose, slope_li
 from ..identification.network.fitted import FittedNetwork
 from ..identification.network.separable import Block, SeparableProblem
 from .static_error import SAMPLES, strokes, with_network
+
+LONGEST_PLAY = 0.1
+"""Largest play radius [share of the travel]: a wider one is felt as play, not as hysteresis."""
+
+_WANTED = 1.02
+"""Slope for which a device is used [share of that of the model]: a network is fitted just below its limits"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 """Standard deviation of the kernel [share of the travel]; True if the force must be restoring at both ends,
@@ -67,6 +76,31 @@ def sliding_slopes(model: ForceModel) -> tuple[float, float]:
     """The smallest and largest slope of these bounds."""
     bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
+
+
+def renderable_slopes(
+    device: DeviceProfile, stick: float = 0.0, model: ForceModel | None = None
+) -> tuple[float, float]:
+    """(lowest, highest) slope for which direct rendering is certified, divided according to the model.
+
+    With hysteresis these are slopes while sliding, and a stick adds `stick` = h/r.
+    """
+    low, high = (-math.inf, math.inf) if model is None else sliding_slopes(model)
+    return stability.renderable_slopes(
+        device, stick, rising=max(0.0, _WANTED * high), falling=max(0.0, -_WANTED * low)
+    )
+
+
+def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
+    """Narrowest certified play radius for direct rendering, at least 4 encoder steps.
+
+    Infinite if none is certified up to `LONGEST_PLAY`.
+    """
+    longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
+    narrowest = fewest_encoder_steps_in_play * device.encoder_step
+    radius = stability.narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
+    # Bounds are computed once more for the certificate, and rounded.
+    return radius if radius == narrowest else 1.000001 * radius
 
 
 def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | None:

@@ -68,7 +68,7 @@ class Plan:
 
     @property
     def structure(self) -> str:
-        """direct, massless, implicit, explicit or energy-consistent."""
+        """Name of the structure."""
         return self.scheme.structure
 
     @property

@@ -38,10 +38,8 @@ def plan(
 ) -> Plan:
     """Chooses the simplest structure that is certified for a model on a device.
 
-    The candidate structures are, in this order: direct; direct with the slope limited to the device's limit;
-    massless behind a coupling, if a coupling is required; implicit, if the object has mass or damping;
-    energy-consistent, if its force falls too steeply for that; explicit, which is stable at best. Numbers
-    that are not given are chosen from the device.
+    ``palpate plan --help`` lists the candidate structures in the order in which they are tried. Numbers that
+    are not given are chosen from the device.
 
     Parameters
     ----------
@@ -125,8 +123,8 @@ def plan(
         )
     refused: list[str] = []
     chosen: Candidate | None = None
-    for name, propose in CANDIDATES.items():
-        outcome = propose(task)
+    for name, candidate in CANDIDATES.items():
+        outcome = candidate.propose(task)
         if isinstance(outcome, Refusal):
             refused.append(f"{name}: {outcome.reason}")
             continue

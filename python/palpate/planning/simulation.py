@@ -12,6 +12,7 @@ import numpy as np
 from .. import _core
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme
+from .._core.run import smallest_domain_share, tolerated_change
 from .._core.simulation import Hand, TestRig, motion_driven
 from .._core.status import Status
 from .._typing import Float1D
@@ -34,10 +35,6 @@ _GRID = 1001
 """Positions at which the force range is computed [-]"""
 _TOLERATED_ERROR = 0.02
 """Largest force error without a finding [share of the force range]"""
-_TOLERATED_TICKS = 0.01
-"""Largest number of extrapolated, clipped or unsolved ticks without a finding [share of the ticks]"""
-_SMALLEST_DOMAIN_SHARE = 0.1
-"""Least motion of the handle without a finding [share of the domain]"""
 
 _COMPENSATED_DAMPING = 0.25
 """Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
@@ -213,7 +210,7 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
     findings: list[Finding] = []
     if lower == upper:
         findings.append(no("the handle did not move: simulate a longer time, or a stiffer hand"))
-    elif covered < _SMALLEST_DOMAIN_SHARE:
+    elif covered < smallest_domain_share:
         findings.append(
             usable(f"the handle covered {100 * covered:.3g} % of the model's domain: simulate a longer time")
         )
@@ -234,7 +231,7 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         (unsolved, "did not solve the load line: choose the structure with palpate plan"),
         (status["Limited"], "clipped the force to the device's limit: a stronger device is needed"),
     ):
-        if count > _TOLERATED_TICKS * ticks:
+        if count > tolerated_change * ticks:
             findings.append(usable(f"{count} of {ticks} ticks ({100 * count / ticks:.3g} %) {sentence}"))
     return Verdict(tuple(findings))
 

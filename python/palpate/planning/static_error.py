@@ -61,7 +61,7 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
     scheme : Scheme
         A coupling makes the rendered force softer: K_c f' / (K_c + f') is felt in place of f'.
     """
-    exact = scheme.structure == "direct" or scheme.compensated
+    exact = scheme.compensated or not scheme.has_coupling
     if exact and rendered is identified:
         return StaticForceError(0.0, 0.0, 0.0, 0.0)
     x = np.linspace(identified.lower[0], identified.upper[0], SAMPLES)

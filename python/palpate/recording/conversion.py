@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .columns import Choice, Column, choose_columns
-from .files import sha256_of_file
+from .files import Layout, sha256_of_file
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
 from .units import COLUMN_SUFFIX
-from .writing import Layout
 
 UNSTATED = ""
 """The unit of an array that was handed over without one: SI, but not said which."""

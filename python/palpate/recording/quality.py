@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..verdict import Finding, usable
-from .cells import CellRows, Travel, amount, cell_rows, sides
-from .comparison import merged_findings, scale_findings
+from .comparison import CellRows, Travel, amount, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirrored
 from .motion import GAP
 from .recording import Recording

@@ -17,10 +17,9 @@ from .._typing import Float1D, Float2D, Int8Vector
 from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
-from .frame import NAME, FrameTable, python_arguments
-from .table import Cells
+from .files import Layout, free_name, write_csv
+from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS
-from .writing import Layout, free_name, write_csv
 
 T = TypeVar("T")
 
@@ -201,7 +200,7 @@ class Recording:
         with python_arguments():
             fields = converted(
                 FrameTable(frame),
-                NAME,
+                FRAME,
                 position=position,
                 force=force,
                 time=time,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Verify a model: on fresh recordings row by row, in closed loop, and beside another model."""
 
-from .agreement import Stroke, compare
 from .closed_loop import ClosedLoop, force_driven, motion_driven
+from .metrics import Stroke, compare
 from .uncertainty import Uncertainty, uncertainty
 from .verification import Verification, columns_of, verify
 

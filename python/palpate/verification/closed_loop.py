@@ -14,14 +14,14 @@ import numpy as np
 
 from .. import _core
 from .._core.dynamics import paper_sample_time_s
-from .._core.rendering import Scheme, explicit_slope_limit
+from .._core.rendering import Scheme, default_play_radius, explicit_slope_limit
 from .._core.status import Status
 from .._typing import Float1D
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
 from .metrics import normalised, root_mean_square
-from .prediction import PLAY_SHARE_OF_TRAVEL, require_same_units
+from .prediction import require_same_units
 
 MOST_SAMPLES = 20_000_000
 """Samples of a motion on an even grid; more would fill the memory."""
@@ -88,7 +88,7 @@ def motion_driven(
     InputError
         The model and the recording, or the model and the scheme, do not fit.
     """
-    scheme = scheme or Scheme(structure="direct", play_radius=_play_radius(model, 0.0))
+    scheme = scheme or Scheme(structure="direct", play_radius=default_play_radius(model, 0.0))
 
     def run(position: Float1D, _force: Float1D) -> dict[str, Any]:
         rendered: dict[str, Any] = _core.simulation.motion_driven(model, scheme, position, period_s)
@@ -135,12 +135,13 @@ def force_driven(
             f"structure is {default.structure}; a recorded force drives an explicit or an implicit "
             "environment"
         )
-    scheme = _with(default, play_radius=_play_radius(model, default.play_radius))
+    radius = default.play_radius or default_play_radius(model, 0.0)
+    scheme = Scheme(**{**default.to_dict(), "play_radius": radius})
     notes: tuple[str, ...] = ()
     steepest = scheme.steepest_slope(model)
     limit = explicit_slope_limit(scheme, period_s, coupled=False)
     if scheme.structure == "explicit" and not steepest < limit:
-        scheme = _with(scheme, structure="implicit")
+        scheme = Scheme(**{**scheme.to_dict(), "structure": "implicit"})
         notes = (
             f"the implicit environment is used: with mass {scheme.mass:g} and damping {scheme.damping:g} the "
             f"explicit one is stable below a slope of {limit:.4g}, and the model reaches {steepest:.4g}",
@@ -197,26 +198,6 @@ def _closed_loop(
         units=dict(recording.units),
         notes=notes,
     )
-
-
-def _play_radius(model: Model, given: float) -> float:
-    """0 where the model has one of its own or needs none."""
-    if given > 0 or not model.hysteretic or model.play_radius is not None:
-        return given
-    return PLAY_SHARE_OF_TRAVEL * (float(model.upper[0]) - float(model.lower[0]))
-
-
-def _with(scheme: Scheme, **changes: Any) -> Scheme:
-    fields = (
-        "structure",
-        "coupling_stiffness",
-        "coupling_damping",
-        "mass",
-        "damping",
-        "compensated",
-        "play_radius",
-    )
-    return Scheme(**{name: getattr(scheme, name) for name in fields} | changes)
 
 
 def _counted(status: Any) -> dict[str, int]:

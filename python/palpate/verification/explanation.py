@@ -11,6 +11,7 @@ import numpy as np
 from .._typing import Float1D
 from ..model import Model
 from ..recording import Recording
+from ..recording.comparison import amount
 from ..recording.units import UNITS
 from .metrics import normalised, root_mean_square
 from .prediction import Prediction
@@ -82,7 +83,7 @@ def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanat
     offset = float(np.mean(force - modelled))
     yield Explanation(
         _share(modelled - (force - offset), force),
-        f"the recording fits with its force less {_with_unit(offset, unit)}, as if the sensor had an offset; "
+        f"the recording fits with its force less {amount(offset, unit)}, as if the sensor had an offset; "
         "give --zero START:STOP, the rows without contact",
         order=2,
     )
@@ -141,7 +142,7 @@ def _of_position(
     yield Explanation(
         left(position + best, side),
         f"the recording fits with its position {'plus' if best > 0.0 else 'less'} "
-        f"{_with_unit(abs(best), unit)}, as if its zero had moved; correct it in the file",
+        f"{amount(abs(best), unit)}, as if its zero had moved; correct it in the file",
         order=5,
     )
 
@@ -155,7 +156,3 @@ def _unit_of(factor: float, unit: str) -> str | None:
             if abs(factor * other.factor - 1.0) < SAME_FACTOR:
                 return f"it were in {unit}, not in {symbol}"
     return None
-
-
-def _with_unit(value: float, unit: str) -> str:
-    return f"{value:.4g} {unit}".rstrip()

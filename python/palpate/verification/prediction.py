@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .._core.rendering import Scheme, default_play_radius, structure_names
 from .._typing import Float1D
 from ..errors import InputError
 from ..identification.data.rows import input_columns
@@ -18,11 +19,7 @@ from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
-from ..recording.motion import GAP, acceleration, velocity
-from ..recording.strokes import ordered_strokes, turns_of
-
-PLAY_SHARE_OF_TRAVEL = 0.01
-"""Play radius over travel where nothing states one: recorded strokes do not tell it."""
+from ..recording.motion import GAP, acceleration, ordered_strokes, turns_of, velocity
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are left out"
 
@@ -188,8 +185,7 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
     ):
         if radius:
             return float(radius), origin
-    travel = float(model.upper[0] - model.lower[0])
-    return PLAY_SHARE_OF_TRAVEL * travel, "1 % of the travel: neither recording nor model states one"
+    return default_play_radius(model, 0.0), "1 % of the travel: neither recording nor model states one"
 
 
 def _gaps(time: Float1D | None) -> NDArray[np.intp]:
@@ -227,7 +223,8 @@ def flight_of(recording: Recording) -> FlightRecord:
     found = re.search(r"\br = ([0-9.eE+-]+)", structure)
     radius = float(found.group(1)) if found else None
     predicted = ", predict " in structure
-    directly = structure.startswith("direct") and not predicted
+    name = structure.partition(",")[0]
+    directly = name in structure_names and not Scheme(structure=name).has_coupling and not predicted
     if not structure or directly or "compensated" in structure:
         return FlightRecord(radius)
     for name, cells in recording.columns.items():

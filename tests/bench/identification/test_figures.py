@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures and page of identification: drawn from the output of its studies."""
+"""Tests figures and page of identification, which are made from the output of the studies."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict
 
 @pytest.fixture
 def identified(tmp_path: Path) -> Path:
-    """What the benchmarks of identification leave where there is no measured data."""
+    """Returns the folder of benchmark results without measured data."""
     rows = [
         _reached("P1", "palpate", 3e-4, 20),
         _reached("P1", "splines", 5e-4, 44),
@@ -56,11 +56,11 @@ def identified(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: Path) -> None:
+def test_draws_figures_and_fills_tables_of_the_page(identified: Path) -> None:
     names = ("compare_methods", "filters", "parsimony", "real_data", "dynamic")
     page = identified / "identification.md"
     tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
-    # the first time a table is filled there is none
+    # a new table is empty
     page.write_text(tables.replace("old filters\n", ""))
     main([str(identified), "--to", str(identified)])
     for name in ("parameters", "time", "filters"):
@@ -72,7 +72,7 @@ def test_identification_is_drawn_and_the_tables_of_its_page_follow(identified: P
     assert "| no wavelet | 99 | 100 |" in text
     assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; median (least" in text
     assert "of up to 12 draws" in text
-    # what was not measured this time stays as it was
+    # a study that did not run keeps its table
     assert "old real_data" in text
     assert "old parsimony" not in text
     assert text.count("| matched |") == 1
@@ -85,7 +85,7 @@ def _measured(nrmse: float, **more: Any) -> dict[str, Any]:
     return {**row, **both, "baselines": {"splines": splines}, **more}
 
 
-def test_measured_objects_stand_beside_their_splines_and_where_strokes_cross(identified: Path) -> None:
+def test_fills_the_tables_of_measured_objects_and_of_crossing_strokes(identified: Path) -> None:
     domes = [_measured(0.015, floor=0.009, share_at_turn=0.8), _measured(0.03)]
     variants = {"domes_h_of_any_sign": [_measured(0.011)], "domes_force_25_ms_earlier": [_measured(0.006)]}
     _left(identified, "real_data", {"domes": domes, **variants, "springs": [_measured(0.009)]})
@@ -99,9 +99,9 @@ def test_measured_objects_stand_beside_their_splines_and_where_strokes_cross(ide
     assert "| dome | 0.0150 | 0.0110 | 0.0100 | 0.0200 | 0.0090 | 80 % | 0.0060 | 0.0100 |" in text
 
 
-def test_a_missing_or_foreign_file_is_refused(tmp_path: Path) -> None:
+def test_refuses_a_missing_or_foreign_file(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match=r"compare_methods.json does not exist; make bench writes it"):
         main([str(tmp_path), "--to", str(tmp_path)])
     (tmp_path / "compare_methods.json").write_text("[1, 2]")
-    with pytest.raises(SystemExit, match=r"is no output of bench/identification/compare_methods.py"):
+    with pytest.raises(SystemExit, match=r"is not from bench/identification/compare_methods.py"):
         main([str(tmp_path), "--to", str(tmp_path)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The six problems with known truth: draws, and the median and range that are published of them."""
+"""Tests the six problems with known force: their draws, and median and range over the draws."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from bench.identification.problems import problem
 
 
 @pytest.mark.parametrize("name", ["P1", "P2", "P3", "P4", "P5"])
-def test_each_draw_has_positions_of_its_own_and_the_same_test_rows(name: str) -> None:
+def test_draws_differ_in_positions_and_share_the_test_rows(name: str) -> None:
     first, again, other = problem(name, 1), problem(name, 1), problem(name, 2)
     assert np.array_equal(first.X, again.X)
     assert np.array_equal(first.y, again.y)
@@ -26,7 +26,7 @@ def test_draws_without_noise_keep_the_ends_of_the_grid() -> None:
         assert np.all(np.diff(x) > 0.0)
 
 
-def test_a_measured_row_has_median_and_range_over_the_draws() -> None:
+def test_measured_row_has_median_and_range_over_the_draws() -> None:
     (row,) = measured("P4", 3, METHODS[:1])
     low, high = row["nrmse_range"]
     assert low < row["nrmse"] < high

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where each method fails: pictures and page are drawn from the output of the program."""
+"""Tests figures and page of the failure maps, which are made from the output of the program."""
 
 import json
 import re
@@ -19,12 +19,12 @@ NAMES = [each["name"] for each in NUMBERS["maps"]]
 
 
 def printed(*names: str) -> dict[str, Any]:
-    """Output of the program with some of its maps."""
+    """Returns the output of the program with some of its maps."""
     maps = [each for each in NUMBERS["maps"] if each["name"] in names]
     return {"maps": maps, "guards": NUMBERS["guards"]}
 
 
-def test_writes_pictures_numbers_and_tables(tmp_path: Path) -> None:
+def test_writes_figures_numbers_and_tables(tmp_path: Path) -> None:
     quick = ("encoder", "pole", "guard")
     page = tmp_path / PAGE.name
     page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "guards", "where")))
@@ -41,7 +41,7 @@ def test_writes_pictures_numbers_and_tables(tmp_path: Path) -> None:
     assert numbers["date"] in text
 
 
-def test_a_page_without_its_marks_is_refused_in_one_sentence(tmp_path: Path) -> None:
+def test_refuses_a_page_without_marks(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text("nothing to fill\n")
     with pytest.raises(SystemExit, match="'<!-- pole -->'"):
@@ -49,7 +49,7 @@ def test_a_page_without_its_marks_is_refused_in_one_sentence(tmp_path: Path) -> 
     assert page.read_text() == "nothing to fill\n"
 
 
-def test_the_table_names_the_ratio_and_where_nothing_failed() -> None:
+def test_table_states_the_ratio_and_the_largest_value_without_failure() -> None:
     line = {"name": "one", "at": [1, 2, 3], "measured": [4.0, 6.0, None], "theory": [4.0, 5.0, 6.0]}
     shown = {"name": "map", "along": "x", "limit": "y", "searched": 10.0, "linear": False, "lines": [line]}
     assert "| one | 1.0000 to 1.2000; elsewhere nothing failed up to 10 |" in map_table(shown)
@@ -58,14 +58,14 @@ def test_the_table_names_the_ratio_and_where_nothing_failed() -> None:
     assert "| one | 4 | 6 | nan |" in map_table(shown)
 
 
-def test_marks_with_nothing_between_are_filled_too(tmp_path: Path) -> None:
+def test_fills_empty_tables(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("<!-- one -->\n<!-- end -->\nbetween\n<!-- two -->\nold\n<!-- end -->\n")
     fill_tables(page, {"one": "1\n", "two": "2\n"})
     assert page.read_text() == "<!-- one -->\n1\n<!-- end -->\nbetween\n<!-- two -->\n2\n<!-- end -->\n"
 
 
-def test_the_command_without_its_program_names_the_build(tmp_path: Path) -> None:
+def test_missing_program_names_its_build_target(tmp_path: Path) -> None:
     script = tmp_path / "bench" / "limits" / "failure_maps.py"
     script.parent.mkdir(parents=True)
     script.write_text(Path(failure_maps.__file__).read_text(encoding="utf-8"), encoding="utf-8")
@@ -77,7 +77,7 @@ def test_the_command_without_its_program_names_the_build(tmp_path: Path) -> None
     assert "--target failure_maps" in run.stderr
 
 
-def test_the_page_has_a_picture_and_a_table_for_every_map() -> None:
+def test_page_has_a_figure_and_a_table_for_every_map() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name in NAMES:
         assert text.count(f"(figures/failure-{name}.png)") == 1
@@ -87,7 +87,7 @@ def test_the_page_has_a_picture_and_a_table_for_every_map() -> None:
     assert len(re.findall(r"<!-- end -->", text)) == len(NAMES) + 2
 
 
-def test_the_numbers_of_the_page_are_those_of_its_file() -> None:
+def test_page_and_json_file_contain_the_same_numbers() -> None:
     text = PAGE.read_text(encoding="utf-8")
     assert NUMBERS["date"] in text
     for each in NUMBERS["maps"]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gain of the half-sample prediction: measured on a few cases, drawn, and written into its page."""
+"""Tests the study of the prediction: it measures a few cases, draws them and fills its page."""
 
 import json
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_measures_draws_and_fills_both_tables(tmp_path: Path, monkeypatch: pytes
     assert text.count("| none | ") == 2
 
 
-def test_the_certificate_table_has_one_row_for_each_line() -> None:
+def test_certificate_table_has_one_row_for_each_line() -> None:
     row = "damping-hold      random networks                   {}      65    {}     65 (t)         0\n"
     search = row.format("0.00", "0.998    1.000") + row.format("0.50", "0.991    0.999") + "0 give energy\n"
     table = table_of(search)

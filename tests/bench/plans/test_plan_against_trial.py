@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plan against exhaustive trial: the page, and the command that fills it."""
+"""Tests the comparison of plans with an exhaustive trial: the page and the command that fills it."""
 
 import json
 import os
@@ -12,7 +12,7 @@ PAGE = ROOT / "docs" / "plan-against-trial.md"
 NUMBERS = PAGE.parent / "figures" / "plan-against-trial.json"
 
 
-def test_the_command_runs_without_measured_data_and_says_what_it_left_out(tmp_path: Path) -> None:
+def test_runs_without_measured_data_and_names_the_omitted_objects(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "figures").mkdir()
@@ -32,7 +32,7 @@ def test_the_command_runs_without_measured_data_and_says_what_it_left_out(tmp_pa
     assert not any(row["shakes"] for row in rows)
 
 
-def test_the_page_shows_seven_objects_on_three_devices_each() -> None:
+def test_page_shows_seven_objects_on_three_devices_each() -> None:
     rows = json.loads(NUMBERS.read_text(encoding="utf-8"))
     assert len(rows) == 21
     text = PAGE.read_text(encoding="utf-8")
@@ -40,7 +40,7 @@ def test_the_page_shows_seven_objects_on_three_devices_each() -> None:
         assert f"| {row['object']} | {row['device']} | {row['plan']} |" in text
 
 
-def test_on_a_device_that_is_too_weak_the_plan_rests_and_plain_direct_rendering_fails() -> None:
+def test_on_a_weak_device_the_plan_comes_to_rest_and_direct_rendering_oscillates() -> None:
     weak = [row for row in json.loads(NUMBERS.read_text(encoding="utf-8")) if "weak" in row["device"]]
     assert len(weak) == 7
     for row in weak:

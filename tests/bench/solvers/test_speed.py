@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures and page of speed: drawn from the output of the benchmarks, and refused without it."""
+"""Tests figures and page of speed, which are made from the output of the benchmarks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _model(name: str, wavelets: int, error: float) -> dict[str, Any]:
 
 
 def _sized(name: str, **counters: float) -> list[dict[str, Any]]:
-    """A benchmark for 8 and 16 wavelets, in three repetitions and with their mean."""
+    """Returns a benchmark for 8 and 16 wavelets, with three repetitions and their mean."""
     rows: list[dict[str, Any]] = []
     for wavelets in (8, 16):
         of = f"{name}/wavelets:{wavelets}"
@@ -60,7 +60,7 @@ def _sized(name: str, **counters: float) -> list[dict[str, Any]]:
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    """What the benchmarks leave, with a time step that diverges."""
+    """Returns the folder of benchmark results, with a time step that diverges."""
     context = {"num_cpus": 2, "mhz_per_cpu": 2000, "date": "2026-01-02T03:04:05", "commit": "abc"}
     benchmarks = {
         "bench_work_precision": [
@@ -115,7 +115,7 @@ def test_draws_every_figure_and_writes_its_numbers_with_machine_and_date(results
     assert "commit abc" in text
 
 
-def test_takes_the_median_of_the_repetitions_and_no_mean_for_one(results: Path) -> None:
+def test_uses_the_median_of_the_repetitions_and_ignores_the_mean(results: Path) -> None:
     to = results / "figures"
     main([str(results), "--to", str(to)])
     text = (to / "speed.md").read_text(encoding="utf-8")
@@ -133,11 +133,13 @@ def test_refuses_a_folder_without_results(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        pytest.param({"error_occurred": True, "error_message": "0.7 N*m"}, "wrong answer", id="wrong-answer"),
-        pytest.param({"force_error_end_Nm": None}, "has no number force_error_end_Nm", id="no-number"),
+        pytest.param({"error_occurred": True, "error_message": "0.7 N*m"}, "wrong result", id="wrong-result"),
+        pytest.param(
+            {"force_error_end_Nm": None}, "lacks the number force_error_end_Nm", id="missing-number"
+        ),
     ],
 )
-def test_draws_no_benchmark_that_is_wrong(results: Path, change: dict[str, Any], says: str) -> None:
+def test_refuses_a_wrong_benchmark(results: Path, change: dict[str, Any], says: str) -> None:
     path = results / "bench_rendered_force.json"
     content = json.loads(path.read_text())
     content["benchmarks"][1] |= change
@@ -147,13 +149,13 @@ def test_draws_no_benchmark_that_is_wrong(results: Path, change: dict[str, Any],
     assert "massless_table" in str(refused.value)
 
 
-def test_refuses_a_file_that_is_no_benchmark_output(results: Path) -> None:
+def test_refuses_a_file_of_another_format(results: Path) -> None:
     (results / "bench_work_precision.json").write_text("[1, 2")
-    with pytest.raises(SystemExit, match="is no output of Google Benchmark"):
+    with pytest.raises(SystemExit, match="is not JSON output of Google Benchmark"):
         main([str(results), "--to", str(results / "figures")])
 
 
-def test_a_claim_has_its_measured_and_its_required_value(results: Path) -> None:
+def test_claim_has_a_measured_and_a_required_value(results: Path) -> None:
     claims = {text: (measured, most) for text, measured, most in measured_claims(results)}
     assert claims["99.9th percentile of a whole tick [ns]"] == (120.0, 500.0)
     assert claims["one prediction from Python / np.interp"] == (None, 1.0)

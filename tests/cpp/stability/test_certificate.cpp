@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/stability/certificate.hpp"
+#include "palpate/stability/renderable_slopes.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -380,6 +381,38 @@ TEST(Certificate, TheStiffestCouplingIsTheOneThatIsStillCertified) {
         }
     }
     EXPECT_EQ(stiffest_coupling(1.0, 0.0, smooth(0.1), 0.9), 0.0) << "its damping alone is too much";
+}
+
+TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
+    const auto holds = [](const ForceBounds& bounds, Scheme scheme, VirtualCoupling coupling,
+                          const DeviceProfile& device) {
+        scheme.coupling = coupling;
+        return all_hold(inequalities_of(bounds, scheme, device));
+    };
+    test::Random random{23};
+    int stable = 0;
+    for (int draw = 0; draw < test::cases(50); ++draw) {
+        const ForceBounds bounds =
+            slopes(-test::uniform(random, 0.0, 5.0), std::exp(test::uniform(random, 0.0, 5.0)));
+        const DeviceProfile device = smooth(std::exp(test::uniform(random, -4.0, 0.0)));
+        const Scheme chosen = explicit_scheme(bounds, device, {});
+        if (!holds(bounds, chosen, chosen.coupling, device)) {
+            continue;  // none of those tried is stable
+        }
+        ++stable;
+        EXPECT_LE(chosen.coupling.stiffness, 0.9 * stiffest_coupling(0.0, 0.0, device));
+        SchemeChoices given;
+        given.coupling_stiffness = chosen.coupling.stiffness;
+        given.mass = chosen.inertia.mass;
+        const Scheme again = explicit_scheme(bounds, device, given);
+        EXPECT_EQ(again.coupling.stiffness, chosen.coupling.stiffness);
+        EXPECT_EQ(again.inertia.mass, chosen.inertia.mass);
+        EXPECT_TRUE(holds(bounds, again, again.coupling, device));
+        EXPECT_LE(again.inertia.damping, chosen.inertia.damping * (1.0 + 1e-12));
+        given.damping = 0.9 * again.inertia.damping;
+        EXPECT_EQ(explicit_scheme(bounds, device, given).inertia.damping, *given.damping);
+    }
+    EXPECT_GT(stable, 5);
 }
 
 // spec of the certificate, section 5: f_c >= ||g||_1 Delta / 2, "300 objects, bound over sum 1.000 to 1.009"

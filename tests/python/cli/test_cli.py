@@ -16,7 +16,8 @@ import pytest
 from palpate import InputError
 from palpate.cli.exit_status import WorkError, ending_of, finishing
 from palpate.cli.main import main, palpate
-from palpate.cli.printing import print_json, require_distinct, require_writable
+from palpate.cli.printing import print_json
+from palpate.cli.verb import require_writable
 
 VERBS = ["identify", "verify", "simulate", "show", "demo"]
 
@@ -166,9 +167,9 @@ def test_an_input_is_never_overwritten(tmp_path: Path) -> None:
 
 
 def test_two_results_do_not_share_a_file(tmp_path: Path) -> None:
-    require_distinct(tmp_path / "a", tmp_path / "b", None)
+    require_writable(tmp_path / "a", tmp_path / "b", None)
     with pytest.raises(InputError, match="two results"):
-        require_distinct(tmp_path / "a", tmp_path / "a")
+        require_writable(tmp_path / "a", tmp_path / "a")
 
 
 def test_checking_an_output_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from palpate import IdentifyOptions, Recording, load_model, read_recording
-from palpate.cli.identify_options import HELP
+from palpate.cli.identify import HELP
 from palpate.cli.main import main, palpate
 from palpate.recording.sample import sample_recording
 

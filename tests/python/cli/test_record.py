@@ -209,7 +209,7 @@ def test_a_handle_that_nobody_moves_is_no_recording(tmp_path: Path) -> None:
 def test_without_an_object_or_a_way_to_see_its_force_nothing_is_recorded(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nothing is mounted on the simulated device"):
         record(tmp_path / "a.csv")
-    with pytest.raises(InputError, match="this device has no force transducer"):
+    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, and its motor"):
         record(tmp_path / "a.csv", object=load_model(OBJECT), transducer=False)
     with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
         record(tmp_path / "a.csv", device="knob")

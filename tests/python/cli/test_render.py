@@ -85,7 +85,7 @@ def test_what_is_wrong_is_refused(words: dict[str, object], sentence: str) -> No
 def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path) -> None:
     out = tmp_path / "felt.csv"
     out.write_text("precious", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"felt.csv exists already; choose another name, or .*force=True"):
+    with pytest.raises(ValueError, match=r"felt.csv exists already; .* set force to replace it"):
         render(Scheme(), duration_s=0.3, record=str(out))
     words = [*COMMAND, "--duration-s", "0.8", "--record", str(out), *PATIENT]
     refused = subprocess.run(words, capture_output=True, text=True, check=False)
@@ -166,3 +166,36 @@ def test_the_verb_refuses_with_one_sentence() -> None:
     answer = subprocess.run([*COMMAND, "--rate-hz", "5"], capture_output=True, text=True, check=False)
     assert answer.returncode == 2
     assert answer.stderr.splitlines()[-1].startswith("error: rate_hz is 5")
+
+
+def test_the_simulated_device_is_rendered_on_by_name(tmp_path: Path) -> None:
+    out = tmp_path / "felt.csv"
+    words = [
+        *COMMAND,
+        "--device",
+        "simulated",
+        "--duration-s",
+        "1.2",
+        "--record",
+        str(out),
+        "--json",
+        *PATIENT,
+    ]
+    answer = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    assert "rendering on simulated, which is simulated: nothing moves" in answer.stderr
+    summary = json.loads(answer.stdout)
+    assert summary["orderly"]
+    assert summary["recorded"] == len(every_row(out))
+
+
+@pytest.mark.parametrize("device", ["toaster", "usb:", "inverse3:w"])
+def test_a_device_that_is_none_is_refused_before_anything_is_written(device: str, tmp_path: Path) -> None:
+    out = tmp_path / "felt.csv"
+    words = [*COMMAND, "--device", device, "--record", str(out)]
+    answer = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert answer.returncode == 2
+    sentence = answer.stderr.splitlines()[-1]
+    assert sentence.startswith("error: ")
+    assert device in sentence or "Inverse3" in sentence
+    assert list(tmp_path.iterdir()) == []

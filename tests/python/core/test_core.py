@@ -165,7 +165,7 @@ def test_play_state_follows_the_motion() -> None:
         ({"alpha": [[-1.0], [1.0], [1.0]]}, r"alpha\[0\]\[0\] is -1.000000, must be > 0"),
         ({"weight": [1.0, float("nan"), 0.0]}, r"weight\[1\] is not a finite number"),
         ({"beta": [[0.5]]}, "beta has 1 values, must have 3"),
-        ({"below": "open"}, "below is 'open', must be 'linear' or 'free'"),
+        ({"below": "open"}, "below is 'open', must be linear or free"),
         ({"play_radius": 0.1}, "play_radius is given for a model without hysteresis"),
         ({"bias_hysteresis": 0.1}, "must be given together"),
     ],
@@ -227,5 +227,5 @@ def test_filters_are_those_of_the_core() -> None:
     signal = np.sin(0.05 * np.arange(400))
     b, a = filters.g1.numerator, filters.g1.denominator
     assert filters.g1.filter(signal) == pytest.approx(lfilter(b, a, signal), abs=1e-9)
-    with pytest.raises(ValueError, match="must be 'implicit' or 'explicit'"):
+    with pytest.raises(ValueError, match="must be implicit or explicit"):
         environment_filters("both")

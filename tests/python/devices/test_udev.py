@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from palpate._core.device import usb_product, usb_vendor
-from palpate.devices import DeviceError, install_rule, udev
+from palpate.devices import DeviceError, install_rule, usb
 
 
 @pytest.fixture
@@ -22,8 +22,8 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
         commands.append(command)
         return subprocess.CompletedProcess(command, 0, "", "")
 
-    monkeypatch.setattr(udev.subprocess, "run", run)
-    monkeypatch.setattr(udev.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(usb.subprocess, "run", run)
+    monkeypatch.setattr(usb.shutil, "which", lambda name: f"/usr/bin/{name}")
     return commands
 
 
@@ -53,7 +53,7 @@ def test_a_rule_that_is_there_is_written_again(tmp_path: Path, ran: list[tuple[s
 
 
 def test_a_machine_without_udev_is_told_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(udev.shutil, "which", lambda name: None)
+    monkeypatch.setattr(usb.shutil, "which", lambda name: None)
     told: list[str] = []
     install_rule(told.append, folder=tmp_path)
     assert told[-1] == "there is no udevadm here: plug the device in again, or restart the machine"
@@ -62,7 +62,7 @@ def test_a_machine_without_udev_is_told_what_to_do(tmp_path: Path, monkeypatch: 
 
 
 def test_without_root_it_says_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(udev.os, "access", lambda path, mode: False)
+    monkeypatch.setattr(usb.os, "access", lambda path, mode: False)
     with pytest.raises(DeviceError, match=r"needs root; run: sudo .*-m palpate devices --install-udev-rule"):
         install_rule(lambda _: None, folder=tmp_path)
     assert not list(tmp_path.iterdir())

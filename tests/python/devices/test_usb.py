@@ -87,7 +87,9 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(told: dict[str, Any]) -> N
 
 
 def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(told: dict[str, Any]) -> None:
-    assert told["unplugged"].endswith("asking who it is: it is gone; plug it in again")
+    assert told["unplugged"].endswith(
+        "asking who it is: it was unplugged meanwhile; plug it in and try again"
+    )
     assert told["found without it"] == 0
     assert told["opened without it"].startswith("no haptic USB device is plugged in")
     assert told["found again"] == "EMU-1"
@@ -129,24 +131,21 @@ def nobody_may_run(program: Path) -> bool:
 )
 def test_without_permission_the_command_that_gives_it_is_said() -> None:
     answer = devices(device=["--denied"])
-    assert "permission denied; run `sudo palpate devices --install-udev-rule` once" in answer.stdout
+    assert "permission denied; run 'sudo palpate devices --install-udev-rule' once" in answer.stdout
 
 
 @pytest.mark.parametrize(
-    ("number", "sentence"),
+    ("code", "sentence"),
     [
-        (
-            errno.EACCES,
-            "knob, asking: permission denied; run `sudo palpate devices --install-udev-rule` once",
-        ),
-        (errno.EBUSY, "knob, asking: another program holds it; close palpate-control"),
-        (errno.ETIMEDOUT, "knob, asking: it does not answer; plug it in again"),
-        (errno.EIO, "knob, asking: the transfer failed; try another cable or port"),
+        (-3, "knob, asking: permission denied; run 'sudo palpate devices --install-udev-rule' once"),
+        (-6, "knob, asking: another program uses it; end that program, then try again"),
+        (-7, "knob, asking: it does not answer; unplug it and plug it in again"),
+        (-1, "knob, asking: the transfer failed on the bus; try another cable or port"),
         (None, "knob, asking: Other error; plug it in again"),
     ],
 )
-def test_an_error_of_the_system_becomes_device_reason_and_cure(number: int | None, sentence: str) -> None:
-    assert str(device_error("knob", "asking", USBError("Other error", errno=number))).startswith(sentence)
+def test_an_error_of_libusb_becomes_device_reason_and_cure(code: int | None, sentence: str) -> None:
+    assert str(device_error("knob", "asking", USBError("Other error", error_code=code))).startswith(sentence)
 
 
 def test_devices_sets_one_up() -> None:

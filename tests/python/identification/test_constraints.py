@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate import InputError
-from palpate._core.model import wavelet_columns, wavelet_slope_columns
+from palpate._core.model import derivative_bounds, wavelet_columns, wavelet_slope_columns
 from palpate.identification import FittedNetwork, IdentifyOptions, fit_environment
 from palpate.identification.data.compression import Compressor
 from palpate.identification.network.basis import Basis
@@ -80,6 +80,30 @@ def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:
     dipping = replace(free, basis=basis, coefficients=coefficients)
     where = violated_positions(problem, dipping, bound)
     assert where == pytest.approx([0.50195], abs=1e-3)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_cells_are_bounded_by_the_derivatives_of_the_core(order: int) -> None:
+    """Sampled derivatives stay below the bound of each cell; near the centre of a wavelet they reach it."""
+    alpha, beta, weight = np.array([[3.0], [20.0]]), np.array([[0.2], [0.6]]), np.array([1.0, -0.5])
+    edges = np.linspace(0.0, 1.0, 33)
+    cells = derivative_bounds(
+        alpha=alpha,
+        beta=beta,
+        weight=weight,
+        linear=1.0,
+        bias=0.0,
+        lower=edges[:-1],
+        upper=edges[1:],
+        order=order,
+    )
+    samples = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 1001)
+    u = alpha[:, 0] * (samples[..., None] - beta[:, 0])
+    polynomial = u**4 - 6 * u**2 + 3 if order == 2 else -(u**5) + 10 * u**3 - 15 * u
+    derivative = (polynomial * np.exp(-(u**2) / 2) * alpha[:, 0] ** order) @ weight
+    largest = np.abs(derivative).max(axis=1)
+    assert (largest <= cells).all()
+    assert largest.max() == pytest.approx(cells.max(), rel=0.05)
 
 
 def test_the_bounded_least_squares_is_the_best_one() -> None:

@@ -9,9 +9,8 @@ import pytest
 from palpate import identify
 from palpate._core.model import wavelet_columns
 from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
-from palpate.identification.data.held_out import BLOCKS, HeldOutRows, gain, held_out_rows, inside
-from palpate.identification.search.criteria import choice, enough, standard_error
-from palpate.identification.search.evidence import Samples
+from palpate.identification.data.compression import BLOCKS, HeldOutRows, gain, held_out_rows, inside
+from palpate.identification.search.evidence import Samples, choice, enough, standard_error
 from palpate.recording import sample_recording
 
 

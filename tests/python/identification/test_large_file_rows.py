@@ -13,7 +13,7 @@ import pytest
 import palpate
 from palpate.cli.main import main
 from palpate.errors import InputError
-from palpate.recording.long_recording import LongRecording, open_long_recording
+from palpate.recording.reading import LongRecording, open_long_recording
 
 BLOCK = 400
 """Rows of a block in these tests."""
@@ -23,7 +23,7 @@ SIZES = {"half": 200, "one": 400, "one-and-a-row": 401, "two": 800, "two-and-a-h
 
 @pytest.fixture(autouse=True)
 def _small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("palpate.recording.long_recording.BLOCK_ROWS", BLOCK)
+    monkeypatch.setattr("palpate.recording.reading.BLOCK_ROWS", BLOCK)
 
 
 def rows(n: int) -> pd.DataFrame:

@@ -20,8 +20,8 @@ import pytest
 import palpate
 from palpate.cli.main import main
 from palpate.errors import InputError
-from palpate.identification.data.large_files import MOST_CELLS, Summary, merged, summarise
-from palpate.recording.long_recording import open_long_recording
+from palpate.identification.identify_files import MOST_CELLS, Summary, merged, summarise
+from palpate.recording.reading import open_long_recording
 
 SCALE = float(os.environ.get("PALPATE_TEST_SCALE", "1"))
 
@@ -237,7 +237,10 @@ def test_no_scheduler_is_told_in_one_sentence(tmp_path: Path, capsys: pytest.Cap
     assert not (tmp_path / "m.json").exists()
 
 
-def test_the_command_shows_how_far_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_shows_how_far_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("palpate.cli.printing._EVERY_S", 0.0)
     rows(5_000).to_csv(tmp_path / "press.csv", index=False)
     command = ["identify", str(tmp_path / "press.csv"), "-o", str(tmp_path / "m.json"), "--out-of-core"]
     assert main(command) == 0

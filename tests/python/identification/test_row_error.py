@@ -9,7 +9,8 @@ import pytest
 import palpate
 from imperfect import Array, line, noise, recorded, strokes, sweep, wall
 from palpate import WaveletNetworkRegressor
-from palpate.identification.classes.findings import RowError, disagreement
+from palpate.identification.classes.findings import disagreement, extreme_forces
+from palpate.identification.search.evidence import RowError
 
 N = 4000
 X = strokes(N)
@@ -99,10 +100,10 @@ def test_few_extreme_forces_do_not_hide_the_error_of_the_others() -> None:
     residual = np.concatenate([noise(990), np.zeros(10)])
     error = RowError(residual, force, np.ones(1000))
     assert error.nrmse < 1e-3
-    (finding,) = error.findings()
+    (finding,) = extreme_forces(error)
     assert finding.level == "no"
     assert "without the 1% of most extreme force" in finding.sentence
-    assert RowError(0.01 * residual, force, np.ones(1000)).findings() == []
+    assert extreme_forces(RowError(0.01 * residual, force, np.ones(1000))) == []
 
 
 def test_error_on_rows_far_above_that_on_cells_is_a_no() -> None:

@@ -12,8 +12,7 @@ from models_by_hand import model_by_hand
 from palpate import DeviceProfile, Model, Scheme, plan
 from palpate._core.stability import balancing_shift, certify
 from palpate.planning import profile_file
-from palpate.planning.choices import renderable_slopes
-from palpate.planning.limited_network import limit_slopes
+from palpate.planning.limited_network import limit_slopes, renderable_slopes
 from palpate.planning.static_error import static_force_error
 
 TURN = 2.0 * math.pi

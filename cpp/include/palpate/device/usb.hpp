@@ -155,15 +155,15 @@ class UsbDevice {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
-    /// Returns the properties that the device reports as a profile. It does not report its mechanics, which stay
-    /// `otherwise`.
-    [[nodiscard]] DeviceProfile profile(DeviceProfile otherwise = {}) const {
-        otherwise.id = name().serial.empty() ? name().product : name().serial;
-        otherwise.period_s = 1.0 / info().rate_hz;
-        otherwise.encoder_step = wire::position_of(1, info().counts_per_rev);
-        otherwise.force_step = 1e-6;
-        otherwise.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 would round twice
-        return otherwise;
+    /// What the device says of itself as a profile. It does not say what its mechanics are.
+    [[nodiscard]] DeviceProfile profile() const {
+        DeviceProfile profile = unmeasured({});
+        profile.id = name().serial.empty() ? name().product : name().serial;
+        profile.period_s = 1.0 / info().rate_hz;
+        profile.encoder_step = wire::position_of(1, info().counts_per_rev);
+        profile.force_step = 1e-6;
+        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 rounds twice
+        return profile;
     }
 
   private:

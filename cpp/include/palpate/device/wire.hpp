@@ -11,6 +11,7 @@
 #include <numbers>
 #include <span>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -34,6 +35,31 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 
 /// bRequest of a control transfer.
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
+
+/// Cause and cure for an error code of libusb; empty for a code that states no cause.
+[[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
+    switch (code) {
+        case -1:  // LIBUSB_ERROR_IO
+            return "the transfer failed on the bus; try another cable or port";
+        case -3:  // LIBUSB_ERROR_ACCESS
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
+                   "again";
+        case -4:  // LIBUSB_ERROR_NO_DEVICE
+        case -5:  // LIBUSB_ERROR_NOT_FOUND
+            return "it was unplugged meanwhile; plug it in and try again";
+        case -6:  // LIBUSB_ERROR_BUSY
+            return "another program uses it; end that program, then try again";
+        case -7:  // LIBUSB_ERROR_TIMEOUT
+            return "it does not answer; unplug it and plug it in again";
+        case -9:  // LIBUSB_ERROR_PIPE
+            return "it refused a request; its firmware may be of another version";
+        case -11:  // LIBUSB_ERROR_NO_MEM
+            return "the system has no memory left for USB; see "
+                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
+        default:
+            return "";
+    }
+}
 
 /// Bits of InPacket::status.
 inline constexpr unsigned enabled = 1;

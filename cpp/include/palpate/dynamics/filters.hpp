@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "palpate/dynamics/transfer_function.hpp"
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate {
 
@@ -18,6 +21,11 @@ enum class FilterDesign : std::uint8_t {
     Paper,    ///< as published: G I is 1.0032 (14.8379) and 1.048 (31) at low frequency
     Matched,  ///< G I is exactly 1 at low frequency
 };
+
+template <>
+inline constexpr auto words_of<FilterPair> = std::array<std::string_view, 2>{"implicit", "explicit"};
+template <>
+inline constexpr auto words_of<FilterDesign> = std::array<std::string_view, 2>{"paper", "matched"};
 
 /// The integrators I1 (force to velocity) and I2 (velocity to position) of the environment, and the differentiators G1
 /// and G2 that replace their inverses in identification (paper figures 10 to 14).

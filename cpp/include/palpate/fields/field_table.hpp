@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -53,7 +55,20 @@ template <auto outer, auto... path>
     return {name, field.doc, field.rule, field.stored, field.words};
 }
 
-/// Tuple of `Field`; each struct specialises it.
+/// All fields of a table inside a struct that holds theirs as `outer`.
+template <auto outer, class... Fields>
+[[nodiscard]] constexpr auto all_within(const std::tuple<Fields...>& fields) noexcept {
+    return std::apply([](const auto&... field) { return std::tuple{within<outer>(field, field.name)...}; },
+                      fields);
+}
+
+/// A field that need not be given: a file may leave it out.
+template <class V>
+inline constexpr bool is_optional = false;
+template <class V>
+inline constexpr bool is_optional<std::optional<V>> = true;
+
+/// A tuple of `Field`, to be specialised for each struct.
 template <class S>
 inline constexpr auto fields_of = nullptr;
 
@@ -102,30 +117,37 @@ template <HasWords Enum>
                                 either(words_of<Enum>));
 }
 
-/// Checks the numbers and words of one object. Throws std::invalid_argument with the field, its value and the rule. The
-/// message has `prefix` before each name.
+/// Throws std::invalid_argument unless `holds`: the field, its value, what would be right.
+inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
+    if (!holds) {
+        throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);
+    }
+}
+
+/// Checks a number or a word by the rule of its field; other values pass.
+template <class F, class V>
+void check_value(const F& field, const V& value, const std::string& prefix) {
+    if constexpr (is_optional<V>) {
+        if (value) {
+            check_value(field, *value, prefix);
+        }
+    } else if constexpr (std::is_arithmetic_v<V>) {
+        const auto number = static_cast<double>(value);
+        require_field(obeys(number, field.rule), prefix + field.name, number, text(field.rule));
+    } else if constexpr (std::is_same_v<V, std::string>) {
+        const auto& words = field.words;
+        if (!words.empty() && std::find(words.begin(), words.end(), value) == words.end()) {
+            throw std::invalid_argument(prefix + field.name + " is '" + value + "', must be " +
+                                        either(words));
+        }
+    }
+}
+
+/// Checks the numbers and words of one object. Throws std::invalid_argument: the field, its value, what would be right.
+/// The message puts `prefix` before each name.
 template <HasFields S>
 void check_fields(const S& object, const std::string& prefix = "") {
-    for_each_field<S>([&](const auto& field) {
-        const auto& value = field.of(object);
-        using V = std::remove_cvref_t<decltype(value)>;
-        if constexpr (std::is_arithmetic_v<V>) {
-            if (!obeys(static_cast<double>(value), field.rule)) {
-                throw std::invalid_argument(prefix + field.name + " is " +
-                                            readable(static_cast<double>(value)) + ", must be " +
-                                            text(field.rule));
-            }
-        } else if constexpr (std::is_same_v<V, std::string>) {
-            bool known = field.words.empty();
-            for (const std::string_view word : field.words) {
-                known = known || value == word;
-            }
-            if (!known) {
-                throw std::invalid_argument(prefix + field.name + " is '" + value + "', must be " +
-                                            either(field.words));
-            }
-        }
-    });
+    for_each_field<S>([&](const auto& field) { check_value(field, field.of(object), prefix); });
 }
 
 }  // namespace palpate

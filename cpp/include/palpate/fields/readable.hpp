@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <string>
 
 namespace palpate {
@@ -17,6 +18,9 @@ namespace palpate {
     const bool whole = size >= 1e3 && size < 1e7;
     return {first, whole ? std::to_chars(first, last, value, std::chars_format::fixed, 0).ptr
                          : std::to_chars(first, last, value, std::chars_format::general, 4).ptr};
+}
+[[nodiscard]] inline std::string readable(std::optional<double> value) {
+    return value ? readable(*value) : "not given";
 }
 
 }  // namespace palpate

@@ -5,11 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <stdexcept>
-#include <string>
 
 #include "palpate/device/device_profile.hpp"
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 #include "palpate/guard/limits.hpp"
 #include "palpate/guard/reading_guard.hpp"
 #include "palpate/rendering/scale.hpp"
@@ -61,25 +59,23 @@ inline constexpr double slowest_buzz_hz = 20.0;
 
 /// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const GuardSettings& settings) {
-    const auto require = [](bool holds, const char* field, double value, const char* right) {
-        if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
-        }
+    const auto obey = [](const char* field, double value, Rule rule) {
+        require_field(obeys(value, rule), field, value, text(rule));
     };
-    const auto not_negative = [](double value) { return std::isfinite(value) && value >= 0.0; };
-    require(std::isfinite(settings.force_limit) && settings.force_limit > 0.0, "force_limit",
-            settings.force_limit, "> 0");
-    require(not_negative(settings.slew_s), "slew_s", settings.slew_s, ">= 0");
-    require(settings.ramp_s >= 0.0 && settings.ramp_s <= longest_guard_s, "ramp_s", settings.ramp_s,
-            "0 to 3600");
-    require(settings.largest_speed > 0.0, "largest_speed", settings.largest_speed, "> 0");
-    require(not_negative(settings.frozen_speed), "frozen_speed", settings.frozen_speed, ">= 0");
-    require(settings.frozen_s >= 0.0 && settings.frozen_s <= longest_guard_s, "frozen_s", settings.frozen_s,
-            "0 to 3600");
-    require(not_negative(settings.buzz_force), "buzz_force", settings.buzz_force, ">= 0");
-    require(not_negative(settings.device_damping), "device_damping", settings.device_damping, ">= 0");
-    require(not_negative(settings.device_friction), "device_friction", settings.device_friction, ">= 0");
-    require(not_negative(settings.encoder_step), "encoder_step", settings.encoder_step, ">= 0");
+    const auto within_an_hour = [](const char* field, double value) {
+        require_field(value >= 0.0 && value <= longest_guard_s, field, value,
+                      "0 to " + readable(longest_guard_s));
+    };
+    obey("force_limit", settings.force_limit, Rule::Positive);
+    obey("slew_s", settings.slew_s, Rule::NotNegative);
+    within_an_hour("ramp_s", settings.ramp_s);
+    require_field(settings.largest_speed > 0.0, "largest_speed", settings.largest_speed, "> 0");
+    obey("frozen_speed", settings.frozen_speed, Rule::NotNegative);
+    within_an_hour("frozen_s", settings.frozen_s);
+    obey("buzz_force", settings.buzz_force, Rule::NotNegative);
+    obey("device_damping", settings.device_damping, Rule::NotNegative);
+    obey("device_friction", settings.device_friction, Rule::NotNegative);
+    obey("encoder_step", settings.encoder_step, Rule::NotNegative);
 }
 
 /// Least number of equal samples that count as a frozen encoder.

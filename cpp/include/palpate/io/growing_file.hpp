@@ -201,10 +201,7 @@ class GrowingFile {
         if (!S_ISREG(there.st_mode) && !S_ISLNK(there.st_mode)) {
             return name_ + " cannot be written: it is not an ordinary file";
         }
-        return force_ ? ""
-                      : name_ +
-                            " exists already; choose another name, or replace it with --force (Python: "
-                            "force=True)";
+        return force_ ? "" : name_ + " exists already; choose another name, or set force to replace it";
     }
 
     /// Returns the length of the whole lines.

@@ -59,15 +59,15 @@ class JsonField {
         }
         return {*found, path};
     }
-    /// Throws if an object has another key.
-    void require_keys(const std::vector<std::string_view>& keys) const {
+    /// Refuses an object with another key.
+    void require_keys(const std::vector<std::string_view>& keys, const char* cure = "") const {
         require(value_.is_object(), "an object");
         for (const auto& item : value_.items()) {
             if (std::find(keys.begin(), keys.end(), item.key()) == keys.end()) {
                 const std::string key = Json(item.key()).dump();  // without control characters
                 throw std::invalid_argument((path_.empty() ? "" : path_ + ".") +
-                                            key.substr(1, key.size() - 2) +
-                                            " is not a key of this format (free keys go under notes)");
+                                            key.substr(1, key.size() - 2) + " is not a key of this format" +
+                                            cure);
             }
         }
     }
@@ -153,7 +153,8 @@ class JsonField {
         }
     }
 
-    /// Returns a value of the type of a field, with its rule. A struct is an object with exactly its stored fields.
+    /// A value of the type of a field, with its rule. A struct is an object of its stored fields and no others; only
+    /// optional ones may be missing.
     template <class T>
     [[nodiscard]] T as(Rule rule = Rule::Any, std::span<const std::string_view> choices = {}) const {
         if constexpr (HasFields<T>) {
@@ -166,13 +167,15 @@ class JsonField {
             require_keys(names);
             T read;
             for_each_field<T>([&](const auto& field) {
-                if (field.stored) {
-                    auto& value = field.of(read);
-                    value = (*this)[field.name].template as<std::remove_cvref_t<decltype(value)>>(
-                        field.rule, field.words);
+                auto& value = field.of(read);
+                using V = std::remove_cvref_t<decltype(value)>;
+                if (field.stored && !(is_optional<V> && !value_.contains(field.name))) {
+                    value = (*this)[field.name].template as<V>(field.rule, field.words);
                 }
             });
             return read;
+        } else if constexpr (is_optional<T>) {
+            return as<typename T::value_type>(rule, choices);
         } else if constexpr (HasWords<T>) {
             return static_cast<T>(one_of(words_of<T>));
         } else if constexpr (std::is_same_v<T, bool>) {

@@ -18,15 +18,13 @@ namespace palpate {
 
 /// Content of a model file that a rendering uses.
 struct ModelFile {
-    ForceModel model;  ///< the identified model
-    std::string kind;
-    std::string position_unit;               ///< rad, m, count or "" (not stated)
+    ForceModel model;                        ///< as it was identified
+    std::string position_unit;               ///< rad, m, count or "" (unstated)
     std::string force_unit;                  ///< N*m, N, A or ""
     std::vector<std::string> inputs;         ///< one name for each input
-    std::string data_sha256;                 ///< of the recordings used
-    std::optional<Scheme> plan;              ///< how to render the model
-    std::optional<ForceModel> limited;       ///< replaces `model` in the plan
-    std::optional<Certificate> certificate;  ///< of the plan; recomputed
+    std::optional<Scheme> plan;              ///< how it is to be rendered
+    std::optional<ForceModel> limited;       ///< plan.network: the plan renders it in place of `model`
+    std::optional<Certificate> certificate;  ///< of the plan; recomputed, and found the same
 
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
@@ -84,11 +82,8 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     domain.require_keys({"lower", "upper"});
     const JsonField beyond = file["continuation"];
     beyond.require_keys({"below", "above", "period"});
-    const auto continuation = [](const JsonField& side) {
-        return side.one_of({"linear", "free"}) == "free" ? Continuation::Free : Continuation::Linear;
-    };
-    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), continuation(beyond["below"]),
-                continuation(beyond["above"]), std::nullopt};
+    Domain read{domain["lower"].numbers(), domain["upper"].numbers(), beyond["below"].as<Continuation>(),
+                beyond["above"].as<Continuation>(), std::nullopt};
     domain["lower"].require_length(d, "one for each dimension");
     domain["upper"].require_length(d, "one for each dimension");
     for (std::size_t k = 0; k < d; ++k) {
@@ -175,19 +170,18 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
-    file.require_keys({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius",
-                       "mass", "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan",
-                       "certificate", "notes"});
+    file.require_keys(
+        {"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
+         "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate", "notes"},
+        " (free keys go under notes)");
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].words();
     const detail::JsonField units = file["units"];
     units.require_keys({"position", "force"});
     ModelFile read{detail::read_network(file["network"], file),
-                   file["kind"].words(),
                    units["position"].one_of({"rad", "m", "count", ""}),
                    units["force"].one_of({"N*m", "N", "A", ""}),
                    {},
-                   "",
                    {},
                    {},
                    {}};
@@ -204,7 +198,6 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         read.model.require_slopes_within({bounds["min"].number(), bounds["max"].number()});
     }
     detail::check_data(file["data"]);
-    read.data_sha256 = file["data"]["sha256"].words();
     detail::check_fit(file["fit"], read.model.parameters().weight.size());
     read.plan = detail::read_plan(file["plan"]);
     read.limited = detail::read_limited(file);

@@ -36,8 +36,8 @@ class RecordingFile {
             head += line(key, value);
         }
         head += line("palpate-columns", R"({"time": "time_s", "position": "position)" +
-                                            suffix(units_.position) + R"(", "force": "force)" +
-                                            suffix(units_.force) + R"(", "status": "status"})");
+                                            suffix_of(units_.position) + R"(", "force": "force)" +
+                                            suffix_of(units_.force) + R"(", "status": "status"})");
         ending_at_ = static_cast<off_t>(head.size());
         head += padded(line("ended", "not yet: the recording was cut off, or is still growing"));
         timing_at_ = static_cast<off_t>(head.size());
@@ -82,10 +82,6 @@ class RecordingFile {
 
   private:
     static constexpr std::size_t room = 512;  ///< bytes for each line that is written at the end
-
-    [[nodiscard]] static std::string suffix(const std::string& unit) {
-        return unit.empty() ? "" : "_" + unit;
-    }
 
     [[nodiscard]] static std::string line(const std::string& key, std::string value) {
         for (char& letter : value) {

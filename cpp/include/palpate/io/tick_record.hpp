@@ -48,6 +48,11 @@ struct RecordUnits {
     return {position, force == "N*m" ? "Nm" : force};
 }
 
+/// "_Nm": what a column's name ends in; empty for an unstated unit.
+[[nodiscard]] inline std::string suffix_of(const std::string& unit) {
+    return unit.empty() ? "" : "_" + unit;
+}
+
 namespace detail {
 
 /// Appends the shortest text from which the same number is read.
@@ -71,10 +76,10 @@ inline void append_nanoseconds(std::string& text, double seconds) {
 /// stems, so that a reader chooses them without a hint. The table of units does not contain velocities; `radps` keeps a
 /// velocity from being read as another quantity.
 [[nodiscard]] inline std::string column_names(const RecordUnits& units) {
-    const auto unit = [](const std::string& suffix) { return suffix.empty() ? "" : "_" + suffix; };
-    const std::string velocity = units.position.empty() ? "" : "_" + units.position + "ps";
-    return "time_s,position" + unit(units.position) + ",force" + unit(units.force) + ",applied" +
-           unit(units.force) + ",environment_position" + unit(units.position) + ",velocity" + velocity +
+    const std::string position = suffix_of(units.position);
+    const std::string force = suffix_of(units.force);
+    return "time_s,position" + position + ",force" + force + ",applied" + force + ",environment_position" +
+           position + ",velocity" + position + (position.empty() ? "" : "ps") +
            ",sequence,device_clock_s,lateness_s,evaluations,extrapolated,status";
 }
 
@@ -97,7 +102,6 @@ inline void append_row(std::string& text, const TickRecord& tick) {
 
 /// Appends the columns as one JSON object; a number that is not finite becomes null.
 inline void append_json(std::string& text, const TickRecord& tick, const RecordUnits& units) {
-    const auto unit = [](const std::string& suffix) { return suffix.empty() ? "" : "_" + suffix; };
     const auto field = [&](const std::string& name, double value) {
         text += '"' + name + "\":";
         if (std::isfinite(value)) {
@@ -109,10 +113,10 @@ inline void append_json(std::string& text, const TickRecord& tick, const RecordU
     };
     text += '{';
     field("time_s", tick.time);
-    field("position" + unit(units.position), tick.position);
-    field("force" + unit(units.force), tick.force);
-    field("applied" + unit(units.force), tick.applied);
-    field("environment_position" + unit(units.position), tick.environment_position);
+    field("position" + suffix_of(units.position), tick.position);
+    field("force" + suffix_of(units.force), tick.force);
+    field("applied" + suffix_of(units.force), tick.applied);
+    field("environment_position" + suffix_of(units.position), tick.environment_position);
     field("lateness_s", tick.lateness);
     text += std::string("\"status\":\"") + palpate::text(tick.status).word + "\"}\n";
 }

@@ -2,9 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string_view>
+
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate {
 
@@ -22,6 +26,9 @@ enum class Continuation : std::uint8_t {
     Linear,  ///< a straight line of non-negative slope through the edge
     Free,    ///< the same line until the force is zero, then zero: contact is lost
 };
+
+template <>
+inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"linear", "free"};
 
 /// A curve beyond one edge of its domain: a straight line through the edge that ends `reach` away from it. The force is
 /// continuous at the edge and at the end; the slope is not.

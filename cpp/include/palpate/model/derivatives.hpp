@@ -51,8 +51,16 @@ using DerivativeBounds = std::array<double, highest_derivative + 1>;
 namespace detail {
 
 /// Suprema of |psi^(n)|, rounded up. psi^(n) = He_{n+2} E up to its sign, so for even n they are at 0.
-inline constexpr DerivativeBounds hat_suprema{
-    1.0, wavelet_slope_bound, wavelet_curvature_bound, 5.7831, 15.0, 35.539, 105.0, 288.492, 945.0, 2913.41};
+inline constexpr DerivativeBounds hat_suprema{1.0,
+                                              wavelet_slope_bound,
+                                              wavelet_curvature_bound,
+                                              wavelet_jerk_bound,
+                                              15.0,
+                                              35.539,
+                                              105.0,
+                                              288.492,
+                                              945.0,
+                                              2913.41};
 
 /// Factors of e^{-u^2/4} that bound psi^(n) away from its centre, from Cramer's inequality |He_n(u)|
 /// e^{-u^2/4} <= 1.0865 sqrt(n!).

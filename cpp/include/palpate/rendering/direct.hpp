@@ -147,7 +147,7 @@ class PredictedDirect {
 
 /// Builds direct rendering: `Direct`, or `PredictedDirect` if the prediction has taps.
 struct DirectStructure {
-    static constexpr StructureTraits traits{.name = "direct", .predicts = true};
+    static constexpr StructureTraits traits{.name = "direct", .velocity = true, .predicts = true};
 
     template <Environment E, class SolverOf, class Visit>
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <tuple>
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/model/force_model.hpp"
@@ -99,6 +100,17 @@ struct SchemeChoices {
                damping || play_radius || predict;
     }
 };
+
+template <>
+inline constexpr auto fields_of<SchemeChoices> =
+    std::tuple{Field<&SchemeChoices::structure>{"structure"},
+               Field<&SchemeChoices::compensated>{"compensated"},
+               Field<&SchemeChoices::coupling_stiffness>{"coupling_stiffness"},
+               Field<&SchemeChoices::coupling_damping>{"coupling_damping"},
+               Field<&SchemeChoices::mass>{"mass"},
+               Field<&SchemeChoices::damping>{"damping"},
+               Field<&SchemeChoices::play_radius>{"play_radius"},
+               Field<&SchemeChoices::predict>{"predict"}};
 
 /// Returns the default play radius of a model without one; otherwise 0.
 [[nodiscard]] inline double default_play_radius(const ForceModel& model, double encoder_step) noexcept {

@@ -65,10 +65,10 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     const std::string structure{name_of(scheme.structure)};
     const StructureTraits& traits = traits_of(scheme.structure);
     require_renderable(model);
-    detail::require(model.velocity() == nullptr || !traits.coupling,
-                    "structure is " + structure +
-                        ", must be direct: of a force of position and velocity behind a coupling no bound is "
-                        "known");
+    detail::require(
+        model.velocity() == nullptr || traits.velocity,
+        "structure is " + structure +
+            ", must be direct: of a force of position and velocity no bound is known in another structure");
     if (traits.coupling) {
         check_fields(scheme.coupling, "coupling_");
     }

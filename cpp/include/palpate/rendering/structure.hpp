@@ -34,6 +34,7 @@ struct StructureTraits {
     bool coupling = false;    ///< a virtual coupling to the device
     bool mass = false;        ///< an object with mass and damping
     bool solved = false;      ///< a load line to solve in each step
+    bool velocity = false;    ///< a force of position and velocity
     bool predicts = false;    ///< a force at a predicted position
     bool keeps_loss = false;  ///< a loss that may be below the play's loss
 };

@@ -8,10 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <stdexcept>
-#include <string>
 
-#include "palpate/fields/readable.hpp"
+#include "palpate/fields/field_table.hpp"
 #include "palpate/io/tick_record.hpp"
 #include "palpate/realtime/periodic.hpp"
 #include "palpate/realtime/timing.hpp"
@@ -36,18 +34,13 @@ inline constexpr double held_rate_share = 0.99;  ///< share of the rate; a slowe
 
 /// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const LoopSettings& settings) {
-    const auto require = [](bool holds, const char* field, double value, const char* right) {
-        if (!holds) {
-            throw std::invalid_argument(std::string(field) + " is " + readable(value) + ", must be " + right);
-        }
-    };
-    require(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
-            settings.rate_hz, "100 to 10000");
-    require(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
-    require(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s",
-            settings.longest_period_s, "at least one period");
-    require(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
-            settings.lowest_rate_share, "0 to 1");
+    require_field(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
+                  settings.rate_hz, readable(lowest_rate_hz) + " to " + readable(highest_rate_hz));
+    require_field(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
+    require_field(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s",
+                  settings.longest_period_s, "at least one period");
+    require_field(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
+                  settings.lowest_rate_share, "0 to 1");
 }
 
 /// Reason why a loop ended.

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "palpate/fields/readable.hpp"
@@ -33,6 +34,16 @@ struct MeasureOptions : RunOptions {
     [[nodiscard]] bool moves() const noexcept { return probe || push; }
 };
 
+template <>
+inline constexpr auto fields_of<MeasureOptions> = std::tuple_cat(
+    fields_of<RunOptions>,
+    std::tuple{Field<&MeasureOptions::probe>{"probe"}, Field<&MeasureOptions::lower>{"lower"},
+               Field<&MeasureOptions::upper>{"upper"}, Field<&MeasureOptions::speed>{"speed"},
+               Field<&MeasureOptions::stiffness>{"stiffness"},
+               Field<&MeasureOptions::force_limit>{"force_limit"}, Field<&MeasureOptions::push>{"push"},
+               Field<&MeasureOptions::keep>{"keep"}, Field<&MeasureOptions::transducer>{"transducer"},
+               Field<&MeasureOptions::friction_share>{"friction_share"}});
+
 namespace detail {
 
 /// Returns the settings of the probe: the given ones, otherwise the defaults at the scale of the device.
@@ -60,6 +71,11 @@ namespace detail {
     SessionSettings session{.loop = options.loop, .real_time = options.real_time};
     session.loop.rate_hz = device.rate_hz;
     validate(session.loop);
+    detail::require(
+        device.transducer || options.probe || options.record.empty(),
+        device.profile.id +
+            " has no force transducer, and its motor does not show a force while a hand moves the handle: "
+            "probe instead");
     const double period_s = 1.0 / device.rate_hz;
     GuardSettings guards = guards_for(device.scale, device.profile);
     std::string moved_by = "a hand";

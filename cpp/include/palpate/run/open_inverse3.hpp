@@ -45,12 +45,11 @@ namespace palpate {
     const std::string filters = live->report().lines.front().second;
     const double period_s = 1.0 / options.loop.rate_hz;
     live->scale = scale_of(model.model, false);
-    // The service does not state the mechanics of the device. Those of the certificate are used, otherwise the
-    // defaults.
+    // The service does not state the mechanics of the device: those of the certificate count, else none.
     if (!options.uncertified && model.certificate) {
         live->profile = model.certificate->device;
     } else {
-        live->profile = scaled_knob(live->scale, false, period_s);
+        live->profile = unmeasured(scaled_knob(live->scale, false, period_s));
         live->profile.force_limit = options.force_limit.value_or(usual_force_limit);
     }
     live->profile.id = info.type + "-" + info.id;

@@ -105,8 +105,8 @@ namespace detail {
     }
     if (std::abs(options.loop.rate_hz - device.info().rate_hz) > 0.5) {
         const std::string rate = std::to_string(device.info().rate_hz);
-        refuse("--rate-hz is " + readable(options.loop.rate_hz) + "; " + name + " sends " + rate +
-               " packets a second and paces the loop: choose --rate-hz " + rate);
+        refuse("rate_hz is " + readable(options.loop.rate_hz) + "; " + name + " sends " + rate +
+               " packets a second and paces the loop: choose " + rate);
     }
     live->title = name + (options.uncertified ? ", uncertified," : "");
     live->profile = device.profile();
@@ -126,12 +126,6 @@ namespace detail {
     const wire::Info info = listener.info();
     const std::string name = listener.name().text();
     listener.close();
-    const bool transducer = (info.capabilities & wire::has_transducer) != 0;
-    detail::require(
-        transducer || options.probe || options.record.empty(),
-        profile.id +
-            " has no force transducer, and its motor does not show a force while a hand moves the handle: "
-            "probe instead");
     detail::require(!options.probe || options.upper,
                     "a probe on a real device needs upper: how far it may go from the zero of its encoder");
     options.force_limit =
@@ -142,7 +136,7 @@ namespace detail {
     live->profile = profile;
     live->rate_hz = info.rate_hz;
     live->metadata = {{"device", profile.id}};
-    live->transducer = transducer;
+    live->transducer = (info.capabilities & wire::has_transducer) != 0;
     return live;
 }
 

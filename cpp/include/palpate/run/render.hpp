@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -44,7 +45,21 @@ struct RunOptions {
     std::string created_by;
 };
 
-/// Options of a rendering. Unset fields follow the model and the device.
+template <>
+inline constexpr auto fields_of<RunOptions> =
+    std::tuple{Field<&RunOptions::device>{"device"},
+               Field<&RunOptions::wait_s>{"wait_s"},
+               Field<&RunOptions::loop, &LoopSettings::rate_hz>{"rate_hz"},
+               Field<&RunOptions::loop, &LoopSettings::duration_s>{"duration_s"},
+               Field<&RunOptions::loop, &LoopSettings::lowest_rate_share>{"lowest_rate_share"},
+               Field<&RunOptions::real_time, &RealTimeOptions::priority>{"priority"},
+               Field<&RunOptions::real_time, &RealTimeOptions::cpu>{"cpu"},
+               Field<&RunOptions::record>{"record"},
+               Field<&RunOptions::force>{"force"},
+               Field<&RunOptions::telemetry_port>{"telemetry_port"},
+               Field<&RunOptions::telemetry_hz>{"telemetry_hz"}};
+
+/// Options of a rendering. Fields that are not set follow the model and the device.
 struct RenderOptions : RunOptions {
     bool rate_given = false;  ///< true if the user chose loop.rate_hz
     SchemeChoices scheme;
@@ -58,6 +73,12 @@ struct RenderOptions : RunOptions {
     bool uncertified = false;
     std::vector<std::string> faults;  ///< faults of the simulated device
 };
+
+template <>
+inline constexpr auto fields_of<RenderOptions> = std::tuple_cat(
+    fields_of<RunOptions>, all_within<&RenderOptions::scheme>(fields_of<SchemeChoices>),
+    std::tuple{Field<&RenderOptions::force_limit>{"force_limit"},
+               Field<&RenderOptions::uncertified>{"uncertified"}, Field<&RenderOptions::faults>{"faults"}});
 
 /// A model and its plan.
 struct PlannedModel {
@@ -106,7 +127,7 @@ struct RenderJob {
         return "the model has no certificate";
     }
     if (options.uncertified) {
-        return "--uncertified was given";
+        return "uncertified was set";
     }
     return differs_from_plan(options) ? "the options change the planned rendering" : "";
 }
@@ -145,8 +166,8 @@ namespace detail {
                readable(device.force_limit) + " N*m";
     }
     if (differs_from_plan(options)) {
-        return "is certified as it was planned: leave out --structure and its numbers, --force-limit, "
-               "--slew-s, --tolerated-samples";
+        return "is certified as it was planned: leave out structure and its numbers, force_limit, slew_s, "
+               "tolerated_samples";
     }
     return "";
 }
@@ -162,7 +183,7 @@ namespace detail {
     guards.energy_tank = options.energy_tank;
     validate(guards);
     if (!device.profile.makes(guards.force_limit)) {
-        refuse("--force-limit is " + readable(guards.force_limit) + ", the device makes " +
+        refuse("force_limit is " + readable(guards.force_limit) + ", the device makes " +
                readable(device.profile.force_limit));
     }
     guards.force_limit = std::min(guards.force_limit, device.profile.force_limit);
@@ -246,7 +267,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         reason = detail::certificate_mismatch(options, model, device.profile);
         if (!reason.empty()) {
             refuse(model.name + " " + reason +
-                   "; make a certificate with 'palpate plan', or type --uncertified to render without");
+                   "; make a certificate with 'palpate plan', or set uncertified to render without");
         }
     }
     const bool follows_plan = model.plan && !options.scheme.any();
@@ -268,7 +289,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     validate(loop);
     validate(job.guards);
     validate(job.scheme, job.model, 1.0 / loop.rate_hz);
-    if (!model.plan && !options.scheme.any() && job.scheme.structure != StructureKind::Direct) {
+    if (!model.plan && !options.scheme.any() && has_coupling(job.scheme.structure)) {
         job.notes.emplace_back(
             "no plan in the model: rendered behind the default coupling, which is felt; 'palpate plan' finds "
             "the simplest rendering that is not");
@@ -282,7 +303,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         flight_metadata(options.created_by, job.metadata, model.name, job.scheme, job.guards, loop.rate_hz);
     if (std::error_code ignored;
         !options.record.empty() && std::filesystem::equivalent(options.record, model.name, ignored)) {
-        refuse("--record " + options.record + " is the model; writing there would destroy it");
+        refuse("record is " + options.record + ", the model; writing there would destroy it");
     }
     if (std::string note = detail::open_sinks(options, model.units(), job.metadata, sinks); !note.empty()) {
         job.notes.push_back(std::move(note));

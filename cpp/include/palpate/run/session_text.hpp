@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -74,9 +73,9 @@ namespace palpate {
 
 /// Returns a text such as "massless, compensated, K_c = 100, B_c = 0.02".
 [[nodiscard]] inline std::string describe(const Scheme& scheme) {
-    std::string text{structure_names[static_cast<std::size_t>(scheme.structure)]};
+    std::string text{name_of(scheme.structure)};
     text += scheme.compensated ? ", compensated" : "";
-    if (scheme.structure != StructureKind::Direct) {
+    if (has_coupling(scheme.structure)) {
         text +=
             ", K_c = " + readable(scheme.coupling.stiffness) + ", B_c = " + readable(scheme.coupling.damping);
     }

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "palpate/fields/readable.hpp"
@@ -67,19 +68,24 @@ struct Summary {
             {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
 }
 
-/// Returns the fields of a summary, for JSON and Python.
+/// Ticks of each status that occurred.
+[[nodiscard]] inline NamedValues ticks_by_status(const LoopReport& loop) {
+    NamedValues counts;
+    for (std::size_t k = 0; k < status_texts.size(); ++k) {
+        if (loop.ticks_by_status[k] > 0) {
+            counts.push_back({std::string(status_texts[k].word), loop.ticks_by_status[k]});
+        }
+    }
+    return counts;
+}
+
+/// The fields of a summary, for JSON and for Python.
 [[nodiscard]] inline NamedValues fields(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     std::vector<NamedValues> findings;
     findings.reserve(summary.findings.size());
     for (const SessionFinding& finding : summary.findings) {
         findings.push_back({{"level", std::string(finding.level)}, {"sentence", finding.sentence}});
-    }
-    NamedValues ticks_by_status;
-    for (std::size_t k = 0; k < status_texts.size(); ++k) {
-        if (loop.ticks_by_status[k] > 0) {
-            ticks_by_status.push_back({std::string(status_texts[k].word), loop.ticks_by_status[k]});
-        }
     }
     NamedValues all{
         {"verdict", verdict_text(summary.findings)},
@@ -95,7 +101,7 @@ struct Summary {
         {"lateness", fields(loop.timing.lateness)},
         {"missed_deadlines", loop.timing.missed},
         {"longest_gap_us", 1e-3 * static_cast<double>(loop.timing.period.largest())},
-        {"ticks_by_status", ticks_by_status},
+        {"ticks_by_status", ticks_by_status(loop)},
         {"lost_samples", loop.lost_samples},
         {"repeated_samples", loop.repeated_samples},
         {"record", summary.record.empty() ? Value{} : Value{summary.record}},
@@ -123,11 +129,9 @@ struct Summary {
     const LoopReport& loop = summary.report.loop;
     const bool slow = loop.timing.rate_hz() < held_rate_share * summary.loop.rate_hz;
     std::string counts;
-    for (std::size_t k = 0; k < status_texts.size(); ++k) {
-        if (loop.ticks_by_status[k] > 0) {
-            counts += (counts.empty() ? "" : ", ") + std::to_string(loop.ticks_by_status[k]) + " " +
-                      status_texts[k].word;
-        }
+    for (const NamedValue& status : ticks_by_status(loop)) {
+        counts += (counts.empty() ? "" : ", ") + std::to_string(std::get<std::uint64_t>(status.value)) + " " +
+                  status.name;
     }
     Lines all{
         {"ended", summary.ended()},

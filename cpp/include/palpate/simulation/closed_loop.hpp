@@ -213,8 +213,7 @@ template <class Each>
                 return rendered;
             } else {
                 throw std::invalid_argument(
-                    "structure is " +
-                    std::string(structure_names[static_cast<std::size_t>(scheme.structure)]) +
+                    "structure is " + std::string(name_of(scheme.structure)) +
                     ", must be implicit or explicit: only an inertia turns force into motion");
             }
         });

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <concepts>
 #include <numbers>
+#include <tuple>
+
+#include "palpate/fields/field_table.hpp"
 
 namespace palpate {
 
@@ -40,11 +43,11 @@ concept SimulatedHand = requires(H& hand, double time, const Motion& handle) {
 ///
 ///     target(t) = lower + (upper - lower)(1 - cos 2 pi f t)/2.
 struct Hand {
-    double stiffness = 15.0;    ///< [N/m or N*m/rad]
-    double damping = 0.05;      ///< [N*s/m or N*m*s/rad]
-    double lower = 0.02;        ///< least target [m or rad]
-    double upper = 0.47;        ///< largest target [m or rad]
-    double frequency_hz = 0.5;  ///< frequency f of the sweep [Hz]
+    double stiffness = 15.0;
+    double damping = 0.05;
+    double lower = 0.02;
+    double upper = 0.47;
+    double frequency_hz = 0.5;
 
     /// Returns the target at a time [m or rad].
     [[nodiscard]] double target(double time) const noexcept {
@@ -59,5 +62,13 @@ struct Hand {
 };
 
 static_assert(SimulatedHand<Hand>);
+
+template <>
+inline constexpr auto fields_of<Hand> =
+    std::tuple{Field<&Hand::stiffness>{"stiffness", "[N/m or N*m/rad]"},
+               Field<&Hand::damping>{"damping", "[N*s/m or N*m*s/rad]"},
+               Field<&Hand::lower>{"lower", "Least target [m or rad]."},
+               Field<&Hand::upper>{"upper", "Largest target [m or rad]."},
+               Field<&Hand::frequency_hz>{"frequency_hz", "Sweeps a second [Hz]."}};
 
 }  // namespace palpate

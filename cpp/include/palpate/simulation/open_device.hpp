@@ -28,8 +28,8 @@ namespace palpate {
     const bool certified = void_reason(options, model).empty();
     const double rate_hz = certified ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
     if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
-        refuse("--rate-hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
-               readable(rate_hz) + " Hz: plan again for a device of that period, or give --uncertified");
+        refuse("rate_hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
+               readable(rate_hz) + " Hz: plan again for a device of that period, or set uncertified");
     }
     LoopSettings loop = options.loop;
     loop.rate_hz = rate_hz;
@@ -73,7 +73,7 @@ namespace palpate {
                "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
     if (kind != "simulated" && !options.faults.empty()) {
-        refuse("--fault is for the simulated device");
+        refuse("faults are for the simulated device");
     }
     if (model.force_unit == "A") {
         refuse(
@@ -93,6 +93,8 @@ namespace palpate {
     }
     detail::require(options.device == "simulated",
                     "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    detail::require(object || options.record.empty(),
+                    "nothing is mounted on the simulated device; give it an object, a model file");
     validate(options.loop);
     const double period_s = 1.0 / options.loop.rate_hz;
     TestRig rig;

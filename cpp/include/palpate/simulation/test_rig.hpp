@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <tuple>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
@@ -30,6 +31,13 @@ struct TestRig {
         return scheme_for(model, scale, device, chosen);
     }
 };
+
+template <>
+inline constexpr auto fields_of<TestRig> = std::tuple{
+    Field<&TestRig::device>{"device"}, Field<&TestRig::hand>{"hand"},
+    Field<&TestRig::scale, &ModelScale::length>{"length",
+                                                "Positions, relative to those of the default knob."},
+    Field<&TestRig::scale, &ModelScale::force>{"force", "Forces, relative to those of the default knob."}};
 
 namespace detail {
 

@@ -75,8 +75,14 @@ template <class T>
 void hash_value(NumberHash& hash, const T& value) {
     if constexpr (HasFields<T>) {
         for_each_field<T>([&](const auto& field) {
-            if (field.stored) {
-                hash_value(hash, field.of(value));
+            const auto& part = field.of(value);
+            if constexpr (is_optional<std::remove_cvref_t<decltype(part)>>) {
+                if (part) {  // an optional field that is not given leaves older fingerprints as they are
+                    hash.add(std::string_view{field.name});
+                    hash_value(hash, *part);
+                }
+            } else if (field.stored) {
+                hash_value(hash, part);
             }
         });
     } else if constexpr (std::is_enum_v<T>) {
@@ -114,8 +120,8 @@ void hash_value(NumberHash& hash, const T& value) {
                                                              const DeviceProfile& device) {
     std::vector<Inequality> lines = with_kind(
         scheme.structure, [&](auto structure) { return inequalities(structure, bounds, scheme, device); });
-    if (bounds.drag > 0.0 && has_coupling(scheme.structure)) {
-        lines.push_back({"velocity-coupling", "force of velocity behind a coupling", "B_v = 0", 0.0,
+    if (bounds.drag > 0.0 && !traits_of(scheme.structure).velocity) {
+        lines.push_back({"velocity-coupling", "force of velocity, not rendered directly", "B_v = 0", 0.0,
                          bounds.drag, Basis::None, "use direct rendering"});
     }
     return lines;

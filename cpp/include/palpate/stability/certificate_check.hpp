@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -20,12 +21,15 @@ namespace palpate {
     const double larger = std::max(std::abs(stored), std::abs(recomputed));
     return std::isfinite(larger) && std::abs(stored - recomputed) <= 1e-9 * larger;
 }
+[[nodiscard]] inline bool agree(std::optional<double> stored, std::optional<double> recomputed) noexcept {
+    return stored && recomputed ? agree(*stored, *recomputed) : !stored && !recomputed;
+}
 
 namespace detail {
 
-/// Returns the sentence about a stored number that differs from the recomputed one.
-[[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed) {
-    return "certificate." + path + " is " + readable(stored) + ": must be " + readable(recomputed) +
+[[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed,
+                                           const char* bound = "") {
+    return "certificate." + path + " is " + readable(stored) + ": must be " + bound + readable(recomputed) +
            ", which is what model and device give; plan it again";
 }
 
@@ -39,9 +43,8 @@ namespace detail {
         const bool lower = std::string_view{field.name}.ends_with("_min");
         if (wrong.empty() && !(lower ? bound <= true_bound : bound >= true_bound) &&
             !agree(bound, true_bound)) {
-            wrong = std::string("certificate.bounds.") + field.name + " is " + readable(bound) +
-                    ": must be " + (lower ? "at most " : "at least ") + readable(true_bound) +
-                    ", which is what model and device give; plan it again";
+            wrong = disagrees(std::string("bounds.") + field.name, bound, true_bound,
+                              lower ? "at most " : "at least ");
         }
     });
     return wrong;

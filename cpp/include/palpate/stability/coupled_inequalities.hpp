@@ -48,8 +48,7 @@ namespace detail {
 /// Adds the line h >= 0, if the model has hysteresis.
 inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
-        lines.push_back({"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower,
-                         0.0, Basis::Proved, "docs/certificate.md"});
+        lines.push_back(loss_inequality(bounds));
     }
 }
 
@@ -88,11 +87,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 }  // namespace detail
 
-/// Returns the largest coupling stiffness for which `share` of the device's damping is sufficient. The coupling has
-/// damping, and the force of the object falls with a slope of at most `falling`. Returns 0 if no stiffness is
-/// certified.
+/// Share of the device's damping that a coupling uses where nothing else sets its stiffness.
+inline constexpr double usual_coupling_share = 0.95;
+
+/// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
+/// object whose force falls with a slope of at most `falling`; 0 if there is none.
 [[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
-                                              double share) {
+                                              double share = usual_coupling_share) {
     constexpr double finer = 0.97;
     constexpr double softest = 1e-9;
     constexpr int halvings = 40;
@@ -117,11 +118,11 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     return low;
 }
 
-/// Returns the lines of a limited object without mass behind a coupling. Slopes of the limited force are those of the
-/// force or 0. Without coupling damping a static force acts as a static force F(x) of slope K_c f' / (K_c + f').
-[[nodiscard]] inline std::vector<Inequality> massless_inequalities(const ForceBounds& bounds,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+/// An object without mass behind a coupling, its force limited: slopes of the limited force are those of the force or
+/// 0. Without coupling damping a static one is a static force F(x) of slope K_c f' / (K_c + f').
+[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double p = coupling.load_line_slope(device.period_s);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -157,14 +158,13 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     return lines;
 }
 
-/// Returns the lines of an object with mass behind a coupling, by backward Euler. The mass does not reduce the need of
-/// a falling force.
-[[nodiscard]] inline std::vector<Inequality> implicit_inequalities(const ForceBounds& bounds, Inertia inertia,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+/// An object with mass behind a coupling, backward Euler. The mass does not help a force that falls.
+[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
-    const double damped = 2.0 * inertia.damping / T;
-    const double alone = inertia.load_line_slope(T);
+    const double damped = 2.0 * scheme.inertia.damping / T;
+    const double alone = scheme.inertia.load_line_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -183,24 +183,24 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
     lines.push_back(detail::coupling_inequality(coupling, std::max(0.0, bounds.falling() - damped), device));
     lines.push_back(detail::uniqueness(coupled + alone, bounds.falling(), "p > s_"));
     if (!bounds.hysteresis && bounds.slope.lower == bounds.slope.upper) {
-        lines.push_back(detail::friction_inequality(device,
-                                                    implicit_gain(bounds.slope.lower, inertia, coupling, T),
-                                                    bounds.mean_force, "||g||_1 Delta / 2"));
+        lines.push_back(detail::friction_inequality(
+            device, implicit_gain(bounds.slope.lower, scheme.inertia, coupling, T), bounds.mean_force,
+            "||g||_1 Delta / 2"));
     } else {
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     }
     return lines;
 }
 
-/// Returns the lines of an object with mass behind a coupling by the energy-consistent step, which stores exactly the
-/// work done on it. It is passive for any slope, and at any solution of the step.
-[[nodiscard]] inline std::vector<Inequality> energy_consistent_inequalities(const ForceBounds& bounds,
-                                                                            Inertia inertia,
-                                                                            VirtualCoupling coupling,
-                                                                            const DeviceProfile& device) {
+/// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope, and at any
+/// solution of the step.
+[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
+                                                          const ForceBounds& bounds, const Scheme& scheme,
+                                                          const DeviceProfile& device) {
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const bool limited = detail::limit_acts(device);
-    const double alone = inertia.midpoint_slope(T);
+    const double alone = scheme.inertia.midpoint_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
     detail::add_loss(lines, bounds);
@@ -211,22 +211,6 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
                      "docs/certificate.md", true});
     detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     return lines;
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return massless_inequalities(bounds, scheme.coupling, device);
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return implicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
-                                                          const ForceBounds& bounds, const Scheme& scheme,
-                                                          const DeviceProfile& device) {
-    return energy_consistent_inequalities(bounds, scheme.inertia, scheme.coupling, device);
 }
 
 }  // namespace palpate

@@ -30,8 +30,12 @@ namespace detail {
             "Abbott and Okamura 2005; Diolaiti et al. 2006; docs/certificate.md"};
 }
 
-/// Returns the line for damping, which must exceed the effects of hold and delay on a force with these slopes, and B_v
-/// of its dependence on velocity.
+[[nodiscard]] inline Inequality loss_inequality(const ForceBounds& bounds) {
+    return {"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
+            Basis::Proved,      "docs/certificate.md"};
+}
+
+/// Damping that covers hold and delay of a force with these slopes, and B_v of its dependence on velocity.
 [[nodiscard]] inline Inequality hold_inequality(const DeviceProfile& device, SlopeRange slopes, double drag,
                                                 const std::string& formula) {
     const double T = device.longest_period_s();
@@ -79,9 +83,7 @@ namespace detail {
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
                                                                      const DeviceProfile& device,
                                                                      int predict = 0) {
-    const Inequality loss{
-        "loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
-        Basis::Proved,      "docs/certificate.md"};
+    const Inequality loss = detail::loss_inequality(bounds);
     const bool late = device.late_samples() > 0;
     if (predict > 0) {
         const double gain = predicted_encoder_gain(predict);

@@ -82,12 +82,13 @@ namespace palpate {
     return best;
 }
 
-/// Returns the lines of an object with mass behind a coupling, with forces that are one sample old (paper figure 14).
-/// They are not proofs. They state the slopes for which the linearisation is stable at a held device, and the damping
-/// that makes the linearised port passive.
-[[nodiscard]] inline std::vector<Inequality> explicit_inequalities(const ForceBounds& bounds, Inertia inertia,
-                                                                   VirtualCoupling coupling,
-                                                                   const DeviceProfile& device) {
+/// An object with mass behind a coupling, every force one sample old (paper figure 14). No proof covers it: what
+/// is known is where its linearisation is stable at a held device, and what damping makes the linearised port
+/// passive.
+[[nodiscard]] inline std::vector<Inequality> inequalities(ExplicitStructure, const ForceBounds& bounds,
+                                                          const Scheme& scheme, const DeviceProfile& device) {
+    const Inertia inertia = scheme.inertia;
+    const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const double damping = inertia.damping + coupling.damping;
     const char* const poles = "poles of the linearised step; docs/certificate.md";
@@ -106,11 +107,6 @@ namespace palpate {
          "b >= max T Re{(1 - 1/z) H} / (2 - 2 cos theta)", device.viscous_damping,
          device.longest_period_s() / T * explicit_need(slopes, inertia, coupling, T, device.late_samples()),
          Basis::Linear, "Colgate and Schenkel 1997, linearised; docs/certificate.md"}};
-}
-
-[[nodiscard]] inline std::vector<Inequality> inequalities(ExplicitStructure, const ForceBounds& bounds,
-                                                          const Scheme& scheme, const DeviceProfile& device) {
-    return explicit_inequalities(bounds, scheme.inertia, scheme.coupling, device);
 }
 
 }  // namespace palpate

@@ -2,11 +2,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
+#include "palpate/rendering/scale.hpp"
+#include "palpate/rendering/scheme.hpp"
+#include "palpate/stability/certificate.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/held_force.hpp"
@@ -118,6 +125,44 @@ template <class Holds>
         (holds(middle) ? wide : narrow) = middle;
     }
     return wide;
+}
+
+/// Object and coupling of the explicit structure: the stiffest coupling, then the least object damping, for which its
+/// linearisation is stable; the last ones tried if none is. `chosen` sets mass, damping, coupling and play radius.
+[[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
+                                            const SchemeChoices& chosen) {
+    constexpr std::array shares{0.9, 0.75, 0.6, 0.45, 0.3, 0.15};  // of the stiffest coupling
+    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};              // B_o T / m; the paper's choice is 0.5
+    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};             // slope limit over the slope that it meets
+    const double T = device.period_s;
+    const double stiffest = stiffest_coupling(0.0, 0.0, device);
+    Scheme scheme;
+    scheme.structure = StructureKind::Explicit;
+    scheme.play_radius = chosen.play_radius.value_or(0.0);
+    scheme.coupling.damping = chosen.coupling_damping.value_or(0.1 * device.viscous_damping);
+    for (const double share : shares) {
+        const double stiffness = chosen.coupling_stiffness.value_or(std::max(share * stiffest, 1e-9));
+        scheme.coupling.stiffness = stiffness;
+        std::set<std::pair<double, double>> objects;  // damping and mass
+        for (const double ratio : ratios) {
+            for (const double reserve : reserves) {
+                const double limit = reserve * (std::max(0.0, bounds.slope.upper) + stiffness) - stiffness;
+                const Inertia object = explicit_object(limit, scheme.coupling, ratio, T);
+                const double mass = chosen.mass.value_or(0.0) > 0.0 ? *chosen.mass : object.mass;
+                objects.emplace(chosen.damping.value_or(ratio * mass / T), mass);
+            }
+        }
+        for (const auto& [damping, mass] : objects) {
+            scheme.inertia = {mass, damping};
+            if (finite(bounds) && all_hold(inequalities_of(bounds, scheme, device))) {
+                return scheme;
+            }
+        }
+        if (chosen.coupling_stiffness) {
+            break;
+        }
+    }
+    return scheme;
 }
 
 }  // namespace palpate

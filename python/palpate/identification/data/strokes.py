@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ... import _core
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.strokes import ordered_strokes, turns_of
+from ...recording.motion import ordered_strokes, turns_of
 from ...verdict import Finding, usable
 
 CELLS = 32

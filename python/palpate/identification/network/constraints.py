@@ -4,7 +4,7 @@
 Each is a bound on a *reading* of the network, a combination of its channels or the slope of one, at every
 position of the domain. The least squares is solved with the bound imposed where it was found violated.
 Everywhere else it is certified: on a cell [a, b] a twice differentiable reading r stays above
-min(r(a), r(b)) - max|r''| (b - a)^2 / 8, where max|r''| over the cell comes from the tails of the wavelets.
+min(r(a), r(b)) - max|r''| (b - a)^2 / 8, where max|r''| over the cell comes from `derivative_bounds`.
 Cells are halved until they are certified or shown violated; violated ones give new positions to impose,
 until none is left.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import isotonic_regression, nnls
 
-from ..._core.model import wavelet_columns, wavelet_curvature_bound, wavelet_jerk_bound, wavelet_slope_columns
+from ..._core.model import derivative_bounds, wavelet_columns, wavelet_slope_columns
 from ..._typing import Float1D, Float2D
 from ..data.compression import Compressed
 from .basis import Basis
@@ -179,7 +179,16 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
     violated: list[NDArray[np.float64]] = []
     for halving in range(HALVINGS + 1):
         lowest = np.minimum(at_left, at_right)
-        bend = _curvature_bound(solution.basis, weights[2:], bound.of_slope, left, right)
+        bend = derivative_bounds(
+            alpha=solution.basis.alpha,
+            beta=solution.basis.beta,
+            weight=weights[2:],
+            linear=weights[1],
+            bias=weights[0],
+            lower=left,
+            upper=right,
+            order=3 if bound.of_slope else 2,
+        )
         undecided = (lowest >= 0.0) & (lowest < bend * (right - left) ** 2 / 8.0)
         shown = undecided | (lowest < 0.0) if halving == HALVINGS else lowest < 0.0
         violated.append(np.stack([left[shown], right[shown]]))
@@ -215,25 +224,6 @@ def _columns(basis: Basis, of_slope: bool, x: Float1D) -> Float2D:
     if of_slope:
         return np.concatenate([zero, one, wavelet_slope_columns(x, basis.alpha, basis.beta)], axis=1)
     return np.concatenate([one, x[:, None], wavelet_columns(x, basis.alpha, basis.beta)], axis=1)
-
-
-def _curvature_bound(
-    basis: Basis, weights: Float1D, of_slope: bool, left: Float1D, right: Float1D
-) -> Float1D:
-    """Upper bound (cells,) of the reading's second derivative, from each wavelet's distance to the cell.
-
-    |psi''| <= (u^4 + 6 u^2 + 3) e^(-u^2/2) and |psi'''| <= (|u|^5 + 10 |u|^3 + 15 |u|) e^(-u^2/2). Both tails
-    fall from |u| = 2.5 on, so beyond it the nearest point of the cell decides; nearer, the global bounds do.
-    """
-    alpha, beta = basis.alpha[:, 0], basis.beta[:, 0]
-    gap = np.abs(0.5 * (left + right)[:, None] - beta) - 0.5 * (right - left)[:, None]
-    u = alpha * np.maximum(gap, 0.0)
-    square = u * u
-    polynomial = u * (square * (square + 10.0) + 15.0) if of_slope else square * (square + 6.0) + 3.0
-    highest = wavelet_jerk_bound if of_slope else wavelet_curvature_bound
-    tail = np.minimum(polynomial * np.exp(-0.5 * square), highest)
-    height = np.where(u < 2.5, highest, tail)
-    return np.asarray(height @ np.abs(weights * alpha ** (3 if of_slope else 2)))
 
 
 def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, limits: Float1D) -> Float2D:

@@ -9,32 +9,18 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
+
+#include "palpate/device/wire.hpp"
 
 namespace palpate::detail {
 
 /// Returns the meaning of an error of libusb, and the cure.
 [[nodiscard]] inline std::string usb_reason(int code) {
-    switch (code) {
-        case LIBUSB_ERROR_ACCESS:
-            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
-                   "again";
-        case LIBUSB_ERROR_BUSY:
-            return "another program uses it; end that program, then try again";
-        case LIBUSB_ERROR_NO_DEVICE:
-        case LIBUSB_ERROR_NOT_FOUND:
-            return "it was unplugged meanwhile; plug it in and try again";
-        case LIBUSB_ERROR_TIMEOUT:
-            return "it does not answer; unplug it and plug it in again";
-        case LIBUSB_ERROR_PIPE:
-            return "it refused a request; its firmware may be of another version";
-        case LIBUSB_ERROR_NO_MEM:
-            return "the system has no memory left for USB; see "
-                   "/sys/module/usbcore/parameters/usbfs_memory_mb";
-        case LIBUSB_ERROR_IO:
-            return "the transfer failed on the bus; try another cable or port";
-        default:
-            return std::string(libusb_error_name(code)) + ", " + libusb_strerror(code);
-    }
+    static_assert(LIBUSB_ERROR_IO == -1 && LIBUSB_ERROR_ACCESS == -3 && LIBUSB_ERROR_NO_MEM == -11);
+    const std::string_view cause = wire::usb_cause(code);
+    return cause.empty() ? std::string(libusb_error_name(code)) + ", " + libusb_strerror(code)
+                         : std::string(cause);
 }
 
 /// Returns an integer of two bytes, little endian.

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Root locus of the explicit structure over its object damping."""
+"""Figures of a rendering: beside its recording, force errors of the structures, root locus of one."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +12,106 @@ from numpy.typing import NDArray
 
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme, compensated_share, default_play_radius
-from .._core.stability import force_bounds
+from .._core.stability import explicit_scheme, force_bounds
 from .._typing import Float1D
 from ..planning import Plan
-from ..planning.choices import explicit_scheme
+from .look import grid, plain_decades, scale_for, thinned
 
 _LINES = ("-", "--", ":", "-.")
 
 _SAMPLES = 801
 """Dampings of a locus [-]"""
+
+
+def draw_real_against_rendered(
+    axes: Axes,
+    real: tuple[Float1D, Float1D],
+    rendered: tuple[Float1D, Float1D],
+    units: Mapping[str, str],
+    *,
+    title: str = "",
+    real_name: str = "recorded",
+) -> None:
+    """Recorded force over position, dotted, and rendered force over position, solid (paper figure 15).
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where to draw.
+    real : (position (n,), force (n,))
+        What was recorded.
+    rendered : (position (n,), force (n,))
+        What the closed loop made of the recorded motion (the rendered force over the recorded position) or
+        of the recorded force (the recorded force over the resulting position).
+    units : mapping
+        {"position": "rad", "force": "N*m"}.
+    title : str
+        Which way the loop was closed.
+    real_name : str
+        What the recorded curve is called.
+    """
+    x = scale_for(units["position"], real[0], rendered[0])
+    y = scale_for(units["force"], real[1], rendered[1])
+    # The dots are wider than the line in front of them: both are seen where the two agree.
+    axes.plot(
+        *thinned(real[0] * x.factor, real[1] * y.factor),
+        color="0.6",
+        linestyle="none",
+        marker=".",
+        markersize=4.0,
+        markeredgewidth=0,
+        label=real_name,
+    )
+    shown = thinned(rendered[0] * x.factor, rendered[1] * y.factor)
+    axes.plot(*shown, color="black", linewidth=0.7, label="rendered")
+    axes.set_xlabel(x.label("position"))
+    axes.set_ylabel(y.label("force"))
+    if title:
+        axes.set_title(title)
+
+
+def draw_structures(
+    axes: Axes, names: Sequence[str], mean: Sequence[float], end: Sequence[float], force_unit: str
+) -> None:
+    """RMS force error of each structure, of the mean of a tick and at its end, on a log axis.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Where to draw.
+    names : sequence of str
+        The structures, best first; drawn from top to bottom.
+    mean, end : sequence of float
+        Their force errors [N*m or N].
+    force_unit : str
+        The unit of both.
+    """
+    x = scale_for(force_unit, mean, end)
+    place = np.arange(len(names), dtype=np.float64)
+    axes.plot(
+        np.multiply(mean, x.factor),
+        place - 0.12,
+        linestyle="none",
+        marker="o",
+        color="black",
+        label="mean of a tick",
+    )
+    axes.plot(
+        np.multiply(end, x.factor),
+        place + 0.12,
+        linestyle="none",
+        marker="o",
+        color="black",
+        markerfacecolor="white",
+        label="end of tick",
+    )
+    axes.set_xscale("log")
+    plain_decades(axes.xaxis)
+    axes.set_yticks(place, [name.replace(", ", ",\n", 1) for name in names])
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    grid(axes, "x")
+    axes.set_xlabel(x.label("force error, RMS"))
+    axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rival methods: curves over position, models of mechanics, and one copy of a method for each stroke."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import product
+from typing import Protocol, TypeVar
+
+import numpy as np
+from scipy.interpolate import UnivariateSpline, make_lsq_spline
+from scipy.optimize import least_squares
+
+from .._typing import Float1D, Float2D
+
+HELD_OUT = 5
+"""Of the rows to fit, every fifth chooses a setting that is not given."""
+
+SIZES = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
+
+SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
+
+MOST_FITTED_ROWS = 20_000
+"""Rows that are fitted; of more, evenly spread ones."""
+
+EXPONENTS = (0.5, 6.0)
+"""Range of the exponent."""
+
+THRESHOLDS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
+
+PLACES = 256
+"""Places at which a zone may be divided: quantiles of its positions."""
+
+LEAST_ZONE_ROWS = 8
+"""Rows in a zone for each of its parameters."""
+
+RIDGE = 1e-10
+
+C = TypeVar("C")
+
+
+class Estimator(Protocol):
+    """fit and predict as in scikit-learn."""
+
+    n_parameters_: int
+    """Every fitted real number, known after fit"""
+
+    def fit(self, X: Float2D, y: Float1D) -> Estimator:
+        """Learn from X (n, d) and y (n,)."""
+
+    def predict(self, X: Float2D) -> Float1D:
+        """(n,) at the rows of X (n, d)."""
+
+
+def best_of(
+    candidates: Iterable[C], fitted: Callable[[C, Float2D, Float1D], Estimator], X: Float2D, y: Float1D
+) -> C:
+    """The simplest candidate that is within one standard error of the best on every fifth row, held out.
+
+    Candidates stand in order, the simplest first; one that cannot be fitted is out. This is what a competent
+    user does before comparing: no method is shown with a setting that suits it badly.
+    """
+    kept = np.arange(len(y)) % HELD_OUT != HELD_OUT - 1
+    if kept.all():
+        return next(iter(candidates))
+    tried: list[tuple[float, float, C]] = []
+    for candidate in candidates:
+        try:
+            trial = fitted(candidate, X[kept], y[kept])
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        square = (trial.predict(X[~kept]) - y[~kept]) ** 2
+        if np.isfinite(square).all():
+            tried.append((float(square.mean()), float(square.std() / np.sqrt(len(square))), candidate))
+    if not tried:
+        raise ValueError("no setting of this method can be fitted to these rows")
+    least, uncertain, _ = min(tried, key=lambda one: one[0])
+    return next(candidate for error, _, candidate in tried if error <= least + uncertain)
+
+
+def merged(x: Float1D, y: Float1D) -> tuple[Float1D, Float1D, Float1D]:
+    """Distinct positions in rising order, the mean of y at each, and how many rows it stands for."""
+    distinct, place, count = np.unique(x, return_inverse=True, return_counts=True)
+    return distinct, np.bincount(place, y) / count, count.astype(np.float64)
+
+
+@dataclass
+class PerStroke:
+    """One copy of an estimator for each stroke.
+
+    The last column of X is the stroke: above 0 press, below 0 release.
+
+    Parameters
+    ----------
+    estimator
+        What is fitted to each stroke; it is copied.
+    passive : bool
+        Where release would lie above press, by which a loop gains energy, both are their mean.
+    """
+
+    estimator: Estimator
+    passive: bool = False
+
+    def fit(self, X: Float2D, y: Float1D) -> PerStroke:
+        """Fit one copy to the press rows of X (n, d) and one to the release rows."""
+        press = X[:, -1] > 0
+        self.press_ = deepcopy(self.estimator).fit(X[press, :-1], y[press])
+        self.release_ = deepcopy(self.estimator).fit(X[~press, :-1], y[~press])
+        self.n_parameters_ = self.press_.n_parameters_ + self.release_.n_parameters_
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        press = X[:, -1] > 0
+        if self.passive:
+            above, below = (each.predict(X[:, :-1]) for each in (self.press_, self.release_))
+            half = 0.5 * np.maximum(above - below, 0.0)
+            return np.asarray(0.5 * (above + below) + np.where(press, half, -half))
+        force = np.empty(len(X))
+        force[press] = self.press_.predict(X[press, :-1])
+        force[~press] = self.release_.predict(X[~press, :-1])
+        return force
+
+
+@dataclass
+class LookupTable:
+    """Forces at evenly spaced positions, straight lines between them; least squares for the forces.
+
+    f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) / (x_(i+1) - x_i). Outside its ends the table holds them.
+
+    Parameters
+    ----------
+    size : int, optional
+        Entries; without it the number that predicts held-out rows best.
+    """
+
+    size: int | None = None
+
+    def fit(self, X: Float2D, y: Float1D) -> LookupTable:
+        """Fit to the first column of X (n, d), the position, and y (n,)."""
+        size = self.size or best_of(SIZES, lambda entries, A, b: LookupTable(entries).fit(A, b), X, y)
+        x, mean, count = merged(X[:, 0], y)
+        # entries that no row lies between would be free: leave out those
+        entries = np.linspace(x[0], x[-1], size)
+        cell = np.clip(np.searchsorted(entries, x, side="right") - 1, 0, size - 2)
+        held = np.isin(np.arange(size - 1), cell)
+        entries = entries[np.concatenate([[True], held[:-1] | held[1:], [True]])]
+        while True:
+            try:
+                knots = np.concatenate([[x[0]], entries, [x[-1]]])
+                spline = make_lsq_spline(x, mean, knots, k=1, w=np.sqrt(count))
+                break
+            except (ValueError, np.linalg.LinAlgError):
+                if len(entries) == 2:
+                    raise
+                entries = entries[np.unique(np.r_[0 : len(entries) : 2, len(entries) - 1])]
+        self.positions_, self.forces_ = entries, np.asarray(spline.c)
+        self.n_parameters_ = len(entries)
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        return np.asarray(np.interp(X[:, 0], self.positions_, self.forces_))
+
+
+@dataclass
+class SmoothingSpline:
+    """The cubic spline with the fewest knots whose squared error stays below a multiple of the noise.
+
+    FITPACK's algorithm (Dierckx 1975): knots are added where the error is largest until
+    sum_k (y_k - f(x_k))^2 <= smoothing * n * sigma^2. The noise sigma^2 is how each row differs from the mean
+    of its neighbours along x, taken by the median, so that jumps do not count. Outside its ends the spline
+    holds its last value.
+
+    Parameters
+    ----------
+    smoothing : float, optional
+        Multiple of the noise that the spline may leave; without it the one that predicts held-out rows best.
+    """
+
+    smoothing: float | None = None
+
+    def fit(self, X: Float2D, y: Float1D) -> SmoothingSpline:
+        """Fit to the first column of X (n, d), the position, and y (n,)."""
+        multiple = self.smoothing or best_of(
+            SMOOTHINGS, lambda smoothing, A, b: SmoothingSpline(smoothing).fit(A, b), X, y
+        )
+        x, mean, count = merged(X[:, 0], y)
+        if len(x) < 5:
+            raise ValueError(f"a cubic spline needs 5 positions; there are {len(x)}")
+        # of what the spline may leave, the scatter of rows that share a position is not its to remove
+        scatter = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
+        allowed = max(multiple * len(y) * _noise(X[:, 0], y) - scatter, 0.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # FITPACK warns where it stops at the most knots it may have
+            self.spline_ = UnivariateSpline(x, mean, w=np.sqrt(count), s=allowed, k=3, ext=3)
+        interior = len(self.spline_.get_knots()) - 2
+        self.n_parameters_ = len(self.spline_.get_coeffs()) + interior
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        return np.asarray(self.spline_(X[:, 0]))
+
+
+def _noise(x: Float1D, y: Float1D) -> float:
+    """Variance of the noise of y from neighbours along x."""
+    along = y[np.argsort(x, kind="stable")]
+    apart = (along[1:-1] - 0.5 * (along[:-2] + along[2:])) ** 2 / 1.5
+    # 0.455 is the median of a squared standard normal; forces of coarse resolution have a median of 0
+    return max(float(np.median(apart)) / 0.455, 0.01 * float(np.mean(apart)), np.finfo(float).tiny)
+
+
+@dataclass
+class HuntCrossley:
+    """F = k d^p (1 + lambda v) + F_0 with the depth d = max(x - x_0, 0) (Hunt and Crossley 1975).
+
+    k, k lambda and F_0 are linear once x_0 and p are given, so only those two are searched for, from several
+    starts. Velocity takes part where X holds it.
+    """
+
+    def fit(self, X: Float2D, y: Float1D) -> HuntCrossley:
+        """Fit to X (n, 1 to 3), position and velocity, and y (n,)."""
+        X = X[:, :2]
+        step = -(-len(y) // MOST_FITTED_ROWS)
+        rows, force = X[::step], y[::step]
+        low, high = float(rows[:, 0].min()), float(rows[:, 0].max())
+        self.reach_ = max(high - low, np.finfo(float).tiny)
+
+        def residual(unknown: Float1D) -> Float1D:
+            return np.asarray(self._linear(rows, force, unknown)[1])
+
+        outcomes = [
+            least_squares(
+                residual,
+                (low + share * self.reach_, exponent),
+                bounds=((low - self.reach_, EXPONENTS[0]), (high - 1e-3 * self.reach_, EXPONENTS[1])),
+                x_scale=(self.reach_, 1.0),
+                max_nfev=60,
+            )
+            for share, exponent in product((0.0, 0.3, 0.6), (1.0, 2.0))
+        ]
+        best = min(outcomes, key=lambda outcome: float(outcome.cost))
+        self.contact_, self.exponent_ = float(best.x[0]), float(best.x[1])
+        self.parameters_ = self._linear(rows, force, best.x)[0]
+        self.n_parameters_ = 2 + len(self.parameters_)
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        unknown = np.array([self.contact_, self.exponent_])
+        return np.asarray(self._columns(X[:, :2], unknown) @ self.parameters_)
+
+    def _linear(self, X: Float2D, y: Float1D, unknown: Float1D) -> tuple[Float1D, Float1D]:
+        """F_0, k and k lambda for given contact and exponent, and the residuals they leave."""
+        columns = self._columns(X, unknown)
+        norm = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+        found = np.linalg.lstsq(columns / norm, y, rcond=None)[0] / norm
+        return found, columns @ found - y
+
+    def _columns(self, X: Float2D, unknown: Float1D) -> Float2D:
+        contact, exponent = unknown
+        spring = (np.maximum(X[:, :1] - contact, 0.0) / self.reach_) ** exponent
+        return np.concatenate([np.ones((len(X), 1)), spring, spring * X[:, 1:]], axis=1)
+
+
+@dataclass
+class TissueParameters:
+    """F = m a + B v + k_1 x + k_2 x^2 + ... + k_p x^p + F_0, all parameters from one linear least squares.
+
+    After Scilingo, De Rossi, Bicchi and Iacconi (1997), who identified tissue grasped by instrumented forceps
+    in this way. Velocity and acceleration take part where X holds them.
+
+    Parameters
+    ----------
+    order : int
+        p, the highest power of the position.
+    """
+
+    order: int = 3
+
+    def fit(self, X: Float2D, y: Float1D) -> TissueParameters:
+        """Fit to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        self.scale_ = np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
+        self.parameters_ = np.linalg.lstsq(self._columns(X), y, rcond=None)[0]
+        self.n_parameters_ = len(self.parameters_)
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        return np.asarray(self._columns(X) @ self.parameters_)
+
+    def _columns(self, X: Float2D) -> Float2D:
+        X = X / self.scale_
+        powers = X[:, :1] ** np.arange(self.order + 1)
+        return np.concatenate([powers, X[:, 1:]], axis=1)
+
+
+@dataclass
+class LinearZones:
+    """The travel divided into zones, F = m a + B v + k (x - x_0) in each, by least squares.
+
+    After MacLean (1996): the number of zones is set by a threshold on what a linear zone may leave. A zone
+    whose RMS error is larger is divided where that helps most. Forces jump between zones.
+
+    Parameters
+    ----------
+    threshold : float, optional
+        RMS error that a zone may leave, as a share of the force's range; without it the one that predicts
+        held-out rows best.
+    """
+
+    threshold: float | None = None
+
+    def fit(self, X: Float2D, y: Float1D) -> LinearZones:
+        """Fit to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        threshold = self.threshold or best_of(
+            THRESHOLDS, lambda share, A, b: LinearZones(share).fit(A, b), X, y
+        )
+        order = np.argsort(X[:, 0], kind="stable")
+        X, y = X[order], y[order]
+        self.centre_, self.scale_ = X.mean(axis=0), np.maximum(X.std(axis=0), np.finfo(float).tiny)
+        design = np.concatenate([np.ones((len(y), 1)), (X - self.centre_) / self.scale_], axis=1)
+        allowed = threshold * float(np.ptp(y))
+        zones, waiting = [], [(0, len(y))]
+        while waiting:
+            start, stop = waiting.pop()
+            cut = _best_cut(X[start:stop, 0], design[start:stop], y[start:stop], allowed)
+            if cut is None:
+                zones.append((start, stop))
+            else:
+                waiting += [(start + cut, stop), (start, start + cut)]
+        self.edges_ = np.array([0.5 * (X[start - 1, 0] + X[start, 0]) for start, _ in zones[1:]])
+        self.parameters_ = np.array([_solved(design[a:b], y[a:b]) for a, b in zones])
+        self.n_parameters_ = self.parameters_.size + len(self.edges_)
+        return self
+
+    def predict(self, X: Float2D) -> Float1D:
+        """Force (n,) at the rows of X."""
+        design = np.concatenate([np.ones((len(X), 1)), (X - self.centre_) / self.scale_], axis=1)
+        zone = np.searchsorted(self.edges_, X[:, 0], side="right")
+        return np.asarray(np.einsum("nk,nk->n", design, self.parameters_[zone]))
+
+
+def _solved(design: Float2D, y: Float1D) -> Float1D:
+    return np.asarray(np.linalg.lstsq(design, y, rcond=1e-9)[0])
+
+
+def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | None:
+    """The row before which to divide a zone, or None where it is good enough or cannot be divided."""
+    least = LEAST_ZONE_ROWS * design.shape[1]
+    rest = y - design @ _solved(design, y)
+    if len(y) < 2 * least or float(np.sqrt(np.mean(rest**2))) <= allowed:
+        return None
+    cuts = np.unique(np.linspace(least, len(y) - least, PLACES).astype(np.int64))
+    # rows of one position stay together
+    cuts = np.unique(np.searchsorted(x, x[cuts], side="left"))
+    cuts = cuts[(cuts >= least) & (cuts <= len(y) - least)]
+    if len(cuts) == 0:
+        return None
+    parts = np.split(np.arange(len(y)), cuts)
+    grams = np.array([design[part].T @ design[part] for part in parts])
+    products = np.array([design[part].T @ y[part] for part in parts])
+    left, from_left = grams.cumsum(axis=0), products.cumsum(axis=0)
+    gained = _explained(left[:-1], from_left[:-1])
+    gained += _explained(left[-1] - left[:-1], from_left[-1] - from_left[:-1])
+    return int(cuts[int(np.argmax(gained))])
+
+
+def _explained(gram: Float2D, product: Float2D) -> Float1D:
+    """Sum of squares that least squares explains, for each of several (k, k) systems."""
+    ridge = RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[1])
+    return np.asarray(
+        np.einsum("nk,nk->n", product, np.linalg.solve(gram + ridge, product[:, :, None])[:, :, 0])
+    )

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Labels, prefixes of units, and the number of points that a figure draws."""
+
+import numpy as np
+import pytest
+
+from palpate.plotting.look import MOST_POINTS, label, scale_for, strokes, thinned
+
+
+@pytest.mark.parametrize("n", [1, 10, MOST_POINTS, MOST_POINTS + 1, 10 * MOST_POINTS + 7])
+def test_no_more_is_drawn_than_a_column_can_show(n: int) -> None:
+    x, y = thinned(np.arange(n, dtype=float), np.arange(n, dtype=float))
+    assert min(n, MOST_POINTS // 2) <= len(x) <= MOST_POINTS
+    np.testing.assert_array_equal(x, y)
+
+
+def test_pauses_belong_to_no_stroke() -> None:
+    direction = np.array([1, 0, -1, 0], dtype=np.int8)
+    told_apart = dict(strokes(direction, 4))
+    np.testing.assert_array_equal(told_apart["press"], [True, False, False, False])
+    np.testing.assert_array_equal(told_apart["release"], [False, False, True, False])
+    assert [name for name, _ in strokes(np.array([1, 0], dtype=np.int8), 2)] == [""]
+
+
+def test_a_unit_that_is_not_known_is_not_invented() -> None:
+    assert label("force", "") == "force"
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "shown", "factor"),
+    [
+        ("m", 0.0041, "mm", 1e3),
+        ("m", 0.1, "m", 1.0),
+        ("m", 0.0999, "mm", 1e3),
+        ("m", 5e-5, "\u00b5m", 1e6),
+        ("N", 0.5, "N", 1.0),
+        ("N", 0.02, "mN", 1e3),
+        ("N", 1000.0, "kN", 1e-3),
+        ("N*m", 0.005, "mN*m", 1e3),
+        ("rad", 0.47, "rad", 1.0),
+        ("rad", 0.05, "mrad", 1e3),
+        ("rad", 5000.0, "rad", 1.0),
+        ("count", 5000.0, "count", 1.0),
+        ("", 1e-5, "", 1.0),
+        ("N", 0.0, "N", 1.0),
+    ],
+)
+def test_the_prefix_of_a_unit_follows_the_largest_value(
+    unit: str, largest: float, shown: str, factor: float
+) -> None:
+    for values in ([largest, 0.0], [-largest, np.nan]):
+        scale = scale_for(unit, values)
+        assert scale.unit == shown
+        assert scale.factor == pytest.approx(factor)

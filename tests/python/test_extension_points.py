@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lists that a new field, structure or verb must not have to enter: each is made from one table."""
+
+from __future__ import annotations
+
+import ast
+import json
+from importlib import import_module
+from pathlib import Path
+
+import click
+import pytest
+
+from conftest import ROOT
+from palpate import DeviceProfile, Scheme
+from palpate._core.rendering import structure_names
+from palpate.cli.main import palpate
+from palpate.planning.candidates import CANDIDATES
+
+PACKAGE = ROOT / "python" / "palpate"
+SCHEMA = json.loads((PACKAGE / "model" / "model.schema.json").read_text(encoding="utf-8"))["$defs"]
+FIELDS: list[str] = list(DeviceProfile().__reduce__()[0].keywords)  # type: ignore[attr-defined]
+
+
+def options_of(verb: str) -> dict[str, click.Parameter]:
+    command = palpate.get_command(click.Context(palpate), verb)
+    assert command is not None
+    return {str(option.name): option for option in command.params}
+
+
+@pytest.mark.parametrize("verb", ["simulate", "render"])
+def test_a_verb_takes_the_structures_of_the_core(verb: str) -> None:
+    kind = options_of(verb)["structure"].type
+    assert isinstance(kind, click.Choice)
+    assert tuple(kind.choices) == structure_names
+
+
+def test_the_schema_names_the_structures_of_the_core() -> None:
+    assert tuple(SCHEMA["Structure"]["enum"]) == structure_names
+
+
+def test_every_structure_is_a_candidate_of_the_plan_and_described_in_its_help() -> None:
+    assert {name.partition(",")[0] for name in CANDIDATES} == set(structure_names)
+    command = palpate.get_command(click.Context(palpate), "plan")
+    assert command is not None
+    for name, candidate in CANDIDATES.items():
+        assert f"{name}: {candidate.use}\n" in (command.help or "")
+
+
+def test_a_structure_that_is_none_is_refused_with_the_names_of_all() -> None:
+    with pytest.raises(ValueError, match="structure is 'soft'") as refused:
+        Scheme(structure="soft")
+    assert all(name in str(refused.value) for name in structure_names)
+
+
+def words_in(node: ast.AST) -> set[str]:
+    """The words of a collection that is written out."""
+    parts = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
+    return {part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str)}
+
+
+@pytest.mark.parametrize(
+    ("names", "most"),
+    [(structure_names, 3), (FIELDS, len(FIELDS) - 1)],
+    ids=["structures", "fields of a profile"],
+)
+def test_no_other_file_lists_them(names: list[str], most: int) -> None:
+    listed = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, (ast.Dict, ast.List, ast.Set, ast.Tuple))
+        and len(set(names) & words_in(node)) > most
+    }
+    assert listed <= {"planning/candidates.py"}
+
+
+def test_every_field_of_a_profile_stands_in_schema_and_stub_with_its_unit() -> None:
+    stub = (PACKAGE / "_core" / "device.pyi").read_text(encoding="utf-8")
+    assert list(SCHEMA["Device"]["properties"]) == FIELDS
+    for name in FIELDS:
+        assert f"    def {name}(self)" in stub
+        if SCHEMA["Device"]["properties"][name]["type"] == "number":
+            unit = getattr(DeviceProfile, name).__doc__
+            assert "[" in unit, f"{name} has no unit: {unit}"
+
+
+def test_a_profile_file_must_have_the_fields_that_the_schema_requires(tmp_path: Path) -> None:
+    assert set(SCHEMA["Device"]["required"]) == set(DeviceProfile().to_dict())
+    given = {name: part["type"] for name, part in SCHEMA["Device"]["properties"].items()}
+    one = {name: 1e-3 for name, kind in given.items() if kind == "number"}
+    profile = DeviceProfile(**one)
+    assert list(profile.to_dict()) == FIELDS
+    again = DeviceProfile.load(profile.save(tmp_path / "device.toml"))
+    assert again == profile
+    for name, value in one.items():
+        assert getattr(again, name) == value
+
+
+def test_every_verb_is_one_file() -> None:
+    for verb in palpate.list_commands(click.Context(palpate)):
+        name = verb.replace("-", "_")
+        assert isinstance(getattr(import_module(f"palpate.cli.{name}"), name), click.Command)
