@@ -155,14 +155,14 @@ class UsbDevice {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
-    /// What the device says of itself as a profile. It does not say what its mechanics are.
+    /// Returns the properties that the device reports as a profile. It does not report its mechanics.
     [[nodiscard]] DeviceProfile profile() const {
         DeviceProfile profile = unmeasured({});
         profile.id = name().serial.empty() ? name().product : name().serial;
         profile.period_s = 1.0 / info().rate_hz;
         profile.encoder_step = wire::position_of(1, info().counts_per_rev);
         profile.force_step = 1e-6;
-        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 rounds twice
+        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 would round twice
         return profile;
     }
 

@@ -36,7 +36,7 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 /// bRequest of a control transfer.
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
-/// Cause and cure for an error code of libusb; empty for a code that states no cause.
+/// Returns cause and cure for an error code of libusb; empty for a code without a known cause.
 [[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
     switch (code) {
         case -1:  // LIBUSB_ERROR_IO
