@@ -75,6 +75,12 @@ def test_no_other_file_lists_them(names: list[str], most: int) -> None:
     assert listed <= {"planning/candidates.py"}
 
 
+def test_no_line_of_the_pages_lists_all_structures() -> None:
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    lines = [line for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    assert [line for line in lines if all(name in line for name in structure_names)] == []
+
+
 def test_every_field_of_a_profile_stands_in_schema_and_stub_with_its_unit() -> None:
     stub = (PACKAGE / "_core" / "device.pyi").read_text(encoding="utf-8")
     assert list(SCHEMA["Device"]["properties"]) == FIELDS
