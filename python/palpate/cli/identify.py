@@ -19,7 +19,7 @@ from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
 from ..identification.identify_files import identify_files
 from ..identification.options import CHOICES, RESERVED_INPUTS, IdentifyOptions, SearchOptions, default_of
-from ..identification.search.criteria import reporting_to
+from ..identification.search.evidence import reporting_to
 from ..recording import Recording
 from ..verdict import Verdict
 from ..verification import Verification, verify

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Identification of a wavelet network from recorded force over position (paper section 3)."""
 
-from .environment import fit_environment
-from .identify import identify
+from .identify import fit_environment, identify
 from .network.basis import frame_bounds
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, SearchOptions

@@ -1,26 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""identify: from recordings to a model."""
+"""identify: from recordings to a model; fit_environment: from arrays to an identified force law."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from .._typing import Float1D, Float2D
 from ..errors import InputError
-from ..model import Fit, Model, PathStep
+from ..model import Model
 from ..recording import Source
 from ..recording.reading import Given, recordings_from
 from ..verdict import Verdict
-from .classes.findings import verdict_of
-from .classes.selection import VELOCITY_INPUTS
+from .classes.climb import VELOCITY_INPUTS
+from .classes.findings import identified, verdict_of
+from .classes.model_selection import select
+from .data.limits import ForceScale
 from .data.outliers import without_isolated
-from .data.rows import observations, require_in_range
-from .environment import fit_environment
+from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .network.fitted import FittedNetwork
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
 
@@ -83,18 +86,13 @@ def identify(
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
-    seen = observations(recordings, settings)
+    rows = rows_of(recordings, settings)
     # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
     with threadpool_limits(limits=1, user_api="blas"):
-        network = fit_environment(
-            seen.X, seen.force, seen.side, settings, starts=seen.starts, names=seen.names, parts=seen.parts
-        )
-    network = replace(
-        network, notes=seen.notes + network.notes, findings=(*isolated, *seen.findings, *network.findings)
-    )
+        network = fit_rows(replace(rows, findings=(*isolated, *rows.findings)), settings)
     source = Source.merged(part.source for part in recordings)
-    every_row = seen.side is not None and len(seen.side) == sum(map(len, recordings))
-    verdict = verdict_of(network, recordings, seen.side if every_row else None)
+    every_row = len(rows.force) == sum(map(len, recordings))
+    verdict = verdict_of(network, recordings, rows.side if every_row else None)
     return model_of(network, recordings[0].units, source, settings, verdict)
 
 
@@ -113,6 +111,84 @@ def _show_options() -> None:
 _show_options()
 
 
+def fit_environment(
+    positions: Float2D,
+    force: Float1D,
+    side: Float1D | None = None,
+    options: IdentifyOptions | None = None,
+    *,
+    starts: Sequence[int] | None = None,
+    names: Sequence[str] | None = None,
+    weight: Float1D | None = None,
+    within: float = 0.0,
+) -> FittedNetwork:
+    """Identify a force law from arrays.
+
+    Parameters
+    ----------
+    positions : (n, d)
+        Positions, growing into the object, and what else the force depends on.
+    force : (n,)
+        Force of the object against the tool.
+    side : (n,), optional
+        +1 in rows of a stroke into the object, -1 out of it, 0 for neither (left out to judge hysteresis).
+    options : IdentifyOptions, optional
+    starts : sequence of int, optional
+        Rows at which a continuous motion starts. With it, and without side, hysteresis is tried with the play
+        operator, s = (x - pi)/r (d = 1).
+    names : sequence of str, optional
+        Of the inputs, for the sentences.
+    weight : (n,), optional
+        Samples that each row stands for, above 0; 1 without it.
+    within : float
+        Sum of squares of the force inside rows that stand for several samples.
+
+    Returns
+    -------
+    FittedNetwork
+
+    Raises
+    ------
+    palpate.InputError
+        For data that cannot be identified, and for a hysteresis input that the data cannot give.
+    """
+    options = options or IdentifyOptions()
+    given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
+    side = None if side is None else np.sign(side).astype(float)
+    rows = Rows(tuple(given), positions, force, side, starts, (), weight, within, options.period)
+    return fit_rows(rows, options)
+
+
+def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
+    """Identify a force law from rows; as :func:`fit_environment`."""
+    require_usable(rows, options)
+    if scale := ForceScale.of(rows.force, options):
+        return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale)
+    return _fitted(rows, options)
+
+
+def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
+    """Without rows of no direction, where hysteresis is accepted, else with them."""
+    side = rows.side
+    if side is not None and not ((side > 0).any() and (side < 0).any()):
+        rows, side = replace(rows, side=None), None
+    if side is None or side.all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
+        return identified(select(rows, options))
+    left_out = f"{np.count_nonzero(side == 0)} rows without a direction were left out to judge hysteresis"
+    found = identified(select(replace(rows, notes=(*rows.notes, left_out)).only(side != 0), options))
+    if found.weight_hysteresis is not None:
+        return found
+    # hysteresis was refused, so there is no reason any more to leave out rows that have no direction
+    every_row = replace(rows, side=None, starts=None, parts=(), notes=(), findings=())
+    again = identified(select(every_row, options))
+    return replace(
+        again,
+        path=found.path + again.path,
+        notes=found.notes + again.notes,
+        findings=found.findings + again.findings,
+    )
+
+
 def model_of(
     network: FittedNetwork,
     units: Mapping[str, str],
@@ -121,15 +197,6 @@ def model_of(
     verdict: Verdict,
 ) -> Model:
     """The model of an identified network, with the verdict on it."""
-    path: list[PathStep] = [
-        {
-            "n_wavelets": at.n_wavelets,
-            "rmse": at.rmse,
-            "criterion": at.criterion,
-            "model_class": at.model_class,
-        }
-        for at in network.path
-    ]
     return Model(
         kind=_kind(network),
         inputs=network.inputs,
@@ -143,14 +210,7 @@ def model_of(
         damping=options.search.assumed_damping
         if options.search.filters == "paper-explicit"
         else network.damping,
-        fit=Fit(
-            model_class=network.model_class,
-            stop_reason=network.stop_reason,
-            nrmse=network.nrmse,
-            n_wavelets=len(network.weight),
-            n_parameters=network.n_parameters,
-            path=path,
-        ),
+        fit=network.fit(),
         data=source,
         notes={"identification": list(network.notes), "verdict": verdict.record()},
     )

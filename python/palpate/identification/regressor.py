@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import math
 from dataclasses import fields, replace
 from typing import Any
 
@@ -17,17 +16,15 @@ from threadpoolctl import threadpool_limits
 from .._typing import Float1D, Float2D
 from ..arguments import shown
 from ..errors import InputError
-from ..model import Fit, Model, PathStep
+from ..model import Model
 from ..recording import Source
-from .classes.climb import BoxRows
-from .classes.findings import RowError
-from .classes.selection import select
-from .data.held_out import held_out_rows
+from .classes.model_selection import select
+from .data.compression import held_out_rows
 from .data.limits import ForceScale, distinct_rows
-from .data.rows import LARGEST
+from .data.rows import LARGEST, Rows
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions
-from .search.criteria import ON_HELD_OUT_ROWS
+from .search.evidence import ON_HELD_OUT_ROWS, RowError
 
 try:
     from sklearn.base import BaseEstimator, RegressorMixin
@@ -217,39 +214,19 @@ def fit_regression(
     lower, upper = X[:, columns].min(axis=0), X[:, columns].max(axis=0)
     if not varies.any():
         lower, upper = lower - 0.5 * _unit(lower), upper + 0.5 * _unit(upper)
-    box = (X[:, columns] - lower) / (upper - lower)
     if options.criterion in ON_HELD_OUT_ROWS and not held_out_rows(len(y), None).any():
         raise InputError(f"criterion {options.criterion!r} holds rows out; {len(y)} are too few for that")
-    rows = BoxRows(
-        names=tuple(f"x{column}" for column in columns),
-        positions=X[:, columns],
-        lower=lower,
-        reach=upper - lower,
-        box=box,
-        path=box[:, 0],
-        force=y,
-        weight=weight,
-        counted=weight,
-    )
+    names = tuple(f"x{column}" for column in columns)
+    rows = Rows(names, X[:, columns], y, weight=weight, corners=(lower, upper))
     with threadpool_limits(limits=1, user_api="blas"):
-        selected = select(rows, options, on_held_out=False)
-        best = selected.best
+        climb = select(rows, options, on_held_out=False)
+        best = climb.best
         some = slice(None, None, max(1, -(-len(y) // MOST_ROWS)))
-        error = RowError(y[some] - best.force_at(box, some), y[some], weight[some])
-    network = FittedNetwork.of(
-        best.solution,
-        best.problem.readout,
-        lower,
-        upper - lower,
-        inputs=rows.names,
-        model_class=best.model_class,
-        stop_reason=best.stop_reason,
-        n_parameters=best.n_parameters,
-        rmse=error.rmse,
-        path=tuple(selected.report.path),
-    )
-    margin = _margin(box) * (upper - lower)
-    return columns, replace(network, lower=lower - margin, upper=upper + margin)
+        error = RowError(y[some] - best.force_at(some), y[some], weight[some])
+    margin = _margin(rows.box) * (upper - lower)
+    path = tuple(climb.report.path)
+    network = replace(best.network, rmse=error.rmse, path=path, lower=lower - margin, upper=upper + margin)
+    return columns, network
 
 
 def _margin(box: Float2D) -> float:
@@ -311,27 +288,12 @@ def _model_of(
             digest.update(np.ascontiguousarray(array).tobytes())
     mean = np.average(y, weights=weight)
     spread = float(np.sqrt(np.average((y - mean) ** 2, weights=weight)))
-    path: list[PathStep] = [
-        {
-            "n_wavelets": at.n_wavelets,
-            "rmse": at.rmse,
-            "criterion": at.criterion if math.isfinite(at.criterion) else None,
-            "model_class": at.model_class,
-        }
-        for at in found.path
-    ]
+    found = replace(found, nrmse=found.rmse / spread if spread > 0 else 0.0)
     return Model(
         kind="general",
         inputs=inputs,
         units={"position": "", "force": ""},
         **found.parameters(),
-        fit=Fit(
-            model_class=found.model_class,
-            stop_reason=found.stop_reason,
-            nrmse=found.rmse / spread if spread > 0 else 0.0,
-            n_wavelets=len(found.alpha),
-            n_parameters=found.n_parameters,
-            path=path,
-        ),
+        fit=found.fit(),
         data=Source(files=(), sha256=digest.hexdigest(), rows=len(y), columns={}),
     )

@@ -19,7 +19,7 @@ from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, identify, load_model
 from palpate.cli.main import main
 from palpate.cli.printing import Progress, visible
-from palpate.identification.search.criteria import reporting_to
+from palpate.identification.search.evidence import reporting_to
 from test_cli_identify import spring
 
 CLI = Path(__file__).parents[3] / "python" / "palpate" / "cli"

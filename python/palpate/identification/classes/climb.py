@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model selection: every model class in turn, from constant to hysteresis, on the rows of one recording.
+"""Model selection: model classes in turn, the simplest first, on the rows of one recording.
 
 A class is judged on the same samples by the same criterion as the one below it, with its constraints imposed.
 It is accepted only if the criterion falls by `evidence` (of :class:`SearchOptions`) or more and if the error
@@ -10,88 +10,49 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..._typing import Float1D, Float2D
 from ...errors import InputError
-from ...verdict import usable
-from ..data.compression import Compressed, Compressor
-from ..data.held_out import EVERY, held_out_rows
-from ..data.limits import NO_LIMITS, RowLimits
-from ..data.outliers import Robust
+from ..data.compression import Compressed
+from ..data.rows import Rows
+from ..data.strokes import HysteresisInput
 from ..network.basis import Basis
 from ..network.constraints import Bound, crossing, domain_bounds, impose, moved_to_bounds
 from ..network.separable import SeparableProblem, Solution
 from ..options import IdentifyOptions
-from ..search.criteria import criterion_of
-from ..search.evidence import Candidate, Judge, Report, Samples
+from ..search.evidence import Candidate, Judge, Report, Samples, criterion_of
 from ..search.growth import Grown, Growth
+from .dynamics import Dynamics
 
 WORTH_REGROWING = 1.01
 """Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
 
+SMALLER_ERRORS = 3.0
+"""Standard errors by which a smaller network must improve on held-out rows: each further try may succeed by
+chance."""
 
-@dataclass(frozen=True)
-class BoxRows:
-    """Rows of a recording, in the unit box of their positions."""
+HELD_OUT = "held-out rows"
+"""Reason for which growth stopped, if held-out rows refused a larger network."""
 
-    names: tuple[str, ...]
-    """(d,) of the inputs"""
-    positions: Float2D
-    """(n, d) in the unit of the recording, modulo the period where there is one"""
-    lower: Float1D
-    reach: Float1D
-    """(d,) corner and sides of the box [position]"""
-    box: Float2D
-    """(n, d) positions in the unit box"""
-    path: Float1D
-    """(n,) first input in the unit box as it was moved through, not taken modulo a period"""
-    force: Float1D
-    side: Float1D | None = None
-    """(n,) +1, -1: the stroke of each row"""
-    starts: Sequence[int] | None = None
-    """Rows at which a motion starts, from which the play operator gives a hysteresis input (d = 1)"""
-    weight: Float1D | None = None
-    """(n,) samples that each row stands for in the fit; None: 1"""
-    counted: Float1D | None = None
-    """(n,) samples that each row stands for in the reported error; None: 1"""
-    within: float = 0.0
-    """Sum of squares inside rows that stand for several samples [force^2]"""
-    robust: Robust | None = None
-    """Outliers, where the loss is Huber's"""
-    limits: RowLimits = NO_LIMITS
-    """What limits the information in the rows"""
+VELOCITY_INPUTS = ("position", "velocity")
+"""Inputs of a force that depends on the motion."""
 
-    @property
-    def reported(self) -> NDArray[np.bool_]:
-        """(n,) rows that count in the error."""
-        rows = np.ones(len(self.force), dtype=bool) if self.counted is None else self.counted > 0.0
-        return rows if self.robust is None else rows & ~self.robust.outliers
-
-    def held_out(self) -> NDArray[np.bool_]:
-        """(n,) rows that are held out to judge on."""
-        held_out = held_out_rows(len(self.force), self.starts)
-        if self.weight is not None:
-            counted = np.flatnonzero(self.weight > 0.0)
-            held_out &= self.weight > 0.0
-            if 2 * EVERY * np.count_nonzero(held_out) < len(counted):
-                # rows that repeat others can stand at every place that is held out
-                held_out[:] = False
-                held_out[counted] = held_out_rows(len(counted), self.starts)
-        return held_out
+NETWORKS = {("position",): "position", VELOCITY_INPUTS: "velocity"}
+"""Inputs of a network and the name of its model class; others: network."""
 
 
 class Climb:
-    """One model selection over one recording: what its model classes share.
+    """One model selection over the rows of one recording: what its model classes share, and the best so far.
 
     Parameters
     ----------
-    rows : BoxRows
+    data : Rows
     options : IdentifyOptions
+    classes : sequence of ModelClass
+        Tried in this order, the simplest first.
     cells : int
         Distinct positions that are kept apart.
     before : Climb, optional
@@ -102,48 +63,78 @@ class Climb:
 
     def __init__(
         self,
-        rows: BoxRows,
+        data: Rows,
         options: IdentifyOptions,
+        classes: Sequence[type[ModelClass]],
         cells: int,
         before: Climb | None = None,
         *,
         on_held_out: bool = True,
     ) -> None:
-        self.data, self.options = rows, options
+        self.data, self.options, self.classes, self.cells = data, options, classes, cells
         self.report: Report = Report(list(before.report.path) if before else [])
         self.begun: dict[str, Basis] = dict(before.begun) if before else {}
         """Wavelets of each model class that growth begins with"""
-        compressor = Compressor(
-            rows.box,
-            rows.force,
-            weight=rows.weight,
-            max_positions=cells,
-            within=rows.within,
-            limits=rows.limits,
-        )
-        self.samples = Samples(rows.box, rows.force, rows.held_out(), compressor, options)
+        self.samples = Samples(data, options, cells)
         self.judge = Judge(self.samples, options, self.report, on_held_out=on_held_out)
-        single = rows.side is None and (rows.starts is None or rows.box.shape[1] > 1)
+        single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
-        self.spread = float(np.std(rows.force)) or 1.0
         self._fixed_force = self._fixed_in_box()
-        given = len(rows.force) if rows.weight is None else int(np.count_nonzero(rows.weight))
-        if (used := compressor.rows_used) < given:
-            self.report.notes.append(f"{used} of {given} rows, evenly spread, stand for all of them")
+        self.spread = float(np.std(data.force)) or 1.0
+        given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))
+        if self.samples.used < given:
+            self.report.notes.append(
+                f"{self.samples.used} of {given} rows, evenly spread, stand for all of them"
+            )
+        self.best = constant(self)
+        """The candidate of the highest class that the judge accepted"""
+        self.take(classes)
 
-    def best(self, classes: Sequence[ModelClass]) -> Candidate:
-        """The highest candidate that the judge accepts."""
-        best: Candidate | None = None
+    def take(self, classes: Sequence[type[ModelClass]]) -> None:
+        """Tries model classes in turn, each above the best candidate so far."""
         for model_class in classes:
-            best = model_class.better(best)
-        assert best is not None
-        self._report_limit(best)
-        return best
+            if model_class.possible(self):
+                self.best = model_class(self).better(self.best)
+
+    def again(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> Climb:
+        """Climbs the same classes over changed rows. With keep, growth begins where this climb ended."""
+        return Climb(
+            data,
+            self.options,
+            self.classes,
+            cells or self.cells,
+            self if keep else None,
+            on_held_out=self.judge.on_held_out,
+        )
 
     @cached_property
     def rows(self) -> Compressed:
         """Compressed rows without a hysteresis input."""
         return self.samples.rows()
+
+    def candidate(
+        self,
+        model_class: str,
+        problem: SeparableProblem,
+        solution: Solution,
+        stop_reason: str,
+        *,
+        rows: Compressed | None = None,
+        strokes: HysteresisInput | None = None,
+    ) -> Candidate:
+        """A candidate on the compressed rows, those without a hysteresis input if no others are given."""
+        n_parameters = problem.n_parameters(len(solution.basis))
+        if strokes is not None and strokes.play_radius is not None:
+            n_parameters += 1
+        rows = rows or self.rows
+        return Candidate(model_class, self.data, rows, problem, solution, n_parameters, stop_reason, strokes)
+
+    @cached_property
+    def motion(self) -> Dynamics | None:
+        """The motion of rows over position alone, where no inputs are named."""
+        data = self.data
+        decides = data.parts and len(data.names) == 1 and self.options.inputs == "auto"
+        return Dynamics(data, self.options) if decides else None
 
     def grown(
         self, problem: SeparableProblem, start: Basis, model_class: str, most: int | None = None
@@ -222,33 +213,92 @@ class Climb:
             )
         return float((place - lower) / reach), fixed
 
-    def _report_limit(self, best: Candidate) -> None:
-        """Reports that growth ended at max_wavelets while neighbouring residuals are still correlated."""
-        limit = self.options.max_wavelets
-        if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
-            return
-        period = "" if self.options.period or best.problem.dimension > 1 else ", or --period if it repeats"
-        self.report.findings.append(
-            usable(
-                f"growth ended at the limit of {limit} wavelets and the error is still structured "
-                f"(NRMSE {best.rmse / self.spread:.3g}); give --max-wavelets {4 * limit}{period}"
-            )
-        )
-
 
 class ModelClass(ABC):
-    """A kind of force law that may be accepted."""
-
-    name: str
+    """A kind of force law that may be accepted above the candidates of simpler classes."""
 
     def __init__(self, climb: Climb) -> None:
         self._climb = climb
 
-    @abstractmethod
-    def fit(self, below: Candidate | None) -> Candidate:
-        """The candidate of this class, fitted to the rows."""
+    @classmethod
+    def possible(cls, climb: Climb) -> bool:
+        """True if the options and the rows allow this class."""
+        return True
 
-    def better(self, below: Candidate | None) -> Candidate:
-        """The candidate of this class if it is accepted, else the one below."""
-        above = self.fit(below)
-        return above if below is None else self._climb.judge.better(below, above)
+    @abstractmethod
+    def better(self, below: Candidate) -> Candidate:
+        """The candidate of this class if the judge accepts it, else the one below."""
+
+
+class Linear(ModelClass):
+    """A straight line over every input, where there are rows enough."""
+
+    def better(self, below: Candidate) -> Candidate:
+        climb = self._climb
+        if below.problem.n_parameters(0) >= below.problem.samples:
+            return below
+        return climb.judge.better(below, climb.recorded(climb.constrained(straight_line(climb))))
+
+
+class Network(ModelClass):
+    """A wavelet network over the inputs, named by what they are."""
+
+    def __init__(self, climb: Climb) -> None:
+        super().__init__(climb)
+        self.name = NETWORKS.get(climb.data.names, "network")
+
+    @classmethod
+    def possible(cls, climb: Climb) -> bool:
+        """True if the options allow wavelets."""
+        return climb.options.max_wavelets > 0
+
+    def better(self, below: Candidate) -> Candidate:
+        """The network that is accepted, or the candidate below.
+
+        If held-out rows refuse a network that the criterion prefers, networks of half its size are tried.
+        """
+        size, errors = self._climb.options.max_wavelets, 1.0
+        if below.problem.n_parameters(1) >= below.problem.samples:
+            return below
+        while size > 0:
+            above = self._of_size(size)
+            judged = self._climb.judge.noted(below, above, errors=errors)
+            if judged.earned:
+                return above
+            size = above.n_wavelets // 2 if judged.criterion_falls else 0
+            errors = SMALLER_ERRORS
+        return below
+
+    def _of_size(self, size: int) -> Candidate:
+        """A network of at most that many wavelets, with its constraints."""
+        climb = self._climb
+        whole = size == climb.options.max_wavelets
+        problem = climb.samples.problem(climb.rows)
+        start = Basis.empty(problem.dimension)
+        if whole:
+            start = climb.begun.get(self.name, start)
+        grown = climb.grown(problem, start, self.name, size)
+        if whole:
+            climb.begun[self.name] = grown.solution.basis
+        reason = grown.stop_reason if whole else HELD_OUT
+        return climb.constrained(climb.candidate(self.name, grown.problem, grown.solution, reason))
+
+
+def constant(climb: Climb) -> Candidate:
+    """The mean force, which every climb starts from."""
+    straight = straight_line(climb)
+    rows, problem = straight.rows, straight.problem
+    coefficients = np.zeros_like(straight.solution.coefficients)
+    coefficients[0, 0] = float(np.average(rows.force, weights=rows.weight))
+    level = problem.with_coefficients(straight.solution, coefficients)
+    reason = "data" if problem.n_parameters(0) >= problem.samples else straight.stop_reason
+    return climb.recorded(
+        replace(straight, model_class="constant", solution=level, n_parameters=1, stop_reason=reason)
+    )
+
+
+def straight_line(climb: Climb) -> Candidate:
+    """The straight line without its constraints."""
+    problem = climb.samples.problem(climb.rows)
+    solution = problem.solve(Basis.empty(problem.dimension))
+    return climb.candidate("linear", problem, solution, climb.options.criterion)

@@ -7,8 +7,7 @@ is exact for any f; L f(x) is not f(L x). Three time constants of L are left out
 Samples behind L are no longer independent: they count for as many as their autocorrelation leaves.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -18,11 +17,11 @@ from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.limits import RESOLVED
-from ..data.rows import modulo
+from ..data.rows import Rows, modulo
 from ..network.basis import Basis
 from ..network.separable import TINY, solve_gram
 from ..options import IdentifyOptions
-from ..search.criteria import CRITERIA, ON_HELD_OUT_ROWS
+from ..search.evidence import CRITERIA, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
 """Stretches of the recording that are held out in turn."""
@@ -56,10 +55,10 @@ class FoldedRegression:
         p = min(len(columns), int(self._independent) - 2)
         return self._independent * float(np.log(share)) + CRITERIA[criterion](self._independent, p)
 
-    def solved(self, two_sided: bool, names: Sequence[str]) -> list[float]:
+    def solved(self, two_sided: bool, names: Sequence[str]) -> dict[str, float]:
         """The coefficients of these names."""
         columns = self._columns(two_sided, names)
-        return [float(value) for value in self._solution(self._grams.sum(axis=0), columns)[: len(names)]]
+        return dict(zip(names, self._solution(self._grams.sum(axis=0), columns).tolist(), strict=False))
 
     def held_out_gain(
         self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
@@ -114,72 +113,28 @@ MOST_ROWS = 20_000
 """Rows that are enough to see what a residual depends on."""
 
 
-@dataclass(frozen=True)
-class Terms:
-    """What was found beside the force over position."""
-
-    damping: float | None
-    mass: float | None
-    hysteresis: bool
-    """Whether the force over position needs hysteresis beside them"""
-    notes: tuple[str, ...]
-
-    def __bool__(self) -> bool:
-        return len(self) > 0
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Which of NAMES there are."""
-        return tuple(name for name in NAMES if getattr(self, name) is not None)
-
-    @property
-    def name(self) -> str:
-        """The model class that they make."""
-        return "velocity" if self.mass is None else "mass and damping"
-
-
-NO_TERMS = Terms(None, None, False, ())
-"""A force that does not depend on the motion."""
-
-
 class Dynamics:
-    """The motion of a recording, ready to be asked what velocity and acceleration explain.
+    """The motion of a recording, from which the share of velocity and acceleration in its force is found.
 
     Parameters
     ----------
-    parts : sequence of Piece
-        Pieces between gaps of time; their rows count over all recordings.
-    lower, reach : float
-        Corner and length of the box of positions.
-    n : int
-        Rows of all recordings.
-    periodic : bool
-        Positions are taken modulo reach.
+    data : Rows
+        With the pieces of motion between gaps of time.
+    options : IdentifyOptions
     """
 
-    def __init__(
-        self, parts: Sequence[Piece], lower: float, reach: float, n: int, *, periodic: bool = False
-    ) -> None:
+    def __init__(self, data: Rows, options: IdentifyOptions) -> None:
+        parts = data.parts
         low_pass = quiet_low_pass(parts, order=2) if parts else None
         self._low_pass = low_pass or LowPass(1.0)
         self._parts = [] if low_pass is None else long_enough(parts, low_pass)
-        self._lower, self._reach, self._n, self._periodic = lower, reach, n, periodic
+        self._data, self._evidence = data, options.search.evidence
+        self._criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
         self._step = max(1, int(1.0 / (PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
-    def terms(
-        self,
-        basis: Basis,
-        side: Float1D | None,
-        options: IdentifyOptions,
-        *,
-        allowed: Sequence[str] = NAMES,
-        settled: bool = False,
-    ) -> Terms:
-        """Which of damping and mass earn their place beside f on these wavelets, and their values.
+    def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[str]]:
+        """Which of damping and mass are accepted beside f on these wavelets, and notes on each.
 
         Parameters
         ----------
@@ -187,39 +142,26 @@ class Dynamics:
             Wavelets in the unit box.
         side : (n,), optional
             Hysteresis input that f may need too.
-        options : IdentifyOptions
-        allowed : sequence of str
-            Terms that are considered.
-        settled : bool
-            The allowed terms, and hysteresis with a side, are in any case: only the values are asked for.
         """
         regression = self._regression(basis, side)
         if regression is None:
-            return Terms(None, None, side is not None, (TOO_SHORT,))
-        notes = []
-        if not settled and "damping" in allowed and (spread := self._spread_of_speeds()) < LEAST_SPREAD:
+            return {}, [TOO_SHORT]
+        notes: list[str] = []
+        allowed: tuple[str, ...] = NAMES
+        if (spread := self._spread_of_speeds()) < LEAST_SPREAD:
             notes.append(
                 f"damping was not tested: the speed was nearly constant (varies by {100 * spread:.2g} %), so "
                 "that damping and hysteresis look alike; record slow and fast strokes"
             )
-            allowed = tuple(name for name in allowed if name != "damping")
-        choices = [
-            (use, names)
+            allowed = ("mass",)
+        criterion = self._criterion
+        valued = {
+            (use, names): regression.value(use, names, criterion) + self._evidence * (len(names) + use)
             for use in ((False, True) if side is not None else (False,))
             for size in range(len(allowed) + 1)
             for names in combinations(allowed, size)
-        ]
-        if settled:
-            choices = [(side is not None, tuple(allowed))]
-        criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
-        valued = {
-            (use, names): regression.value(use, names, criterion)
-            + options.search.evidence * (len(names) + use)
-            for use, names in choices
         }
         use, names = min(valued, key=lambda choice: valued[choice])
-        if settled:
-            return Terms(*_values(regression.solved(use, names), names), use, ())
         for name in allowed:
             with_it = tuple(other for other in allowed if other in names or other == name)
             without = tuple(other for other in with_it if other != name)
@@ -231,7 +173,7 @@ class Dynamics:
                 notes.append(f"{name} refused: {changes}")
                 continue
             share, error = regression.held_out_gain(use, without, with_it)
-            found = dict(zip(with_it, regression.solved(use, with_it), strict=True))[name]
+            found = regression.solved(use, with_it)[name]
             way = "falls" if share > 0.0 else "rises"
             by = f"{100 * abs(share):.3g} +- {100 * error:.2g} %"
             measured = f"the squared error on held-out stretches {way} by {by}"
@@ -242,36 +184,42 @@ class Dynamics:
             notes.append(
                 f"{name} refused: {changes}, but {measured if found > 0.0 else f'it would be {found:.4g}'}"
             )
-        return Terms(*_values(regression.solved(use, names), names), use, tuple(notes))
+        return regression.solved(use, names), notes
 
-    def force_of(self, terms: Terms) -> tuple[Float1D, Float1D]:
-        """m L a + B L v at every row (n,), and 1 at the rows (n,) that have one, else 0."""
-        total, known = np.zeros(self._n), np.ones(self._n, dtype=bool)
-        for value, derive in (
-            (terms.damping, lambda part: part.velocity),
-            (terms.mass, lambda part: part.acceleration),
+    def values(self, basis: Basis, side: Float1D | None, names: Sequence[str]) -> dict[str, float]:
+        """Values of these terms beside f on these wavelets; empty where the motion is too short for them."""
+        regression = self._regression(basis, side)
+        return {} if regression is None else regression.solved(side is not None, names)
+
+    def moving(self, values: dict[str, float]) -> Moving:
+        """The terms of these values, with m L a + B L v at every row."""
+        total, known = np.zeros(len(self._data.force)), np.ones(len(self._data.force), dtype=bool)
+        for name, derive in (
+            ("damping", lambda part: part.velocity),
+            ("mass", lambda part: part.acceleration),
         ):
-            if value is not None:
-                derived, here = at_rows(self._parts, self._low_pass, derive, self._n)
-                total, known = total + value * derived, known & here
-        return total, known.astype(float)
+            if name in values:
+                derived, here = self._at_rows(derive)
+                total, known = total + values[name] * derived, known & here
+        return Moving(values.get("damping"), values.get("mass"), total, known.astype(float))
 
     def velocity(self) -> tuple[Float1D, NDArray[np.bool_]]:
         """L v at every row (n,), and the rows (n,) that have one."""
-        return at_rows(self._parts, self._low_pass, lambda part: part.velocity, self._n)
+        return self._at_rows(lambda part: part.velocity)
 
-    def left_to_velocity(
-        self, residual: Float1D, box: Float2D, basis: Basis, *, friction: bool = False
-    ) -> float:
+    def _at_rows(self, derive: Callable[[Piece], Float1D]) -> tuple[Float1D, NDArray[np.bool_]]:
+        return at_rows(self._parts, self._low_pass, derive, len(self._data.force))
+
+    def left_to_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
         """Share of a residual (n,) that functions of velocity and position explain.
 
-        These are v|v|, and v times 1, x and psi_i(x). With friction, the smoothed sign of v takes part as v
-        does. box (n, 1) are the positions, and the wavelets those of the force over position. The share is
-        corrected for the number of functions.
+        These are v|v|, and v times 1, x and psi_i(x), with the wavelets of the force over position. With
+        friction, the smoothed sign of v takes part as v does, and the share is corrected for the number of
+        functions.
         """
         velocity, known = self.velocity()
         rows = np.flatnonzero(known)[:: max(1, -(-int(known.sum()) // MOST_ROWS))]
-        v, r, x = velocity[rows, None], residual[rows], box[rows]
+        v, r, x = velocity[rows, None], residual[rows], self._data.box[rows]
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
         over_x = np.concatenate([np.ones_like(x), x, wavelet_columns(x, basis.alpha, basis.beta)], 1)
@@ -297,8 +245,8 @@ class Dynamics:
         rows = sum(len(fixed) for fixed in self._fixed)
         done = 0
         for part, fixed in zip(self._parts, self._fixed, strict=True):
-            box = (part.position - self._lower) / self._reach
-            box = modulo(box) if self._periodic else box
+            box = (part.position - self._data.lower[0]) / self._data.reach[0]
+            box = box if self._data.period is None else modulo(box)
             plain = np.concatenate(
                 [
                     np.ones((len(box), 1)),
@@ -345,8 +293,3 @@ class Dynamics:
 
 def _moving(part: Piece) -> tuple[Float1D, Float1D, Float1D]:
     return part.force, part.velocity, part.acceleration
-
-
-def _values(found: Sequence[float], names: Sequence[str]) -> tuple[float | None, float | None]:
-    by_name = dict(zip(names, found, strict=True))
-    return by_name.get("damping"), by_name.get("mass")

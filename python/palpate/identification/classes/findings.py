@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,11 @@ from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.quality import findings_of
 from ...verdict import Finding, Verdict, no, usable
+from ..data.rows import period_notes
 from ..network.fitted import FittedNetwork
-from ..search.evidence import Candidate
-from .climb import BoxRows
+from ..options import IdentifyOptions
+from ..search.evidence import Candidate, RowError
+from .climb import Climb
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: a tenth of the force's spread [-]."""
@@ -240,68 +242,34 @@ UNFIT_BEYOND = 1.0
 """The same, from which the model is unfit [-]."""
 
 
-@dataclass(frozen=True)
-class RowError:
-    """Residuals of every row, with the samples that each stands for."""
+def extreme_forces(error: RowError) -> list[Finding]:
+    """A finding if few rows of extreme force hide a large error of all others."""
+    rows = np.flatnonzero(error.weight > 0.0)
+    if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
+        return []
+    far = np.abs(error.force[rows] - np.median(error.force[rows]))
+    count = len(rows) - int(EXTREME_SHARE * len(rows))
+    kept = rows[np.sort(np.argpartition(far, count - 1)[:count])]
+    inner = RowError(error.residual[kept], error.force[kept], error.weight[kept])
+    if inner.nrmse <= max(USABLE_NRMSE, HIDDEN * error.nrmse):
+        return []
+    judge = no if inner.nrmse > UNFIT_NRMSE else usable
+    return [
+        judge(
+            f"the NRMSE is {error.nrmse:.3g} over all rows, but {inner.nrmse:.3g} without the "
+            f"{EXTREME_SHARE:.0%} of most extreme force (|force| up to {np.abs(error.force).max():.3g}, "
+            f"the others span {np.ptp(error.force[kept]):.3g}): few large forces hide the error of the "
+            "others. If they are wrong readings, remove these rows or give --loss huber"
+        )
+    ]
 
-    residual: Float1D
-    """(n,) [force]"""
-    force: Float1D
-    """(n,)"""
-    weight: Float1D
-    """(n,) samples, 0 for a row that does not count"""
-    within: float = 0.0
-    """Sum of squares inside rows that stand for several samples [force^2]"""
 
-    @property
-    def rmse(self) -> float:
-        """Root mean square error over the samples [force]."""
-        total = float(self.weight.sum())
-        return float(np.sqrt((self.weight @ self.residual**2 + self.within) / total)) if total else 0.0
-
-    @property
-    def nrmse(self) -> float:
-        """rmse over the standard deviation of the force; 0 for a constant force."""
-        spread = self.spread
-        return self.rmse / spread if spread > 0.0 else 0.0
-
-    @property
-    def spread(self) -> float:
-        """Standard deviation of the force over the samples [force]."""
-        if not self.weight.any():
-            return 0.0
-        if np.all(self.weight == 1.0):
-            return float(np.std(self.force))
-        mean = np.average(self.force, weights=self.weight)
-        return float(np.sqrt(np.average((self.force - mean) ** 2, weights=self.weight)))
-
-    def findings(self) -> list[Finding]:
-        """A finding if few rows of extreme force hide a large error of all others."""
-        rows = np.flatnonzero(self.weight > 0.0)
-        if len(rows) < LEAST_ROWS or self.spread == 0.0 or self._plainly_small(rows):
-            return []
-        far = np.abs(self.force[rows] - np.median(self.force[rows]))
-        count = len(rows) - int(EXTREME_SHARE * len(rows))
-        kept = rows[np.sort(np.argpartition(far, count - 1)[:count])]
-        inner = RowError(self.residual[kept], self.force[kept], self.weight[kept])
-        if inner.nrmse <= max(USABLE_NRMSE, HIDDEN * self.nrmse):
-            return []
-        judge = no if inner.nrmse > UNFIT_NRMSE else usable
-        return [
-            judge(
-                f"the NRMSE is {self.nrmse:.3g} over all rows, but {inner.nrmse:.3g} without the "
-                f"{EXTREME_SHARE:.0%} of most extreme force (|force| up to {np.abs(self.force).max():.3g}, "
-                f"the others span {np.ptp(self.force[kept]):.3g}): few large forces hide the error of the "
-                "others. If they are wrong readings, remove these rows or give --loss huber"
-            )
-        ]
-
-    def _plainly_small(self, rows: NDArray[np.intp]) -> bool:
-        """True if the error is small for the spread of all but the most extreme forces, of some rows (k,)."""
-        some = self.force[rows[:: max(1, len(rows) // SAMPLED)]]
-        low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
-        inner = some[(some >= low) & (some <= high)]
-        return bool(self.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
+def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
+    """True if the error is small for the spread of all but the most extreme forces, of some rows (k,)."""
+    some = error.force[rows[:: max(1, len(rows) // SAMPLED)]]
+    low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
+    inner = some[(some >= low) & (some <= high)]
+    return bool(error.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
 
 
 def beyond_rows(network: FittedNetwork, force: Float1D, *, repeats: bool) -> list[Finding]:
@@ -354,43 +322,48 @@ def disagreement(on_rows: RowError, on_cells: float, travel: float, cells: int) 
     ]
 
 
-def judged_on_rows(
-    network: FittedNetwork,
-    found: Candidate,
-    data: BoxRows,
-    cells: int,
-    moving: tuple[Float1D, Float1D] | None,
-    *,
-    periodic: bool,
-) -> FittedNetwork:
-    """The network with the error that its evaluator leaves on the rows, and the findings on this error.
+def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
+    """A finding if growth ended at max_wavelets while neighbouring residuals are still correlated."""
+    limit = options.max_wavelets
+    if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
+        return []
+    period = "" if options.period or best.problem.dimension > 1 else ", or --period if it repeats"
+    spread = float(np.std(best.data.force)) or 1.0
+    return [
+        usable(
+            f"growth ended at the limit of {limit} wavelets and the error is still structured "
+            f"(NRMSE {best.rmse / spread:.3g}); give --max-wavelets {4 * limit}{period}"
+        )
+    ]
 
-    moving: force of mass and damping (n,), and 1 in the rows where it is known, else 0.
-    """
-    residual = data.force - network.force(data.positions, found.side)
-    counted = np.ones(len(residual)) if data.counted is None else data.counted
-    fitted = np.ones(len(residual)) if data.weight is None else data.weight
-    if moving is not None:
-        residual, counted, fitted = residual - moving[0], counted * moving[1], fitted * moving[1]
-    if found.strokes is not None:
-        counted, fitted = counted * found.strokes.known, fitted * found.strokes.known
-    findings = []
+
+def identified(climb: Climb) -> FittedNetwork:
+    """The accepted model in the units of the data, with its error on the rows, all notes and all findings."""
+    best, report, options = climb.best, climb.report, climb.options
+    data, error, network = best.data, best.error, best.network
+    single, counted = len(data.names) == 1, error.weight
+    notes, findings = list(data.notes), list(data.findings)
+    if data.period is not None:
+        note, of_period = period_notes(data.lower[0] + data.reach[0] * data.path[:, 0], data.period)
+        notes, findings = [*notes, note], findings + of_period
+    findings += report.findings + limit_findings(best, options)
     if data.robust is not None:
-        counted = np.where(data.robust.outliers, 0.0, counted)
-        findings += data.robust.findings(residual)
-    error = RowError(residual, data.force, counted, data.within)
-    on_fitted = RowError(residual, data.force, fitted, data.within)
-    findings += [*error.findings(), *disagreement(on_fitted, found.rmse, float(data.reach[0]), cells)]
-    findings += beyond_rows(network, data.force[counted > 0.0], repeats=periodic)
-    if data.counted is None and len(data.names) == 1:
+        findings += data.robust.findings(best.residual)
+    findings += extreme_forces(error)
+    findings += disagreement(best.error_on(data.weight), best.rmse, float(data.reach[0]), best.rows.cells)
+    findings += beyond_rows(network, data.force[counted > 0.0], repeats=data.period is not None)
+    if data.counted is None and single:
         rows = np.flatnonzero(counted)
-        side = None if found.side is None else found.side[rows]
-        position = data.positions[rows, 0]
-        findings += explained_findings(position, data.force[rows], residual[rows], side, error.nrmse)
+        side, position = None if best.side is None else best.side[rows], data.domain[rows, 0]
+        findings += explained_findings(position, data.force[rows], best.residual[rows], side, error.nrmse)
+    near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(data.force[data.reported])))
+    left_there = single and abs(best.at_lower) <= near_zero and data.period is None
     return replace(
         network,
+        below="free" if left_there else "linear",
         rmse=error.rmse,
         nrmse=error.nrmse,
-        independent_rows=found.problem.independent,
-        findings=(*network.findings, *findings),
+        path=tuple(report.path),
+        notes=(*notes, *report.notes),
+        findings=tuple(findings),
     )

@@ -12,19 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..._typing import Float1D
 from ...errors import InputError
 from ...verdict import usable
-from ..data.compression import Compressed
 from ..data.strokes import HysteresisInput
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
-from ..network.separable import SeparableProblem, Solution
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Samples
-from .climb import Climb, ModelClass
+from .climb import Climb, ModelClass, straight_line
 from .findings import USABLE_NRMSE
-from .position import straight_line
 
 GAINS_ENERGY = 2.0
 """Ratio of the RMS errors with and without h >= 0 above which a cure is named."""
@@ -59,7 +55,7 @@ class Hysteresis(ModelClass):
         self._named = options.inputs != "auto"
         self._play: PlaySearch | None = None
         if data.side is None and data.starts is not None and len(data.names) == 1:
-            self._play = PlaySearch(climb.samples, data.path, data.starts, options)
+            self._play = PlaySearch(climb.samples, options)
 
     @classmethod
     def possible(cls, climb: Climb) -> bool:
@@ -79,8 +75,7 @@ class Hysteresis(ModelClass):
             )
         return told and (inputs == "auto" or "hysteresis" in inputs)
 
-    def better(self, below: Candidate | None) -> Candidate:
-        assert below is not None
+    def better(self, below: Candidate) -> Candidate:
         if self._play is None:
             assert self._climb.data.side is not None
             return self._of(below, HysteresisInput.of_strokes(self._climb.data.side))
@@ -93,20 +88,17 @@ class Hysteresis(ModelClass):
         self._climb.report.notes.append(f"hysteresis was not tested: {untested}")
         return below
 
-    def fit(self, below: Candidate | None) -> Candidate:
-        return self.better(below)
-
     def _of(self, below: Candidate, strokes: HysteresisInput) -> Candidate:
         """The better of the candidate below and hysteresis with this input.
 
         h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
         not fall at all with these, growing a network would be in vain.
         """
-        judge, named, samples = self._climb.judge, self._named, self._climb.samples
+        climb, judge, named, samples = self._climb, self._climb.judge, self._named, self._climb.samples
         rows = samples.rows(strokes)
         problem = samples.problem(rows, strokes)
         first = problem.solve(below.solution.basis)
-        free = self._candidate(strokes, rows, problem, first, judge.criterion)
+        free = climb.candidate(self.name, problem, first, judge.criterion, rows=rows, strokes=strokes)
         if named or judge.fall(below, free) > 0.0:
             free = self._grown(below, free)
         if not named and not judge.earned(below, free):
@@ -147,20 +139,12 @@ class Hysteresis(ModelClass):
             limit = min(most, max(FIRST_SIZE, 2 * len(basis))) if play else most
             grown = climb.grown(climb.samples.problem(rows, strokes), basis, self.name, limit)
             basis = climb.begun[self.name] = grown.solution.basis
-            found = self._candidate(strokes, rows, grown.problem, grown.solution, grown.stop_reason)
+            reason = grown.stop_reason
+            found = climb.candidate(
+                self.name, grown.problem, grown.solution, reason, rows=rows, strokes=strokes
+            )
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
         return found
-
-    def _candidate(
-        self,
-        strokes: HysteresisInput,
-        rows: Compressed,
-        problem: SeparableProblem,
-        solution: Solution,
-        stop_reason: str,
-    ) -> Candidate:
-        n_parameters = problem.n_parameters(len(solution.basis)) + (strokes.play_radius is not None)
-        return Candidate(self.name, rows, problem, solution, n_parameters, stop_reason, strokes)
 
     def _single_valued(self, hysteresis: Candidate) -> Candidate:
         """A force of position alone on the wavelets of hysteresis, those it does not need removed.
@@ -177,8 +161,7 @@ class Hysteresis(ModelClass):
         line = climb.recorded(climb.constrained(straight_line(climb)))
         if len(solution.basis) == 0:
             return line
-        n_parameters = problem.n_parameters(len(solution.basis))
-        found = Candidate("position", climb.rows, problem, solution, n_parameters, hysteresis.stop_reason)
+        found = climb.candidate("position", problem, solution, hysteresis.stop_reason)
         found = climb.recorded(climb.constrained(found))
         return found if climb.judge.earned(line, found) else line
 
@@ -225,18 +208,13 @@ class PlaySearch:
     Parameters
     ----------
     samples : Samples
-        Of one position.
-    path : (n,)
-        Positions as they were moved through, not taken modulo a period.
-    starts : sequence of int
-        Rows at which a motion starts.
+        Of one position; every start of a motion is known.
     options : IdentifyOptions
     """
 
-    def __init__(
-        self, samples: Samples, path: Float1D, starts: Sequence[int], options: IdentifyOptions
-    ) -> None:
-        self._samples, self._path, self._starts = samples, path, list(starts)
+    def __init__(self, samples: Samples, options: IdentifyOptions) -> None:
+        data = samples.data
+        self._samples, self._path, self._starts = samples, data.path[:, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
     def best_tried(self, basis: Basis) -> HysteresisInput | None:
@@ -275,8 +253,8 @@ class PlaySearch:
         """The candidate with each motion's play begun where its first force says."""
         if found.play_radius is None:
             return found
-        g, h = found.parts_at(self._samples.box[self._starts])
-        force = self._samples.force[self._starts]
+        g, h = found.parts_at(self._samples.data.box[self._starts])
+        force = self._samples.data.force[self._starts]
         first = np.clip((force - g) / np.where(h == 0.0, np.inf, h), -1.0, 1.0)
         return replace(found, strokes=self._of(found.play_radius, first.tolist()))
 

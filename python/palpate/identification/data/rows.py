@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +18,149 @@ from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, pieces, velocity
 from ...verdict import Finding, no, usable
 from ..options import IdentifyOptions
+from .compression import EVERY, held_out_rows
+from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
+from .outliers import Robust
 from .strokes import strokes_of
 
 LARGEST = 1e100
 """Largest absolute value, and the inverse of the smallest travel and force, that is identified."""
 
 
-def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> None:
+def require_in_range(name: str, values: Float1D) -> None:
+    """Refuse values (n,), n >= 1, whose squares would overflow.
+
+    Raises
+    ------
+    InputError
+        Names the largest value and the limit.
+    """
+    if (largest := float(np.abs(values).max())) > LARGEST:
+        raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of all recordings, one under the other, and the unit box that their positions stand in."""
+
+    names: tuple[str, ...]
+    """(d,) of the inputs; the first is position"""
+    positions: Float2D
+    """(n, d)"""
+    force: Float1D
+    """(n,)"""
+    side: Float1D | None = None
+    """(n,) direction of the stroke: +1, -1, 0 for neither; None where it is not known"""
+    starts: Sequence[int] | None = None
+    """Rows at which a motion starts, from which the play operator gives a hysteresis input (d = 1)"""
+    parts: Sequence[Piece] = ()
+    """The motion between gaps of time (d = 1); rows count over all recordings"""
+    weight: Float1D | None = None
+    """(n,) samples that each row stands for in the fit; None: 1"""
+    within: float = 0.0
+    """Sum of squares inside rows that stand for several samples [force^2]"""
+    period: float | None = None
+    """Of an environment that repeats [position]"""
+    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    """Reservations for the verdict"""
+    counted: Float1D | None = None
+    """(n,) samples that each row stands for in the reported error; None: 1"""
+    robust: Robust | None = None
+    """Outliers, where the loss is Huber's"""
+    limits: RowLimits = NO_LIMITS
+    """What limits the information in the rows"""
+    corners: tuple[Float1D, Float1D] | None = None
+    """(d,) least and largest corner of the box; None: those of the positions"""
+
+    @cached_property
+    def lower(self) -> Float1D:
+        """(d,) corner of the box [position]."""
+        return self.positions.min(axis=0) if self.corners is None else self.corners[0]
+
+    @cached_property
+    def reach(self) -> Float1D:
+        """(d,) sides of the box [position]."""
+        if self.period is not None:
+            return np.array([self.period])
+        return np.asarray(
+            np.ptp(self.positions, axis=0) if self.corners is None else self.corners[1] - self.lower
+        )
+
+    @cached_property
+    def path(self) -> Float2D:
+        """(n, d) positions in units of the box, as they were moved through, not taken modulo the period."""
+        return (self.positions - self.lower) / self.reach
+
+    @cached_property
+    def box(self) -> Float2D:
+        """(n, d) positions in the unit box."""
+        return self.path if self.period is None else modulo(self.path)
+
+    @property
+    def domain(self) -> Float2D:
+        """(n, d) positions modulo the period."""
+        return self.positions if self.period is None else self.lower + self.box * self.reach
+
+    @property
+    def reported(self) -> NDArray[np.bool_]:
+        """(n,) rows that count in the error."""
+        rows = np.ones(len(self.force), dtype=bool) if self.counted is None else self.counted > 0.0
+        return rows if self.robust is None else rows & ~self.robust.outliers
+
+    def held_out(self) -> NDArray[np.bool_]:
+        """(n,) rows that are held out to judge on."""
+        held_out = held_out_rows(len(self.force), self.starts)
+        if self.weight is not None:
+            counted = np.flatnonzero(self.weight > 0.0)
+            held_out &= self.weight > 0.0
+            if 2 * EVERY * np.count_nonzero(held_out) < len(counted):
+                # rows that repeat others can stand at every place that is held out
+                held_out[:] = False
+                held_out[counted] = held_out_rows(len(counted), self.starts)
+        return held_out
+
+    def only(self, rows: NDArray[np.bool_]) -> Rows:
+        """Some of the rows, without their motion."""
+        side, weight = (None if each is None else each[rows] for each in (self.side, self.weight))
+        return replace(
+            self, positions=self.positions[rows], force=self.force[rows], side=side, weight=weight, parts=()
+        )
+
+    def scaled(self, scale: ForceScale) -> Rows:
+        """The rows with the forces that the fit sees."""
+        return replace(
+            self,
+            force=scale.scaled(self.force),
+            within=self.within * scale.factor**2,
+            parts=[replace(part, force=scale.scaled(part.force)) for part in self.parts],
+        )
+
+    def limited(self) -> Rows:
+        """The rows with what limits their information; rows that repeat others have no weight.
+
+        Where rows have a weight, it counts in the fit and in the error, and there are no limits.
+        """
+        if self.weight is not None:
+            return replace(self, counted=self.weight)
+        noise = position_noise(self.positions[:, 0] / self.reach[0]) if len(self.names) == 1 else 0.0
+        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force), position_noise=noise)
+        again, repeats = repeated(self.positions, self.force, self.side)
+        if not repeats:
+            return replace(self, limits=limits)
+        return replace(self, limits=limits, weight=np.where(again, 0.0, 1.0), notes=(*self.notes, repeats))
+
+
+def require_usable(rows: Rows, options: IdentifyOptions) -> None:
     """Refuse what cannot be identified.
 
     Raises
     ------
     InputError
-        Too few rows or distinct positions, a value that is not finite, an input that never changes.
+        Too few rows or distinct positions, a value that is not finite, an input that never changes, an option
+        that is for one input.
     """
+    names, positions, force = rows.names, rows.positions, rows.force
     if positions.ndim != 2 or force.shape != (len(positions),):
         raise InputError(
             f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
@@ -59,42 +189,16 @@ def require_usable(positions: Float2D, force: Float1D, names: Sequence[str]) -> 
                 f"{name} takes only {len(np.unique(column))} distinct values; "
                 f"{MIN_POSITIONS} or more are needed"
             )
+    if len(names) > 1 and (options.slope_limits is not None or options.fixed_force is not None):
+        raise InputError(
+            "slope_bounds, monotone, coupling_stiffness and fixed_force are for a force over position alone, "
+            f"not over {', '.join(names)}"
+        )
+    if len(names) > 1 and options.period is not None:
+        raise InputError(f"period is for a force over position alone, not over {', '.join(names)}")
 
 
-def require_in_range(name: str, values: Float1D) -> None:
-    """Refuse values (n,), n >= 1, whose squares would overflow.
-
-    Raises
-    ------
-    InputError
-        Names the largest value and the limit.
-    """
-    if (largest := float(np.abs(values).max())) > LARGEST:
-        raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")
-
-
-@dataclass(frozen=True)
-class Observations:
-    """Rows of all recordings, one under the other."""
-
-    names: tuple[str, ...]
-    """Of the columns of X; the first is position"""
-    X: Float2D
-    """(n, d)"""
-    force: Float1D
-    """(n,)"""
-    side: Float1D | None
-    """(n,) direction of the stroke: stated by every recording, or taken from the order of its rows"""
-    starts: tuple[int, ...] | None
-    """Rows at which a recording begins, where every one has time"""
-    parts: tuple[Piece, ...]
-    """The motion between gaps of time, where every recording has time; rows count over all recordings"""
-    notes: tuple[str, ...]
-    findings: tuple[Finding, ...] = ()
-    """Reservations for the verdict"""
-
-
-def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> Observations:
+def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
     """The rows that the options ask for.
 
     Raises
@@ -133,7 +237,17 @@ def observations(recordings: Sequence[Recording], options: IdentifyOptions) -> O
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
-    return Observations(names, np.concatenate(columns), force, side, starts, parts, notes, findings)
+    return Rows(
+        names,
+        np.concatenate(columns),
+        force,
+        side,
+        starts,
+        parts,
+        period=options.period,
+        notes=notes,
+        findings=findings,
+    )
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
@@ -224,12 +338,6 @@ USABLE_GAP = 0.05
 
 UNFIT_GAP = 0.5
 """Share of the period without a position above which the model is unfit [-]."""
-
-
-def require_one_input(names: tuple[str, ...]) -> None:
-    """Refuse a period for a force over several inputs."""
-    if len(names) > 1:
-        raise InputError(f"period is for a force over position alone, not over {', '.join(names)}")
 
 
 def period_notes(position: Float1D, period: float) -> tuple[str, list[Finding]]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..._core.model import ForceModel
 from ..._typing import Float1D, Float2D
+from ...model import Fit, PathStep
 from ...verdict import Finding
 from ..data.limits import ForceScale
 from .separable import Solution
@@ -91,6 +93,26 @@ class FittedNetwork:
             "lower": self.lower,
             "upper": self.upper,
         }
+
+    def fit(self) -> Fit:
+        """How the network came about, as a model file holds it."""
+        path: list[PathStep] = [
+            {
+                "n_wavelets": at.n_wavelets,
+                "rmse": at.rmse,
+                "criterion": at.criterion if math.isfinite(at.criterion) else None,
+                "model_class": at.model_class,
+            }
+            for at in self.path
+        ]
+        return Fit(
+            model_class=self.model_class,
+            stop_reason=self.stop_reason,
+            nrmse=self.nrmse,
+            n_wavelets=len(self.weight),
+            n_parameters=self.n_parameters,
+            path=path,
+        )
 
     def unscaled(self, scale: ForceScale) -> FittedNetwork:
         """The network in the unit of the force."""

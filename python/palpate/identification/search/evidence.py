@@ -1,23 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Candidate models, the rows that they are fitted to, and the judge that compares them."""
+"""Candidate models, the criteria that they are compared by, and the judge that accepts them.
+
+The criteria weigh the error against the number of fitted numbers. All are written as a deviance, n ln(RSS/n)
+plus a price for the p fitted parameters, so that their differences compare: BIC (Schwarz 1978), AICc (Hurvich
+& Tsai 1989), GCV (Craven & Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the score). The
+smallest value wins.
+
+Two rules judge on held-out rows instead, and need no price. "fresh" takes the smallest network
+whose error there is within one standard error of the least (Breiman et al. 1984); "perceptual" the smallest
+whose error there is not felt: RMS of the error over 7 % of the local force, or 1 % of the largest, below 1.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..._core.model import wavelet_columns, wavelet_curvature_columns
 from ..._typing import Float1D, Float2D
+from ...errors import InputError
 from ...verdict import Finding
-from ..data.compression import Compressed, Compressor, around_seam, binning_error
-from ..data.held_out import TRIM, HeldOutRows, gain, inside
+from ..data.compression import (
+    TRIM,
+    Compressed,
+    Compressor,
+    HeldOutRows,
+    around_seam,
+    binning_error,
+    gain,
+    inside,
+)
+from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..network.fitted import PathPoint
-from ..network.separable import SeparableProblem, Solution, problem_of
+from ..network.fitted import FittedNetwork, PathPoint
+from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
-from .criteria import ON_HELD_OUT_ROWS, criterion_of, enough, standard_error
 
 BINNING_SHARE = 0.05
 """Error that cells of positions may add, as a share of the RMS error; above it the cells are halved."""
@@ -31,12 +55,151 @@ LEAST_HELD_OUT = 20
 ALL = slice(None)
 """Every row."""
 
+CRITERIA: dict[str, Callable[[float, int], float]] = {
+    "bic": lambda n, p: p * math.log(n),
+    "aicc": lambda n, p: 2.0 * p + 2.0 * p * (p + 1) / (n - p - 1) if p < n - 1 else math.inf,
+    "gcv": lambda n, p: -2.0 * n * math.log1p(-p / n) if p < n else math.inf,
+    "fpe": lambda n, p: n * math.log((n + p) / (n - p)) if p < n else math.inf,
+    "fresh": lambda n, p: 0.0,
+    "perceptual": lambda n, p: 0.0,
+}
+"""Name of the criterion to its price of p parameters on n samples."""
+
+ON_HELD_OUT_ROWS = ("fresh", "perceptual")
+"""The criteria whose error is that on held-out rows."""
+
+
+def deviance(criterion: str, rss: float, n: float, p: int) -> float:
+    """Value of a criterion: n ln(rss/n) + price(n, p); rss in force squared, over all n samples.
+
+    For "perceptual" rss is in just noticeable differences squared, so that 0 is what is just not felt.
+    """
+    return n * math.log(rss / n) + CRITERIA[criterion](n, p)
+
+
+def standard_error(n: float) -> float:
+    """Standard error of n ln(MSE) over n samples of normal noise: n sqrt(2/n)."""
+    return math.sqrt(2.0 * n)
+
+
+def enough(criterion: str, value: float) -> bool:
+    """True if no larger network is needed."""
+    return criterion == "perceptual" and value <= 0.0
+
+
+def choice(criterion: str, values: Sequence[float], n: float) -> int:
+    """Index of the network to take, from the values of ever larger networks."""
+    least = min(values)
+    limit = {"fresh": least + standard_error(n), "perceptual": max(0.0, least)}.get(criterion, least)
+    return next(index for index, value in enumerate(values) if value <= limit)
+
+
+def criterion_of(
+    problem: SeparableProblem, solution: Solution, name: str, n_parameters: int | None = None
+) -> float:
+    """Value of a criterion for a solution: the smaller the better.
+
+    Without n_parameters those of the problem and the basis are counted.
+
+    Raises
+    ------
+    InputError
+        The criterion judges on held-out rows, and the problem has none.
+    """
+    if name in ON_HELD_OUT_ROWS:
+        rows = problem.held_out
+        if rows is None:
+            raise InputError(f"criterion is {name!r}, but no rows were held out to judge on")
+        return held_out_deviance(name, rows, problem.errors(solution, rows))
+    p = problem.n_parameters(len(solution.basis)) if n_parameters is None else n_parameters
+    share = problem.limits.independent
+    return deviance(name, share * problem.total(solution.rss), problem.independent, p)
+
+
+def held_out_deviance(criterion: str, rows: HeldOutRows, errors: Float1D) -> float:
+    """Criterion of a network that leaves these errors on held-out rows."""
+    counted = rows.felt(errors) if criterion == "perceptual" else errors
+    smallest = (1e-12 * float(np.ptp(rows.force))) ** 2 * len(counted)
+    return deviance(criterion, max(float(counted @ counted), smallest, TINY), len(counted), 0)
+
+
+Reporter = Callable[[str, int], None]
+"""Receives the model class that is tried and the number of wavelets."""
+
+_reporter: ContextVar[Reporter | None] = ContextVar("reporter", default=None)
+
+
+@contextmanager
+def reporting_to(reporter: Reporter) -> Iterator[None]:
+    """Report every network that is tried in this context."""
+    token = _reporter.set(reporter)
+    try:
+        yield
+    finally:
+        _reporter.reset(token)
+
+
+def report(model_class: str, n_wavelets: int) -> None:
+    """Report a network that is tried now."""
+    if (reporter := _reporter.get()) is not None:
+        reporter(model_class, n_wavelets)
+
+
+@dataclass(frozen=True)
+class Moving:
+    """Mass and damping, and their force."""
+
+    damping: float | None
+    mass: float | None
+    force: Float1D
+    """(n,) m L a + B L v at every row"""
+    known: Float1D
+    """(n,) 1 in the rows that have a velocity and an acceleration, else 0"""
+
+
+@dataclass(frozen=True)
+class RowError:
+    """Residuals of every row, with the samples that each stands for."""
+
+    residual: Float1D
+    """(n,) [force]"""
+    force: Float1D
+    """(n,)"""
+    weight: Float1D
+    """(n,) samples, 0 for a row that does not count"""
+    within: float = 0.0
+    """Sum of squares inside rows that stand for several samples [force^2]"""
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square error over the samples [force]."""
+        total = float(self.weight.sum())
+        return float(np.sqrt((self.weight @ self.residual**2 + self.within) / total)) if total else 0.0
+
+    @property
+    def nrmse(self) -> float:
+        """rmse over the standard deviation of the force; 0 for a constant force."""
+        spread = self.spread
+        return self.rmse / spread if spread > 0.0 else 0.0
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the force over the samples [force]."""
+        if not self.weight.any():
+            return 0.0
+        if np.all(self.weight == 1.0):
+            return float(np.std(self.force))
+        mean = np.average(self.force, weights=self.weight)
+        return float(np.sqrt(np.average((self.force - mean) ** 2, weights=self.weight)))
+
 
 @dataclass(frozen=True)
 class Candidate:
     """A candidate model: one solution of a problem over compressed rows."""
 
     model_class: str
+    data: Rows
+    """The rows that its error is reported on"""
     rows: Compressed
     problem: SeparableProblem
     solution: Solution
@@ -44,6 +207,8 @@ class Candidate:
     stop_reason: str
     strokes: HysteresisInput | None = None
     """The hysteresis input, where the model class has one"""
+    moving: Moving | None = None
+    """Mass and damping, where the model class has them"""
 
     @property
     def side(self) -> Float1D | None:
@@ -97,9 +262,9 @@ class Candidate:
         curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
         return binning_error(self.rows, curvature) > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
 
-    def force_at(self, positions: Float2D, rows: slice = ALL) -> Float1D:
-        """Force at every row (n,), or at some, of positions (n, d) in the unit box."""
-        return self._force(positions[rows], None if self.side is None else self.side[rows])
+    def force_at(self, rows: slice = ALL) -> Float1D:
+        """Force over position at every row (n,), or at some."""
+        return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
     def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
         """g and h (k,) of a model with hysteresis at positions (k, d) in the unit box."""
@@ -108,6 +273,48 @@ class Candidate:
 
     def _force(self, positions: Float2D, side: Float1D | None) -> Float1D:
         return -self.problem.errors(self.solution, HeldOutRows(positions, np.zeros(len(positions)), side))
+
+    @cached_property
+    def network(self) -> FittedNetwork:
+        """The candidate in the units of the data."""
+        lower, reach, moving = self.data.lower, self.data.reach, self.moving
+        return FittedNetwork.of(
+            self.solution,
+            self.problem.readout,
+            lower,
+            reach,
+            inputs=self.data.names,
+            play_radius=None if self.play_radius is None else self.play_radius * float(reach[0]),
+            mass=moving and moving.mass,
+            damping=moving and moving.damping,
+            model_class=self.model_class,
+            stop_reason=self.stop_reason,
+            n_parameters=self.n_parameters,
+            independent_rows=self.problem.independent,
+        )
+
+    @cached_property
+    def residual(self) -> Float1D:
+        """Force of every row (n,) less that of the network's evaluator, of mass and of damping."""
+        residual = self.data.force - self.network.force(self.data.domain, self.side)
+        return residual if self.moving is None else residual - self.moving.force
+
+    @cached_property
+    def error(self) -> RowError:
+        """Error on the rows that count."""
+        error, robust = self.error_on(self.data.counted), self.data.robust
+        return (
+            error if robust is None else replace(error, weight=np.where(robust.outliers, 0.0, error.weight))
+        )
+
+    def error_on(self, samples: Float1D | None) -> RowError:
+        """Error on rows that stand for so many samples (n,), or 1; rows without a motion do not count."""
+        weight = np.ones(len(self.residual)) if samples is None else samples
+        if self.moving is not None:
+            weight = weight * self.moving.known
+        if self.strokes is not None:
+            weight = weight * self.strokes.known
+        return RowError(self.residual, self.data.force, weight, self.data.within)
 
 
 @dataclass
@@ -120,33 +327,42 @@ class Report:
     sign_findings: list[Finding] = field(default_factory=list)
     """Those on the signs of position and force"""
 
+    def replaces(self, other: Report, note: str) -> None:
+        """Begins with the path of a climb that this one replaces, and with the reason."""
+        self.path[:0] = other.path
+        self.notes.insert(0, note)
+
+    def add(self, other: Report, heading: str) -> None:
+        """Adds the path and the notes of a climb that takes the place of this one, and takes its findings."""
+        self.path += other.path
+        self.notes += [heading, *other.notes]
+        self.findings, self.sign_findings = other.findings, other.sign_findings
+
 
 class Samples:
-    """The rows of one recording in the unit box: compressed for fits, and held out to judge on.
+    """The rows of one recording: compressed for fits, and held out to judge on.
 
     Parameters
     ----------
-    box : (n, d)
-        Positions in the unit box.
-    force : (n,)
-    held_out : (n,)
-        Rows that are held out.
-    compressor : Compressor
-        Of the same rows.
+    data : Rows
     options : IdentifyOptions
+    cells : int
+        Distinct positions that are kept apart.
     """
 
-    def __init__(
-        self,
-        box: Float2D,
-        force: Float1D,
-        held_out: NDArray[np.bool_],
-        compressor: Compressor,
-        options: IdentifyOptions,
-    ) -> None:
-        self.box, self.force = box, force
-        self._held_out, self._compressor = held_out, compressor
-        self._resolved_by, self._periodic = options.search.resolved_by, options.period is not None
+    def __init__(self, data: Rows, options: IdentifyOptions, cells: int) -> None:
+        self.data, self._held_out = data, data.held_out()
+        self._compressor = Compressor(
+            data.box,
+            data.force,
+            weight=data.weight,
+            max_positions=cells,
+            within=data.within,
+            limits=data.limits,
+        )
+        self.used = self._compressor.rows_used
+        """Rows that stand for all"""
+        self._resolved_by = options.search.resolved_by
         self._for_criterion = options.criterion in ON_HELD_OUT_ROWS
 
     def rows(self, strokes: HysteresisInput | None = None) -> Compressed:
@@ -163,7 +379,7 @@ class Samples:
             rows = self._compressor.rows(strokes.side, known)
             if not strokes.known.all():
                 rows = rows.standing_for(self._compressor.samples(only))
-        return around_seam(rows) if self._periodic else rows
+        return rows if self.data.period is None else around_seam(rows)
 
     def problem(self, rows: Compressed, strokes: HysteresisInput | None = None) -> SeparableProblem:
         """Least squares over compressed rows."""
@@ -176,7 +392,7 @@ class Samples:
         """Rows that are held out, of those whose hysteresis input is known."""
         known = strokes.known if strokes is not None else known
         rows = self._held_out if known is None else self._held_out & known
-        return HeldOutRows.of(self.box, self.force, None if strokes is None else strokes.side, rows)
+        return HeldOutRows.of(self.data.box, self.data.force, None if strokes is None else strokes.side, rows)
 
     def on_known_rows(self, below: Candidate, above: Candidate) -> Candidate:
         """The candidate below on the rows whose hysteresis input is known for the one above.
@@ -206,7 +422,7 @@ class Samples:
             compressed = self._compressor.rows(one.side, fitted)
             problem = problem_of(compressed, resolved_by=self._resolved_by)
             rows = self.held_out_rows(one.strokes, known)
-            errors.append(one.held_out_errors(problem, rows)[inside(rows.positions, self.box[fitted])])
+            errors.append(one.held_out_errors(problem, rows)[inside(rows.positions, self.data.box[fitted])])
         if len(errors[0]) < LEAST_HELD_OUT:
             return gain(*errors) if len(errors[0]) else (0.0, 0.0)
         share, error = gain(*errors)

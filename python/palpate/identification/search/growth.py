@@ -15,10 +15,9 @@ from ..._typing import Float1D
 from ..data.limits import RESOLVED
 from ..network.basis import COARSEST_CANDIDATE, LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.fitted import PathPoint
-from ..network.refinement import refine, refine_all
-from ..network.separable import SeparableProblem, Solution
+from ..network.separable import SeparableProblem, Solution, refine, refine_all
 from ..options import IdentifyOptions
-from .criteria import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
+from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
 
 PRUNE_CANDIDATES = 3

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ..network.basis import Basis
-from ..network.refinement import COARSEST
-from ..network.separable import SeparableProblem, Solution, half_solved
-from .criteria import deviance
+from ..network.separable import COARSEST, SeparableProblem, Solution, half_solved
+from .evidence import deviance
 
 DEPENDENT = 1e-5
 """Share of a candidate's squared norm that must stand outside the design for it to be a new direction: more

@@ -10,7 +10,7 @@ from palpate._core.model import wavelet_columns
 from palpate.identification.data.compression import Compressed, Compressor
 from palpate.identification.network.basis import Basis, truncated_frame
 from palpate.identification.network.separable import SeparableProblem, problem_of
-from palpate.identification.search.criteria import CRITERIA, ON_HELD_OUT_ROWS, deviance
+from palpate.identification.search.evidence import CRITERIA, ON_HELD_OUT_ROWS, deviance
 from palpate.identification.search.selection import (
     STRETCHES,
     UNLIKE,

@@ -9,9 +9,16 @@ import pytest
 from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
 from palpate.identification.network.basis import Basis, truncated_frame
-from palpate.identification.network.refinement import COARSEST, REACH, _gradient, refine, refine_all
-from palpate.identification.network.separable import SeparableProblem, problem_of
-from palpate.identification.search.criteria import criterion_of
+from palpate.identification.network.separable import (
+    COARSEST,
+    REACH,
+    SeparableProblem,
+    _gradient,
+    problem_of,
+    refine,
+    refine_all,
+)
+from palpate.identification.search.evidence import criterion_of
 from palpate.identification.search.growth import Growth
 from palpate.identification.search.selection import Library
 

@@ -13,8 +13,7 @@ from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
 from palpate.identification.data.limits import RESOLVED
 from palpate.identification.network.basis import Basis
-from palpate.identification.network.refinement import COARSEST
-from palpate.identification.network.separable import CORE, SeparableProblem, problem_of
+from palpate.identification.network.separable import COARSEST, CORE, SeparableProblem, problem_of
 from palpate.identification.search.growth import SMOOTH, WITHOUT_NOISE, WORTH_FINER, Grown, Growth
 
 OPTIONS = IdentifyOptions()

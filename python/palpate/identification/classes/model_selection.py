@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The model selection of one recording: all model classes, and the revisions that its rows may need."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..._typing import Float1D
+from ..data.limits import MOST_ORDERED, RESOLVED, correlation, independent_share, innovation_deviance
+from ..data.outliers import robust_weights, suspects
+from ..data.rows import Rows
+from ..network.separable import NOISE_WIDTHS
+from ..options import IdentifyOptions
+from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
+from .climb import VELOCITY_INPUTS, Climb, Linear, ModelClass, Network
+from .findings import USABLE_NRMSE, most_of_error, unexplained_share
+from .hysteresis import Hysteresis
+
+MOST_HALVINGS = 3
+"""Times that cells are halved at most."""
+
+DYNAMIC_ROUNDS = 2
+"""Times that the model is selected again beside velocity and mass, on ever better values of theirs."""
+
+WORTH_A_VELOCITY = 0.05
+"""Share of the squared error that velocity as an input must take away beside a constant damping: a force of
+two inputs is harder to render."""
+
+WORTH_FRICTION = 0.25
+"""The same where no constant damping was found, such as for Coulomb friction: its sign changes with that of
+the velocity."""
+
+WORTH_MORE_THAN_HYSTERESIS = 0.75
+"""The same where hysteresis was accepted, which is easier to render and certify."""
+
+CORRELATION_ROUNDS = 5
+"""Times that the correlation of noise is estimated at most."""
+
+LEAST_INDEPENDENT = 0.02
+"""Independent samples per sample below which a residual is memory or drift rather than noise [-]"""
+
+WORTH_CLIMBING = 0.8
+"""Ratio of the independent samples to those before from which the model is not selected again [-]"""
+
+LARGE_ERROR = 0.2
+"""NRMSE above which wavelets stay wide if position cannot explain most of it [-]"""
+
+LEAST_CORE = 1.0 / 64.0
+"""Half of the core of these wavelets, as a share of the travel [-]"""
+
+
+def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> Climb:
+    """Selects a model: the classes at rest, revised where the rows ask for it, then those in motion.
+
+    Cells are halved until they are fine enough. Outliers are weighed down if the loss is Huber's.
+    """
+    rows = rows.limited()
+    given, robust = rows.weight, options.loss == "huber"
+    if robust:
+        suspect = suspects(rows.box, rows.force, rows.side, given)
+        rows = replace(rows, weight=np.where(suspect, 0.0, 1.0 if given is None else given))
+    cells = options.search.max_positions * 2 ** (rows.box.shape[1] - 1)
+    found = Climb(rows, options, AT_REST, cells, on_held_out=on_held_out)
+    for _ in range(MOST_HALVINGS):
+        if not found.best.cells_too_wide():
+            break
+        found = found.again(rows, cells=2 * found.cells, keep=True)
+    if robust:
+        halved = found
+
+        def fit(weight: Float1D) -> Float1D:
+            return halved.again(replace(rows, weight=weight), keep=True).best.force_at()
+
+        weights = robust_weights(fit, found.best.force_at(), rows.force, given, suspect)
+        found = found.again(replace(rows, weight=weights.weight, robust=weights), keep=True)
+        found.report.notes.append(weights.note)
+    for revised in REVISIONS:
+        found = revised(found)
+    found.take(IN_MOTION)
+    return found
+
+
+def correlated_noise(first: Climb) -> Climb:
+    """The model selected again on fewer independent samples, if the noise is correlated in recorded order.
+
+    Wavelets that follow the noise hide part of its correlation, so that it is estimated again after each
+    selection. Of all results that one is taken whose prediction of a row, from the residual of the row
+    before, is best for its size: an unfitted structure is correlated too, but the prediction from the force
+    itself beats it.
+    """
+    data = first.data
+    if data.counted is not None or first.options.criterion in ON_HELD_OUT_ROWS:
+        return first
+    count = len(data.force)
+    first_row = max(0, (count - MOST_ORDERED) // 2)
+    rows = slice(first_row, first_row + MOST_ORDERED)
+    used = np.ones(count, dtype=bool) if data.weight is None else data.weight > 0.0
+    least = (RESOLVED * float(np.ptp(data.force))) ** 2 + np.finfo(float).tiny
+    found = []
+    current = first
+    for _ in range(CORRELATION_ROUNDS):
+        best, limits = current.best, current.data.limits
+        residual = (data.force[rows] - best.force_at(rows))[used[rows]]
+        found.append((innovation_deviance(residual, best.n_parameters, least), current))
+        share = independent_share(correlation(residual))
+        if share > WORTH_CLIMBING * limits.independent or share < LEAST_INDEPENDENT:
+            break
+        again = current.again(replace(current.data, limits=replace(limits, independent=share)))
+        note = f"the noise is correlated: {share * count:.4g} of {count} rows are independent"
+        again.report.replaces(current.report, note)
+        current = again
+    chosen = min(found, key=lambda each: each[0])[1]
+    full = first.best.stop_reason == "max_wavelets"
+    if full and 2 * chosen.best.n_wavelets > first.best.n_wavelets:
+        return first  # what so many wavelets left is unfitted structure rather than noise
+    return chosen
+
+
+def no_finer_than_explained(first: Climb) -> Climb:
+    """The model selected again with wide wavelets, if position cannot explain most of a large error.
+
+    Rows that differ for another reason, such as time during a pause, differ by as much between neighbouring
+    positions as anywhere: narrow wavelets then give slopes that the object does not have.
+    """
+    data, best = first.data, first.best
+    if data.counted is not None or len(data.names) > 1:
+        return first
+    rows = data.reported
+    force, side = data.force[rows], None if best.side is None else best.side[rows]
+    spread = float(np.std(force))
+    if best.rmse <= LARGE_ERROR * spread or best.n_wavelets == 0:
+        return first
+    error = float(np.std(force - best.force_at()[rows])) / spread
+    if unexplained_share(data.box[rows, 0], force, side) < most_of_error(error):
+        return first
+    noise = max(LEAST_CORE / NOISE_WIDTHS, data.limits.position_noise)
+    wide = first.again(replace(data, limits=replace(data.limits, position_noise=noise)))
+    wide.report.replaces(
+        first.report,
+        f"wavelets narrower than {2 * LEAST_CORE:g} of the travel were not tried: position does not explain "
+        "most of the error",
+    )
+    return wide
+
+
+class MassAndDamping(ModelClass):
+    """Mass and damping, beside a model at rest that is selected again without their force."""
+
+    @classmethod
+    def possible(cls, climb: Climb) -> bool:
+        """True if the motion may decide."""
+        return climb.motion is not None
+
+    def better(self, below: Candidate) -> Candidate:
+        climb, motion, data = self._climb, self._climb.motion, self._climb.data
+        assert motion is not None
+        values, notes = motion.accepted(below.solution.basis, below.side)
+        climb.report.notes.extend(notes)
+        best, current, names = below, climb, tuple(values)
+        for _ in range(DYNAMIC_ROUNDS):
+            if not values or min(values.values()) <= 0.0:
+                break  # a passive object has none below zero: the values of the round before stay
+            moving = motion.moving(values)
+            weight = moving.known if data.weight is None else moving.known * data.weight
+            still = replace(data, force=data.force - moving.force, weight=weight)
+            current = current.again(still, keep=current is not climb)
+            best = replace(
+                current.best,
+                model_class="velocity" if moving.mass is None else "mass and damping",
+                data=data,
+                n_parameters=current.best.n_parameters + len(values),
+                moving=moving,
+            )
+            values = motion.values(best.solution.basis, best.side, names)
+        if best is below:
+            return below
+        climb.report.add(current.report, f"without the force of {' and '.join(names)}:")
+        return climb.recorded(best)
+
+
+class Velocity(ModelClass):
+    """A network over position and velocity, where damping or friction depends on both."""
+
+    @classmethod
+    def possible(cls, climb: Climb) -> bool:
+        """True if the motion may decide; a force that repeats has one input."""
+        return climb.motion is not None and climb.data.period is None
+
+    def better(self, below: Candidate) -> Candidate:
+        """The network if it lowers the squared error by the share that it is worth, else the one below."""
+        data, report, motion, moving = self._climb.data, self._climb.report, self._climb.motion, below.moving
+        assert motion is not None
+        damped = moving is not None and moving.mass is None
+        if not (damped or below.error.nrmse > USABLE_NRMSE):
+            return below
+        residual = (data.force if moving is None else data.force - moving.force) - below.force_at()
+        worth = WORTH_A_VELOCITY if damped else WORTH_FRICTION
+        if below.strokes is not None and not damped:
+            worth = WORTH_MORE_THAN_HYSTERESIS
+        if motion.left_to_velocity(residual, below.solution.basis, friction=not damped) < worth:
+            return below
+        velocity, known = motion.velocity()
+        rows = known if data.weight is None else known & (data.weight > 0.0)
+        over_both = Rows(
+            VELOCITY_INPUTS,
+            np.column_stack([data.positions, velocity])[rows],
+            data.force[rows],
+            starts=(0,),
+            weight=None if data.weight is None else data.weight[rows],
+            notes=data.notes,
+            findings=data.findings,
+        )
+        both = select(over_both, self._climb.options)
+        before = float(np.mean(residual[rows] ** 2))
+        share = 1.0 - both.best.error.rmse**2 / before if before > 0.0 else 0.0
+        constant = moving is not None and moving.damping is not None
+        beside = "beside a constant damping" if constant else f"compared with {below.model_class}"
+        gains = (
+            f"a network over position and velocity lowers the squared error by {100 * share:.3g} % {beside}"
+        )
+        if share < worth:
+            report.path += both.report.path
+            report.notes.append(
+                f"velocity refused as an input: {gains}, it has to be {100 * worth:g} % or more"
+            )
+            return below
+        both.report.findings[:0] = report.sign_findings
+        report.add(both.report, f"velocity accepted as an input: {gains}")
+        return both.best
+
+
+AT_REST = (Linear, Network, Hysteresis)
+"""Model classes above the constant force, the simplest first, that do not depend on the motion."""
+
+REVISIONS = (correlated_noise, no_finer_than_explained)
+"""What selects a model at rest again, where its residual asks for it."""
+
+IN_MOTION = (MassAndDamping, Velocity)
+"""Model classes above them that need the motion."""
