@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the filters of the paper with matched ones on moving objects with known truth.
+"""Compares the filters of the paper with matched filters on moving objects with known force.
 
 python bench/identification/filters.py [--json FILE]
 

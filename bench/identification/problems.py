@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Six identification problems with known truth: noisy rows for the fit, noise-free rows for the test."""
+"""Provides six identification problems with known force: noisy rows for the fit, exact rows for the test."""
 
 from __future__ import annotations
 

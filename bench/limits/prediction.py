@@ -67,7 +67,7 @@ class PredictionGain:
 
     @property
     def name(self) -> str:
-        """The number of samples, or "none"."""
+        """Returns the number of samples, or "none"."""
         return str(self.samples) if self.samples else "none"
 
     def as_json(self) -> dict[str, Any]:

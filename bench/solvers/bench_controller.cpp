@@ -19,7 +19,7 @@
 
 namespace {
 
-/// Plays a motion back repeatedly.
+/// Plays back a motion repeatedly.
 class Playback {
   public:
     explicit Playback(std::vector<double> motion) : motion_{std::move(motion)} {}

@@ -28,7 +28,7 @@ from palpate.planning import DeviceProfile, Plan, force_at, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
-MODEL = ROOT / "bench" / "click_and_wall.json"
+MODEL = ROOT / "bench" / "solvers" / "click_and_wall.json"
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) >= 100
 SWEEP_S = 2.0
@@ -48,7 +48,7 @@ RENDER = """
 name=$1
 model=$2
 shift 2
-palpate-control /in/$model --device usb --record $name.csv --json "$@" > $name.json 2> $name.told
+palpate-control /in/$model --device usb --record $name.csv --json "$@" > $name.json 2> $name.stderr
 echo $? > $name.code
 """
 FACTS = """
@@ -73,7 +73,7 @@ class Told:
 
     def summary(self, run: str) -> dict[str, Any]:
         told = self.text(f"{run}.json")
-        assert told, self.text(f"{run}.told")
+        assert told, self.text(f"{run}.stderr")
         summary: dict[str, Any] = json.loads(told)
         return summary
 
@@ -142,7 +142,7 @@ def test_loop_runs_at_1000_hz(told: Told, capsys: pytest.CaptureFixture[str]) ->
             f"period {summary['period']}, round trip {summary['usb']['round_trip']}, "
             f"delay {summary['usb']['delay_samples']}, {summary['lost_samples']} samples lost"
         )
-    assert told.text("whole.code").strip() == "0", told.text("whole.told")
+    assert told.text("whole.code").strip() == "0", told.text("whole.stderr")
     assert summary["rate_hz"] == pytest.approx(1000.0, rel=5e-3)
     assert summary["lost_samples"] == summary["repeated_samples"] == 0
     assert summary["ticks"] == summary["recorded"] == round(1e3 * DURATION_S)
@@ -184,7 +184,7 @@ def test_unplugging_ends_with_a_fault_and_a_complete_record_and_replugging_works
     assert summary["ticks"] == pytest.approx(UNPLUGGED_AT, abs=10)
     assert told.text("left") == ""
     assert "USB disconnect, device number" in told.text("dmesg")
-    assert told.text("again.code").strip() == "0", told.text("again.told")
+    assert told.text("again.code").strip() == "0", told.text("again.stderr")
     assert told.summary("again")["ticks"] == 1000
 
 
@@ -193,7 +193,7 @@ def test_low_rate_stops_a_certified_run_within_a_second(told: Told) -> None:
         summary = told.summary(run)
         assert told.text(f"{run}.code").strip() == "1"
         assert "did not hold its rate" in summary["ended"]
-        assert "did not hold its rate" in told.text(f"{run}.told")
+        assert "did not hold its rate" in told.text(f"{run}.stderr")
         assert summary["ticks"] <= ticks_before + rate_hz + 1
         assert len(told.table(f"{run}.csv")) == summary["ticks"]
 
@@ -202,7 +202,7 @@ def test_low_rate_of_an_uncertified_run_is_reported_within_a_second(told: Told) 
     summary = told.summary("told_slow")
     assert summary["ticks"] == 900  # in one second
     assert told.text("told_slow.code").strip() == "0"
-    warned = re.search(r"warning: the loop runs at ([0-9.]+) Hz", told.text("told_slow.told"))
+    warned = re.search(r"warning: the loop runs at ([0-9.]+) Hz", told.text("told_slow.stderr"))
     assert warned
     assert float(warned[1]) == pytest.approx(900.0, rel=5e-3)
     assert summary["rate_hz"] == pytest.approx(900.0, rel=5e-3)

@@ -2,9 +2,8 @@
 """Plans how a model is rendered on a device, and simulates the plan.
 
 Model and device -> candidate structures, the simplest first (`candidates`, with `limited_network` where the
-device is too weak) -> certificate -> force error (`static_error`) -> `Plan`, or the reasons of the refusal
-with the device property that would help (`device_needs`). `search` runs these steps. `simulation` renders a
-plan in virtual time.
+device is too weak) -> certificate -> `Plan` with its force error, or the reasons of the refusal with the
+device property that would help. `search` runs these steps. `simulation` renders a plan in virtual time.
 """
 
 from .. import _core
@@ -13,7 +12,7 @@ from .._core.simulation import Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
-from .plan import ACCEPTED_FORCE_ERROR, Plan, describe
+from .plan import ACCEPTED_FORCE_ERROR, Plan, StaticForceError, describe
 from .simulation import (
     Comparison,
     ForceError,
@@ -25,7 +24,6 @@ from .simulation import (
     rig_for,
     simulate,
 )
-from .static_error import StaticForceError
 
 __all__ = [
     "ACCEPTED_FORCE_ERROR",

@@ -28,7 +28,7 @@ from .limited_network import (
     scale_hysteresis,
     sliding_slopes,
 )
-from .static_error import static_force_error, with_network
+from .plan import static_force_error, with_network
 
 _COUPLING_DAMPING = 0.2
 """Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""

@@ -104,3 +104,30 @@ class DeviceProfile(_core.device.DeviceProfile):
         with replacing(file) as temporary:
             temporary.write_text(comment + tomli_w.dumps(self.to_dict()), encoding="utf-8")
         return file
+
+
+def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) -> _core.device.DeviceProfile:
+    """A device by object, by the name of an example profile, or by the path of its TOML file.
+
+    Raises
+    ------
+    InputError
+        It is none of these; the message names the argument, or file and field.
+    """
+    if isinstance(device, _core.device.DeviceProfile):
+        return device
+    if not isinstance(device, (str, os.PathLike)):
+        raise InputError(
+            f"device is a {type(device).__name__}: must be a DeviceProfile, the path of its TOML file, or "
+            f"{_example_names()}"
+        )
+    file = profile_file(os.fspath(device))
+    if not file.exists() and file == Path(file.name) and not file.suffix:
+        raise InputError(
+            f"device is '{device}': there is no such file, and no such example; {_example_names()}"
+        )
+    return DeviceProfile.load(file)
+
+
+def _example_names() -> str:
+    return f"one of the examples {', '.join(example_profiles())}"

@@ -27,7 +27,7 @@ from ..identification.network.basis import Basis
 from ..identification.network.constraints import domain_bounds, impose, slope_limited
 from ..identification.network.fitted import FittedNetwork
 from ..identification.network.separable import Block, SeparableProblem
-from .static_error import SAMPLES, strokes, with_network
+from .plan import SAMPLES, strokes, with_network
 
 LONGEST_PLAY = 0.1
 """Largest play radius [share of the travel]: a wider one is felt as play, not as hysteresis."""

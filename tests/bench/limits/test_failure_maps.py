@@ -19,7 +19,7 @@ NAMES = [each["name"] for each in NUMBERS["maps"]]
 
 
 def printed(*names: str) -> dict[str, Any]:
-    """Output of the program with some of its maps."""
+    """Returns the output of the program with some of its maps."""
     maps = [each for each in NUMBERS["maps"] if each["name"] in names]
     return {"maps": maps, "guards": NUMBERS["guards"]}
 

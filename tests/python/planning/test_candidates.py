@@ -13,7 +13,7 @@ from palpate import DeviceProfile, Model, Scheme, plan
 from palpate._core.stability import balancing_shift, certify
 from palpate.planning import profile_file
 from palpate.planning.limited_network import limit_slopes, renderable_slopes
-from palpate.planning.static_error import static_force_error
+from palpate.planning.plan import static_force_error
 
 TURN = 2.0 * math.pi
 BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))
