@@ -74,7 +74,7 @@ class SearchOptions:
     """Play radii tried for hysteresis where a recording has time but no direction; the best one between the
     least and the largest is found [share of the travel]"""
     contact_share: float = 0.02
-    """Share of the force's range; below it |f(lower)| means that the object is left there: "free" below [-]"""
+    """Share of the force's range; with |f(lower)| below it the object is left there: "free" below [-]"""
 
     def __post_init__(self) -> None:
         _require(self)

@@ -247,7 +247,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
 
 
 def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
-    """The nearest force (k,) with slope within [low, high]: alternating isotonic regressions (Dykstra 1983)."""
+    """Nearest force (k,) with slope within [low, high]: alternating isotonic regressions (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
     for _ in range(ALTERNATIONS):
