@@ -188,6 +188,15 @@ def test_the_umbrella_header_holds_every_header_but_the_leaves() -> None:
     assert headers - leaves - {"palpate/palpate.hpp"} == reached
 
 
+def test_a_cpp_test_is_named_after_a_header_of_its_folder() -> None:
+    tests = ROOT / "tests" / "cpp"
+    files = sorted(tests.rglob("test_*.cpp"))
+    for file in files:
+        header = file.relative_to(tests).with_name(f"{file.stem.removeprefix('test_')}.hpp")
+        assert any((folder / header).exists() for folder in (HEADERS, tests, ROOT)), file
+    assert len({file.name for file in files}) == len(files)
+
+
 def test_bindings_include_pybind11_and_our_headers_only() -> None:
     for path in sorted((ROOT / "cpp" / "bindings").glob("*.?pp")):
         foreign = {
