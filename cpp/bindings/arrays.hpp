@@ -15,6 +15,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include "palpate/fields/field_table.hpp"
 #include "palpate/model/parameters.hpp"
 
 namespace palpate::bindings {
@@ -133,8 +134,7 @@ template <class T>
 }
 
 inline void require_period(double period_s) {
-    palpate::detail::require(std::isfinite(period_s) && period_s > 0.0,
-                             "period_s is " + std::to_string(period_s) + ", must be > 0");
+    require_field(obeys(period_s, Rule::Positive), "period_s", period_s, text(Rule::Positive));
 }
 
 }  // namespace palpate::bindings

@@ -11,7 +11,7 @@ void bind_device(py::module_& module) {
     py::class_<DeviceProfile> type(
         module, "DeviceProfile",
         "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.");
-    bind_fields(type, [](const DeviceProfile& made) { validate(made); });
+    bind_fields(type, true, [](const DeviceProfile& made) { validate(made); });
     type.def_property_readonly("late_samples", &DeviceProfile::late_samples,
                                "Smallest number of whole samples that is not shorter than the delay.")
         .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,

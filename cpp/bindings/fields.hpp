@@ -6,7 +6,6 @@
 #include <tuple>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -14,55 +13,6 @@
 #include "palpate/fields/field_table.hpp"
 
 namespace palpate::bindings {
-
-/// Defines pickling, copying, comparison, hash and repr of a class from one list of names: the keyword arguments of its
-/// constructor, which are also its attributes. `with_repr` is false for a class with a shorter repr. An instance of a
-/// Python subclass with the same constructor keeps its type.
-template <class T>
-void define_by_fields(pybind11::class_<T>& type, const std::vector<std::string>& fields,
-                      bool with_repr = true) {
-    namespace py = pybind11;
-    const auto values = [fields](const py::object& self) {
-        py::dict given;
-        for (const std::string& name : fields) {
-            given[py::str(name)] = self.attr(name.c_str());
-        }
-        return given;
-    };
-    type.def("__reduce__", [values](const py::object& self) {
-        const py::object rebuild = py::module_::import("functools").attr("partial");
-        return py::make_tuple(rebuild(py::type::of(self), **values(self)), py::tuple());
-    });
-    type.def("__eq__", [values](const py::object& self, const py::object& other) -> py::object {
-        if (!py::isinstance<T>(other)) {
-            return py::reinterpret_borrow<py::object>(Py_NotImplemented);
-        }
-        return py::bool_(values(self).equal(values(other)));
-    });
-    type.def("__hash__", [values](const py::object& self) {
-        py::list items;
-        const py::dict given = values(self);
-        for (const auto& [name, value] : given) {
-            items.append(py::isinstance<py::list>(value)
-                             ? py::object(py::tuple(py::reinterpret_borrow<py::list>(value)))
-                             : py::reinterpret_borrow<py::object>(value));
-        }
-        return py::hash(py::tuple(items));
-    });
-    if (!with_repr) {
-        return;
-    }
-    type.def("__repr__", [values](const py::object& self) {
-        std::string text = py::type::of(self).attr("__name__").cast<std::string>() + "(";
-        const char* comma = "";
-        const py::dict given = values(self);
-        for (const auto& [name, value] : given) {
-            text += comma + std::string(py::str(name)) + "=" + std::string(py::repr(value));
-            comma = ", ";
-        }
-        return text + ")";
-    });
-}
 
 /// Type of a field in Python: str for an enumeration.
 template <class V>
@@ -102,10 +52,21 @@ auto argument_of(const T& standard) {
     }
 }
 
-/// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, and the methods of
-/// `define_by_fields`. `check` throws if the fields contradict each other.
-template <class T, std::size_t required = 0, class Check>
-void bind_fields(pybind11::class_<T>& type, Check check, bool with_repr = true) {
+/// All fields by name.
+template <class T>
+pybind11::dict dict_of(const T& object) {
+    pybind11::dict values;
+    for_each_field<T>([&](const auto& field) { values[field.name] = to_python(field.of(object)); });
+    return values;
+}
+
+/// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, pickling, copying, comparison, hash
+/// and repr. `with_repr` is false for a class with a shorter repr; `check` throws if the fields contradict each other. An
+/// instance of a Python subclass with the same constructor keeps its type.
+template <class T, std::size_t required = 0>
+void bind_fields(
+    pybind11::class_<T>& type, bool with_repr = true,
+    void (*check)(const std::type_identity_t<T>&) = [](const T&) {}) {
     namespace py = pybind11;
     constexpr std::size_t n = std::tuple_size_v<std::remove_cvref_t<decltype(fields_of<T>)>>;
     const T standard{};
@@ -118,31 +79,49 @@ void bind_fields(pybind11::class_<T>& type, Check check, bool with_repr = true) 
                  }),
                  py::kw_only(), argument_of<T, k, required>(standard)...);
     }(std::make_index_sequence<n>{});
-    std::vector<std::string> names;
     for_each_field<T>([&](const auto& field) {
-        names.emplace_back(field.name);
         type.def_property_readonly(
             field.name, [field](const T& object) { return to_python(field.of(object)); }, field.doc);
     });
     type.def(
         "to_dict",
         [](const T& object) {
-            py::dict values;
+            py::dict values = dict_of(object);
             for_each_field<T>([&](const auto& field) {
-                if (const py::object value = py::cast(to_python(field.of(object)));
-                    field.stored && !value.is_none()) {
-                    values[field.name] = value;
+                if (!field.stored || values[field.name].is_none()) {
+                    values.attr("pop")(field.name);
                 }
             });
             return values;
         },
         "The fields that are written to a file, by name; without optional ones that are not given.");
-    define_by_fields(type, names, with_repr);
-}
-
-template <class T, std::size_t required = 0>
-void bind_fields(pybind11::class_<T>& type, bool with_repr = true) {
-    bind_fields<T, required>(type, [](const T&) {}, with_repr);
+    type.def("__reduce__", [](const py::object& self) {
+        const py::object rebuild = py::module_::import("functools").attr("partial");
+        return py::make_tuple(rebuild(py::type::of(self), **dict_of(self.cast<const T&>())), py::tuple());
+    });
+    type.def("__eq__", [](const T& self, const py::object& other) -> py::object {
+        return py::isinstance<T>(other) ? py::bool_(dict_of(self).equal(dict_of(other.cast<const T&>())))
+                                        : py::reinterpret_borrow<py::object>(Py_NotImplemented);
+    });
+    type.def("__hash__", [](const T& self) {
+        py::list items;
+        for (const auto& [name, value] : dict_of(self)) {
+            items.append(py::isinstance<py::list>(value)
+                             ? py::object(py::tuple(py::reinterpret_borrow<py::list>(value)))
+                             : py::reinterpret_borrow<py::object>(value));
+        }
+        return py::hash(py::tuple(items));
+    });
+    if (with_repr) {
+        type.def("__repr__", [](const py::object& self) {
+            std::string text;
+            for (const auto& [name, value] : dict_of(self.cast<const T&>())) {
+                text += (text.empty() ? "" : ", ") + std::string(py::str(name)) + "=" +
+                        std::string(py::repr(value));
+            }
+            return py::type::of(self).attr("__name__").cast<std::string>() + "(" + text + ")";
+        });
+    }
 }
 
 }  // namespace palpate::bindings

@@ -49,7 +49,8 @@ py::object to_python(const Json& value) {
     }
 }
 
-/// An integer of more than 64 bits becomes a double, as it does in a file; infinite if none is large enough.
+/// Converts a Python value to JSON. An integer of more than 64 bits becomes a double, as in a file; infinity if it is
+/// too large.
 Json to_json(const py::handle& value, int depth = 0) {
     if (depth > deepest_json) {
         throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +

@@ -20,7 +20,7 @@ using namespace py::literals;
 
 namespace {
 
-/// The element k of an optional argument that is one value for all samples or one for each.
+/// An optional argument with one value for all samples, or one value for each sample.
 class Broadcast {
   public:
     Broadcast(const std::optional<Array>& array, py::ssize_t samples, const char* name) {

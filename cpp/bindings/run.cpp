@@ -118,7 +118,7 @@ py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord
     return values;
 }
 
-/// Sets the options from keywords; checks what no other function checks.
+/// Sets the options from keywords and checks those that other functions do not check.
 template <class T>
 void set_options(T& options, const py::kwargs& given) {
     set_fields(options, given);

@@ -13,7 +13,7 @@
 
 namespace palpate::bindings {
 
-/// The value of a keyword for a field of type V; an enumeration is a str in Python.
+/// Returns the value of a keyword for a field of type V; an enumeration is a str in Python.
 template <class V>
 [[nodiscard]] V value_of(const pybind11::handle& given, const char* field) {
     if constexpr (requires(V value) { requires HasWords<typename V::value_type>; }) {
@@ -23,8 +23,8 @@ template <class V>
     }
 }
 
-/// Sets the fields of a settings struct by keyword, as its table names them; None leaves the default. TypeError for an
-/// unknown keyword, InputError for a value of a wrong type.
+/// Sets the fields of a settings struct by the keywords in its table; None keeps the default. Raises TypeError for an
+/// unknown keyword and InputError for a value of a wrong type.
 template <HasFields T>
 void set_fields(T& settings, const pybind11::kwargs& given) {
     namespace py = pybind11;

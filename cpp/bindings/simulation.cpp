@@ -59,7 +59,7 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
         "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
 
-/// Arrays of what `render(samples, each)` gives along a recording (n,).
+/// Returns the columns of `render(samples, each)` along a recording (n,).
 template <class Render>
 py::dict rendered_along(const Array& samples, const char* name, double period_s, Render render) {
     require_vector(samples, name);

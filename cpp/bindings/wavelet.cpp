@@ -124,7 +124,7 @@ using Columns = py::array_t<double, py::array::f_style>;
     return Columns({static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
 }
 
-/// value(hats, wavelet, k in its block) at every sample and wavelet.
+/// Returns value(hats, wavelet, k in its block) at every sample and wavelet.
 template <class Value>
 Columns filled(const Frame& frame, Value value) {
     auto result = columns(frame.samples, frame.wavelets);

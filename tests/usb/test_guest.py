@@ -28,7 +28,7 @@ from palpate.planning import DeviceProfile, Plan, force_at, simulate
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
-MODEL = ROOT / "bench" / "click_and_wall.json"
+MODEL = ROOT / "bench" / "solvers" / "click_and_wall.json"
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 LONG = int(os.environ.get("PALPATE_TEST_SCALE", "1")) >= 100
 SWEEP_S = 2.0

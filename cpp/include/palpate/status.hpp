@@ -25,6 +25,7 @@ enum class Status : std::uint8_t {
     Softened,
 };
 
+/// Word and meaning of a status.
 struct StatusText {
     const char* word;
     const char* meaning;

@@ -4,7 +4,7 @@ Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class DeviceProfile:
     """
     What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
@@ -21,17 +21,12 @@ class DeviceProfile:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name.
+        The fields that are written to a file, by name; without optional ones that are not given.
         """
     @property
     def coulomb_friction(self) -> float:
         """
         f_c, physical [N or N*m]; at most the true one.
-        """
-    @property
-    def delay_fraction(self) -> float:
-        """
-        tau: rest of the delay [samples].
         """
     @property
     def delay_s(self) -> float:
@@ -92,11 +87,6 @@ class DeviceProfile:
     def viscous_damping(self) -> float:
         """
         b, physical [N*s/m or N*m*s/rad]; at most the true one.
-        """
-    @property
-    def whole_delay_samples(self) -> int:
-        """
-        n: number of whole samples in the delay.
         """
 class UsbRequest:
     """
@@ -160,6 +150,10 @@ def decode_info(data: bytes) -> dict:
     
     firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, transducer,
     measures_velocity, uid.
+    """
+def usb_cause(code: typing.SupportsInt | typing.SupportsIndex) -> str:
+    """
+    Cause and cure for an error code of libusb; empty for a code that states no cause.
     """
 longest_watchdog_ms: int = 1000
 shortest_watchdog_ms: int = 2

@@ -3,11 +3,12 @@
 Model files.
 """
 from __future__ import annotations
+import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
 import typing
-__all__: list[str] = ['check_model', 'checked_certificate', 'read_json', 'scheme_of']
+__all__: list[str] = ['check_model', 'checked_certificate', 'profile_of', 'read_json', 'scheme_of']
 def check_model(content: typing.Any) -> None:
     """
     Checks the content of a model file; a certificate is computed again. ValueError: the path of the
@@ -17,6 +18,11 @@ def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any,
     """
     Certificate of a model file, computed again from the rendered model and found the same. ValueError:
     the field that differs, its value, what would be right.
+    """
+def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
+    """
+    Device profile of the content of a file. ValueError: the first wrong field, its value, what would
+    be right.
     """
 def read_json(path: str) -> typing.Any:
     """

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ForceModel', 'fingerprint', 'mexican_hat', 'mexican_hat_curvature', 'mexican_hat_integral', 'mexican_hat_jerk', 'mexican_hat_slope', 'play', 'slope_bounds', 'value_bounds', 'wavelet_columns', 'wavelet_curvature_bound', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_jerk_bound', 'wavelet_slope_bound', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['ForceModel', 'derivative_bounds', 'fingerprint', 'play', 'slope_bounds', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
 class ForceModel:
     """
     A force identified over d inputs, with its domain and continuations.
@@ -46,10 +46,6 @@ class ForceModel:
         """
         The same for an array of positions, of any shape.
         """
-    def loss_range(self) -> tuple[float, float]:
-        """
-        Proved (smallest, largest) h inside the domain; within 1 % of the largest.
-        """
     def play(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         State of the play operator along a motion (n,), started at rest unless told otherwise.
@@ -58,10 +54,6 @@ class ForceModel:
         """
         Force at X (n, d), (n,); a hysteresis model takes the direction as one more column. A row with a
         value that is not finite gives NaN.
-        """
-    def require_slopes_within(self, least: typing.SupportsFloat | typing.SupportsIndex, largest: typing.SupportsFloat | typing.SupportsIndex) -> None:
-        """
-        ValueError if stored slope bounds are narrower than the slopes of this model.
         """
     @typing.overload
     def slope(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -134,29 +126,14 @@ class ForceModel:
     @property
     def weight_hysteresis(self) -> numpy.typing.NDArray[numpy.float64] | None:
         ...
+def derivative_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], order: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Proved bounds (k,) of |f^(order)| of a network of one input, up to the ninth, over the cells
+    [lower, upper], each (k,).
+    """
 def fingerprint(model: ForceModel) -> str:
     """
     16 hexadecimal digits that change with every number of which the model's force is made.
-    """
-def mexican_hat(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    """
-    The Mexican hat psi(u) = (u^2 - 1) exp(-u^2 / 2), element by element.
-    """
-def mexican_hat_curvature(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    """
-    psi''(u) = (u^4 - 6u^2 + 3) exp(-u^2 / 2).
-    """
-def mexican_hat_integral(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    """
-    An antiderivative of psi: -u exp(-u^2 / 2).
-    """
-def mexican_hat_jerk(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    """
-    psi'''(u) = (-u^5 + 10u^3 - 15u) exp(-u^2 / 2).
-    """
-def mexican_hat_slope(u: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
-    """
-    psi'(u) = (3u - u^3) exp(-u^2 / 2).
     """
 def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radius: typing.SupportsFloat | typing.SupportsIndex, start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -167,11 +144,6 @@ def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     """
     Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`
     times max|f'| wider than the true range.
-    """
-def value_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
-    """
-    Proved (smallest, largest) value of a network of one input over [lower, upper], at most `relative`
-    times max|f| wider than the true range.
     """
 def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -197,6 +169,3 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
     Derivatives of the wavelet columns by steps without a unit, d log(alpha) and alpha d(beta):
     (n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.
     """
-wavelet_curvature_bound: float = 3.0
-wavelet_jerk_bound: float = 5.7831
-wavelet_slope_bound: float = 1.3801190462

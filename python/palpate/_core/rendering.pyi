@@ -5,7 +5,7 @@ Structures between a model and a device.
 from __future__ import annotations
 import palpate._core.model
 import typing
-__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_object', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
+__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
 class Scheme:
     """
     How a model is rendered: the structure and its numbers, SI units.
@@ -27,7 +27,7 @@ class Scheme:
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name.
+        The fields that are written to a file, by name; without optional ones that are not given.
         """
     def validate(self, model: palpate._core.model.ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
@@ -87,11 +87,6 @@ class Scheme:
 def default_play_radius(model: palpate._core.model.ForceModel, encoder_step: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Play radius of a model that leaves it to the rendering, else 0.
-    """
-def explicit_object(limit: typing.SupportsFloat | typing.SupportsIndex, *, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex, coupling_damping: typing.SupportsFloat | typing.SupportsIndex, ratio: typing.SupportsFloat | typing.SupportsIndex, period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[float, float]:
-    """
-    (mass, damping) of the object with this slope limit in the explicit structure, with a damping of
-    ratio * mass / period_s: the inverse of explicit_slope_limit.
     """
 def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
     """

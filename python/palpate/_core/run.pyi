@@ -8,7 +8,7 @@ import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
 import typing
-__all__: list[str] = ['LoopSettings', 'measure', 'render', 'usual_telemetry_hz']
+__all__: list[str] = ['LoopSettings', 'measure', 'render', 'smallest_domain_share', 'tolerated_change', 'usual_telemetry_hz']
 class LoopSettings:
     """
     Default rate, duration and limits of a session.
@@ -52,4 +52,6 @@ def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.
     Returns the summary by name, its lines for a person under `lines`. InputError where it is refused
     before anything moves.
     """
+smallest_domain_share: float = 0.1
+tolerated_change: float = 0.01
 usual_telemetry_hz: float = 50.0

@@ -10,7 +10,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Hand', 'TestRig', 'force_driven', 'force_error', 'most_simulated_ticks', 'motion_driven', 'rig_for', 'simulate']
+__all__: list[str] = ['Hand', 'TestRig', 'force_driven', 'force_error', 'motion_driven', 'rig_for', 'simulate']
 class Hand:
     """
     A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.
@@ -25,6 +25,10 @@ class Hand:
         ...
     def __repr__(self) -> str:
         ...
+    def to_dict(self) -> dict:
+        """
+        The fields that are written to a file, by name; without optional ones that are not given.
+        """
     @property
     def damping(self) -> float:
         """
@@ -33,12 +37,12 @@ class Hand:
     @property
     def frequency_hz(self) -> float:
         """
-        [Hz]
+        Sweeps a second [Hz].
         """
     @property
     def lower(self) -> float:
         """
-        [m or rad]
+        Least target [m or rad].
         """
     @property
     def stiffness(self) -> float:
@@ -48,7 +52,7 @@ class Hand:
     @property
     def upper(self) -> float:
         """
-        [m or rad]
+        Largest target [m or rad].
         """
 class TestRig:
     """
@@ -67,6 +71,10 @@ class TestRig:
     def scheme(self, model: palpate._core.model.ForceModel, **kwargs) -> palpate._core.rendering.Scheme:
         """
         Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the model's scale.
+        """
+    def to_dict(self) -> dict:
+        """
+        The fields that are written to a file, by name; without optional ones that are not given.
         """
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
@@ -110,11 +118,10 @@ def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.render
     """
     The model rendered on a simulated device held by a simulated hand, in virtual time.
     The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. Ctrl-C
-    ends it as in Python; ValueError for more than most_simulated_ticks.
+    ends it as in Python; ValueError for more than 3 600 000 ticks.
     
     Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and
     handle_end (the true handle when sampled, and in the middle and at the end of the tick that holds the
     force), environment_position, force (commanded), applied (at the end of the tick), mean_applied (over
     the tick), evaluations, status, extrapolated.
     """
-most_simulated_ticks: int = 3600000

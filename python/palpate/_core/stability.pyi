@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'balancing_shift', 'certify', 'certify_bounds', 'device_difference', 'felt_slope', 'force_bounds', 'narrowest_play', 'renderable_slopes', 'steepest_stick', 'stiffest_coupling']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'balancing_shift', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'felt_slope', 'force_bounds', 'narrowest_play', 'renderable_slopes', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
 class ForceBounds:
     """
     Proved bounds of a force over every position that can be reached, continuations included.
@@ -27,7 +27,7 @@ class ForceBounds:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name.
+        The fields that are written to a file, by name; without optional ones that are not given.
         """
     @property
     def drag(self) -> float:
@@ -95,7 +95,7 @@ class Inequality:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name.
+        The fields that are written to a file, by name; without optional ones that are not given.
         """
     @property
     def formula(self) -> str:
@@ -165,7 +165,7 @@ class Certificate:
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name.
+        The fields that are written to a file, by name; without optional ones that are not given.
         """
     @property
     def bounds(self) -> ForceBounds:
@@ -236,6 +236,12 @@ def device_difference(certified: palpate._core.device.DeviceProfile, device: pal
     """
     The first field in which a device is not the certified one, as a sentence; empty where it is.
     """
+def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProfile, **kwargs) -> palpate._core.rendering.Scheme:
+    """
+    Explicit structure with the stiffest coupling, then the least object damping, for which it is stable; the
+    last one tried if none is. mass, damping, coupling_stiffness, coupling_damping and play_radius by
+    keyword, None: chosen.
+    """
 def felt_slope(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.
@@ -262,8 +268,9 @@ def steepest_stick(device: palpate._core.device.DeviceProfile) -> float:
     """
     Slope h / r that leaves half of what the device holds to sliding.
     """
-def stiffest_coupling(*, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+def stiffest_coupling(*, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> float:
     """
     Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
     `damping` is B_c; `falling` the steepest fall of the object's force.
     """
+usual_coupling_share: float = 0.95

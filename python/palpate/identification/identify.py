@@ -20,7 +20,7 @@ from ..recording.reading import Given, recordings_from
 from ..verdict import Verdict
 from .classes.climb import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
-from .classes.selection import select
+from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_isolated
 from .data.rows import Rows, require_in_range, require_usable, rows_of

@@ -18,7 +18,7 @@ from ..arguments import shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
-from .classes.selection import select
+from .classes.model_selection import select
 from .data.compression import held_out_rows
 from .data.limits import ForceScale, distinct_rows
 from .data.rows import LARGEST, Rows

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/model/derivatives.hpp"
+
 namespace palpate {
 namespace {
 
@@ -35,7 +37,7 @@ TEST(Wavelet, SlopeHasItsBoundAtTheSteepestPoint) {
     const double steepest = std::sqrt(3.0 - std::sqrt(6.0));
     EXPECT_NEAR(steepest, 0.741964, 5e-7);
     EXPECT_NEAR(mexican_hat(steepest).slope, 1.3801190461, 1e-10);
-    EXPECT_LE(mexican_hat(steepest).slope, wavelet_slope_bound);
+    EXPECT_LE(mexican_hat(steepest).slope, detail::hat_suprema[1]);
 }
 
 // spec section 1: "|psi''| <= 3 (at 0); |psi'''| <= 5.7831"
@@ -49,10 +51,10 @@ TEST(Wavelet, DerivativesStayWithinTheirBounds) {
         curvature = std::max(curvature, std::abs(mexican_hat_curvature(u)));
         jerk = std::max(jerk, std::abs(mexican_hat_jerk(u)));
     }
-    EXPECT_LE(slope, wavelet_slope_bound);
+    EXPECT_LE(slope, detail::hat_suprema[1]);
     EXPECT_NEAR(slope, 1.38012, 5e-6);
-    EXPECT_DOUBLE_EQ(curvature, wavelet_curvature_bound);
-    EXPECT_LE(jerk, wavelet_jerk_bound);
+    EXPECT_DOUBLE_EQ(curvature, detail::hat_suprema[2]);
+    EXPECT_LE(jerk, detail::hat_suprema[3]);
     EXPECT_NEAR(jerk, 5.7831, 5e-5);
 }
 

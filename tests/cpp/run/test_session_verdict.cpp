@@ -15,8 +15,7 @@ namespace {
 
 /// A session of 1000 punctual ticks over its whole domain.
 struct Judged {
-    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // on the heap, because it is
-                                                                                // large
+    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // large, so on the heap
     LoopSettings settings;
     RecordSinks sinks;
     SessionExpectation expected{false, 1e-3, {0.0, 1.0}, "rad", {}};

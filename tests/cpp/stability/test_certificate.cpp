@@ -397,7 +397,7 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
         const DeviceProfile device = smooth(std::exp(test::uniform(random, -4.0, 0.0)));
         const Scheme chosen = explicit_scheme(bounds, device, {});
         if (!holds(bounds, chosen, chosen.coupling, device)) {
-            continue;  // none of those tried is stable
+            continue;  // no tried object is stable
         }
         ++stable;
         EXPECT_LE(chosen.coupling.stiffness, 0.9 * stiffest_coupling(0.0, 0.0, device));

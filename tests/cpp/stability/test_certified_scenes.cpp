@@ -119,8 +119,7 @@ Scene random_scene_of_velocity(test::Random& random) {
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 2.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    network.linear[1] = test::uniform(random, -0.2, 0.2);  // an object may push, because the bound uses the
-                                                           // absolute value
+    network.linear[1] = test::uniform(random, -0.2, 0.2);  // also an object that pushes
     const double slowest = random() % 4 == 0 ? test::uniform(random, 0.0, 0.1) : -fastest;
     Scene scene{
         ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}), {}, {}};

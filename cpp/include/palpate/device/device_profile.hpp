@@ -89,13 +89,13 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     Field<&DeviceProfile::jitter_s>{
         "jitter_s", "How much longer than T the time between two samples can get [s].", Rule::NotNegative}};
 
-/// The profile without damping and friction: nobody measured them, so nothing may count on them.
+/// Returns the profile without damping and friction, because values that were not measured must not be credited.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {
     profile.viscous_damping = profile.coulomb_friction = 0.0;
     return profile;
 }
 
-/// Throws std::invalid_argument naming the field, its value and what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const DeviceProfile& profile) {
     check_fields(profile, "device profile: ");
     if (!(profile.delay_s <= longest_delay_s(profile.period_s))) {

@@ -101,6 +101,7 @@ class Inverse3Device {
         return last_;
     }
 
+    /// Closes the connection.
     void close() noexcept {
         if (!link_) {
             return;
@@ -159,6 +160,7 @@ class Inverse3Device {
     static constexpr double noticed_force = 0.05;  ///< least force whose effect the state must show [N]
     static constexpr int most_unheeded = 200;
 
+    /// Connects to the service. Throws with the likely cure.
     void connect(const std::string& service) {
         const auto refuse = [&](const std::string& why) {
             throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + why +
@@ -209,6 +211,7 @@ class Inverse3Device {
         return text;
     }
 
+    /// Reads the first device of the first message. Throws if there is none or it is not calibrated.
     void read_inventory(const Json& inventory, const std::string& service) {
         const Json none = Json::array();
         const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
@@ -243,6 +246,7 @@ class Inverse3Device {
         last_.sequence = link_->sequence;
     }
 
+    /// Writes a command into the message that is sent next.
     void write_message(double force, const char* head) {
         std::string& text = link_->message;
         text.assign(head).append(link_->command_head);
@@ -257,6 +261,7 @@ class Inverse3Device {
         text += "}}}}]}";
     }
 
+    /// Sends a command and waits for its state. Returns the status of the exchange.
     [[nodiscard]] Status exchanged(double force) {
         Link& link = *link_;
         if (!link.sending) {  // at most one command in transmission
@@ -289,6 +294,7 @@ class Inverse3Device {
         return answered ? Status::Ok : Status::Timeout;
     }
 
+    /// Starts reading the next message, until all messages have their state.
     void read_next() {
         Link& link = *link_;
         if (link.reading || link.gone || link.unanswered == 0) {

@@ -70,6 +70,7 @@ class PacketStream {
     /// Marks that packets were discarded: the next packet does not follow the last, and commands before it have no
     /// sample.
     void pause() noexcept { follows_ = false; }
+    /// Returns true if the next packet follows the last one taken.
     [[nodiscard]] bool follows() const noexcept { return follows_; }
 
     /// Returns the next command, to be sent at `now`.
@@ -91,6 +92,7 @@ class PacketStream {
     [[nodiscard]] std::uint16_t status_bits() const noexcept { return status_bits_; }
 
   private:
+    /// A command that was sent, with the time of its sample.
     struct Flight {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
@@ -126,6 +128,7 @@ class PacketStream {
         }
     }
 
+    /// Computes the reading of a packet.
     void read(const wire::InPacket& packet, bool first, std::int64_t step) noexcept {
         Reading now;
         now.position = wire::position_of(count_.value(), info_.counts_per_rev);
@@ -140,6 +143,7 @@ class PacketStream {
         reading_ = now;
     }
 
+    /// Returns the velocity of the device, or a difference quotient of positions without a loss.
     [[nodiscard]] double velocity(const wire::InPacket& packet, const Reading& now, bool first,
                                   std::int64_t step) const noexcept {
         if ((info_.capabilities & wire::measures_velocity) != 0) {

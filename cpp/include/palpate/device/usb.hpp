@@ -50,7 +50,7 @@ struct UsbHealth {
 /// Reading::status:
 /// - Timeout: no packet came, the device's watchdog ended the torque, or a command took longer than
 ///   `UsbOptions::longest_delay_s`.
-/// - Fault: the device reported one, was disabled or is gone. It is permanent.
+/// - Fault: the device reported a fault, was disabled or is gone. This status is permanent.
 /// - Lost: a command did not arrive or was not understood.
 /// - Limited: the device clipped a command.
 ///
@@ -155,14 +155,14 @@ class UsbDevice {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
-    /// What the device says of itself as a profile. It does not say what its mechanics are.
+    /// Returns the properties that the device reports as a profile. It does not report its mechanics.
     [[nodiscard]] DeviceProfile profile() const {
         DeviceProfile profile = unmeasured({});
         profile.id = name().serial.empty() ? name().product : name().serial;
         profile.period_s = 1.0 / info().rate_hz;
         profile.encoder_step = wire::position_of(1, info().counts_per_rev);
         profile.force_step = 1e-6;
-        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 rounds twice
+        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 would round twice
         return profile;
     }
 
@@ -175,6 +175,7 @@ class UsbDevice {
 
     static constexpr const char* clear_it = "run 'palpate devices --clear', then try again";
 
+    /// The state of an open device.
     struct OpenDevice {
         detail::UsbConnection connection;
         PacketStream stream;
@@ -234,12 +235,14 @@ class UsbDevice {
                    : std::numeric_limits<Nanoseconds>::max();
     }
 
+    /// Returns the fault of the device in words.
     [[nodiscard]] static std::string fault_text(std::uint16_t bits) {
         return (bits & wire::emergency_stop) != 0     ? "an emergency stop"
                : (bits & wire::over_temperature) != 0 ? "over-temperature"
                                                       : "a fault of its encoder";
     }
 
+    /// Takes the next valid packet. Returns false if none came before the deadline.
     [[nodiscard]] bool next_packet(Nanoseconds deadline) noexcept {
         detail::UsbArrival arrival;
         while (open_->transfers->wait_for_arrival(deadline)) {
@@ -251,6 +254,7 @@ class UsbDevice {
         return false;
     }
 
+    /// Discards packets. Returns false if they did not come before the deadline.
     [[nodiscard]] bool throw_away(int packets, Nanoseconds deadline) noexcept {
         detail::UsbArrival old;
         for (int k = 0; k < packets; ++k) {
@@ -307,6 +311,7 @@ class UsbDevice {
         return ended;
     }
 
+    /// Sends a command, unless the last one is still in flight.
     void send(double force) noexcept {
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
@@ -318,12 +323,12 @@ class UsbDevice {
         open_->skipped_commands += code == LIBUSB_ERROR_BUSY ? 1 : 0;
     }
 
+    /// Sends zero force and disables the device.
     void last_word() noexcept {
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
         send(0.0);
         (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
-        (void)open_->transfers->request(wire::Request::Enable, 0);  // after a failure the watchdog ends the
-                                                                    // torque
+        (void)open_->transfers->request(wire::Request::Enable, 0);  // otherwise the watchdog ends the torque
     }
 
     /// Sets the status Lost if a command was not sent or was lost, because an older force acts then.

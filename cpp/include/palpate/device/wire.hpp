@@ -22,12 +22,12 @@
 /// counts. A force of this library is that of the object against the handle, so it is -1e-6 times the torque.
 namespace palpate::wire {
 
-inline constexpr std::uint16_t vendor_id = 0x1209;
+inline constexpr std::uint16_t vendor_id = 0x1209;   ///< identification of the device, with product_id
 inline constexpr std::uint16_t product_id = 0x0001;  ///< of pid.codes' test pair: for development only
 inline constexpr std::uint8_t interface_number = 0;
 inline constexpr std::array<std::uint8_t, 3> interface_kind{0xFF, 0x01, 0x01};  ///< class, subclass, protocol
-inline constexpr std::uint8_t in_endpoint = 0x81;
-inline constexpr std::uint8_t out_endpoint = 0x01;
+inline constexpr std::uint8_t in_endpoint = 0x81;   ///< interrupt IN endpoint: packets of the device
+inline constexpr std::uint8_t out_endpoint = 0x01;  ///< interrupt OUT endpoint: commands
 inline constexpr std::uint8_t protocol_version = 1;
 
 inline constexpr std::uint8_t request_to_host = 0xC1;  ///< bmRequestType: vendor, interface
@@ -36,7 +36,7 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 /// bRequest of a control transfer.
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
-/// Cause and cure for an error code of libusb; empty for a code that states no cause.
+/// Returns cause and cure for an error code of libusb; empty for a code without a known cause.
 [[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
     switch (code) {
         case -1:  // LIBUSB_ERROR_IO
@@ -80,8 +80,7 @@ inline constexpr std::uint32_t measures_velocity = 2;
 inline constexpr int shortest_watchdog_ms = 2;
 inline constexpr int longest_watchdog_ms = 1000;
 
-inline constexpr std::size_t largest_packet = 64;  ///< largest packet of a full-speed interrupt endpoint
-                                                   ///< [bytes]
+inline constexpr std::size_t largest_packet = 64;  ///< of a full-speed interrupt endpoint [bytes]
 inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
 inline constexpr std::size_t info_size = 32;
@@ -89,11 +88,11 @@ inline constexpr std::size_t info_size = 32;
 /// Packet from the device, once every frame.
 struct InPacket {
     std::uint16_t sequence = 0;
-    std::uint32_t clock_us = 0;  ///< of the device at the encoder latch; wraps after 71 minutes
-    std::int32_t count = 0;
-    std::int32_t velocity_cps = 0;  ///< counts a second; 0 if it is not measured
-    std::int32_t torque_uNm = 0;    ///< applied torque
-    std::uint16_t status = 0;
+    std::uint32_t clock_us = 0;      ///< of the device at the encoder latch; wraps after 71 minutes
+    std::int32_t count = 0;          ///< position of the encoder
+    std::int32_t velocity_cps = 0;   ///< counts a second; 0 if it is not measured
+    std::int32_t torque_uNm = 0;     ///< applied torque
+    std::uint16_t status = 0;        ///< status bits
     std::uint16_t out_sequence = 0;  ///< of the last accepted OUT packet
     std::uint16_t out_age_us = 0;    ///< since it was accepted; saturates
     std::uint16_t temperature_dC = 0;

@@ -55,20 +55,20 @@ template <auto outer, auto... path>
     return {name, field.doc, field.rule, field.stored, field.words};
 }
 
-/// All fields of a table inside a struct that holds theirs as `outer`.
+/// Returns all fields of a table for a struct that contains theirs as `outer`.
 template <auto outer, class... Fields>
 [[nodiscard]] constexpr auto all_within(const std::tuple<Fields...>& fields) noexcept {
     return std::apply([](const auto&... field) { return std::tuple{within<outer>(field, field.name)...}; },
                       fields);
 }
 
-/// A field that need not be given: a file may leave it out.
+/// True for an optional field, which a file may omit.
 template <class V>
 inline constexpr bool is_optional = false;
 template <class V>
 inline constexpr bool is_optional<std::optional<V>> = true;
 
-/// A tuple of `Field`, to be specialised for each struct.
+/// Tuple of `Field`; each struct specialises it.
 template <class S>
 inline constexpr auto fields_of = nullptr;
 
@@ -117,14 +117,14 @@ template <HasWords Enum>
                                 either(words_of<Enum>));
 }
 
-/// Throws std::invalid_argument unless `holds`: the field, its value, what would be right.
+/// Throws std::invalid_argument with the field, its value and the rule unless `holds`.
 inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
     if (!holds) {
         throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);
     }
 }
 
-/// Checks a number or a word by the rule of its field; other values pass.
+/// Checks a number or a word by the rule of its field; accepts other values.
 template <class F, class V>
 void check_value(const F& field, const V& value, const std::string& prefix) {
     if constexpr (is_optional<V>) {
@@ -143,8 +143,8 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
     }
 }
 
-/// Checks the numbers and words of one object. Throws std::invalid_argument: the field, its value, what would be right.
-/// The message puts `prefix` before each name.
+/// Checks the numbers and words of one object. Throws std::invalid_argument with the field, its value and the rule. The
+/// message has `prefix` before each name.
 template <HasFields S>
 void check_fields(const S& object, const std::string& prefix = "") {
     for_each_field<S>([&](const auto& field) { check_value(field, field.of(object), prefix); });

@@ -10,6 +10,7 @@
 namespace palpate {
 
 struct NamedValue;
+/// Values of a report, in their order.
 using NamedValues = std::vector<NamedValue>;
 
 /// Value of a report, which becomes JSON or a Python object. An empty value and a number that is not finite become

@@ -20,12 +20,11 @@ struct GuardSettings {
     double slew_s = 0.005;         ///< from zero force to the limit; 0 = no limit [s]
     double ramp_s = 0.2;           ///< from zero to the full force at the start [s]
     double largest_speed = 100.0;  ///< of the handle; faster is a jump [m/s or rad/s]
-    double frozen_speed = 0.3;     ///< cannot stop at once [m/s or rad/s]
+    double frozen_speed = 0.3;     ///< a faster handle cannot stop at once [m/s or rad/s]
     double frozen_s = 0.05;        ///< longest apparent rest; 0 = no check [s]
     bool energy_tank = true;       ///< true: an energy tank limits the energy
     double buzz_force =
-        0.05;  ///< least force swing of a fast oscillation that counts as a limit cycle; 0 = no check [N or
-               ///< N*m]
+        0.05;  ///< least force swing of a fast oscillation that is a limit cycle; 0 = no check [N or N*m]
     double device_damping = 0.0;   ///< known b [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< known f_c [N or N*m]
     double encoder_step = 0.0;     ///< [m or rad]

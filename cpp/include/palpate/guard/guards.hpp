@@ -22,13 +22,13 @@ namespace palpate {
 /// Checks of each sample before it is used, and limits of each force before it is sent. With the force limit alone
 /// these are the guards of a simulation, because other faults cannot occur there.
 struct Guards {
-    ReadingGuard reading{};
-    ForceLimit limit{};
-    LimitCycleDetector buzz{};
-    ForceRamp ramp{};
-    SlewLimit slew{};
-    EnergyTank tank{};
-    ReadMotion motion{};
+    ReadingGuard reading{};        ///< check of each sample
+    ForceLimit limit{};            ///< first limit
+    LimitCycleDetector buzz{};     ///< softens the object
+    ForceRamp ramp{};              ///< increase at the start
+    SlewLimit slew{};              ///< change of the force
+    EnergyTank tank{};             ///< energy that may be given
+    ReadMotion motion{};           ///< motion that the readings prove
     PassivityObserver at_start{};  ///< observes during the ramp
     PassivityObserver observer{};  ///< observes after the ramp
 };

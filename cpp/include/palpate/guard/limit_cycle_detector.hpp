@@ -14,9 +14,8 @@ namespace palpate {
 struct LimitCycleSettings {
     double force_swing =
         std::numeric_limits<double>::infinity();  ///< least change of force between two reversals [N or N*m]
-    std::uint64_t longest_swing = 25;  ///< longest time between two reversals [ticks]; hands reverse more
-                                       ///< slowly than 20 Hz
-    double encoder_step = 0.0;         ///< a motion back of at most this length is not a reversal [m or rad]
+    std::uint64_t longest_swing = 25;             ///< between two reversals [ticks]; hands stay below 20 Hz
+    double encoder_step = 0.0;  ///< a motion back of at most this length is not a reversal [m or rad]
 };
 
 /// Detects a limit cycle of the handle and makes the object softer. A limit cycle is ten consecutive swings between

@@ -29,8 +29,7 @@ struct ForceLimit {
 
 /// Limits the change of the force between two ticks. Zero, the safe command, is always possible.
 struct SlewLimit {
-    double largest_step = std::numeric_limits<double>::infinity();  ///< largest change in a tick [N or N*m],
-                                                                    ///< > 0
+    double largest_step = std::numeric_limits<double>::infinity();  ///< change in a tick [N or N*m], > 0
     double last = 0.0;                                              ///< force sent before [N or N*m]
 
     /// Limits the force.
@@ -46,8 +45,8 @@ struct SlewLimit {
 
 /// Increases the force from zero at the start: scales the first `ticks` forces by 0, 1/ticks, 2/ticks, ...
 struct ForceRamp {
-    std::uint64_t ticks = 0;
-    std::uint64_t done = 0;
+    std::uint64_t ticks = 0;  ///< length of the ramp
+    std::uint64_t done = 0;   ///< ticks so far
 
     /// Returns true after the last scaled force.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }

@@ -23,9 +23,8 @@ class ReadingGuard {
     struct Limits {
         double largest_step =
             std::numeric_limits<double>::infinity();  ///< of the position in a sample [m or rad]
-        double frozen_step = 0.0;  ///< least motion in a sample before the encoder can count as frozen [m or
-                                   ///< rad]
-        std::uint64_t frozen_samples = 0;  ///< number of equal samples after it; 0 = no check
+        double frozen_step = 0.0;                     ///< least motion before a frozen encoder [m or rad]
+        std::uint64_t frozen_samples = 0;             ///< number of equal samples after it; 0 = no check
     };
 
     ReadingGuard() = default;

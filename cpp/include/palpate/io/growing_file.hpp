@@ -204,6 +204,7 @@ class GrowingFile {
         return force_ ? "" : name_ + " exists already; choose another name, or set force to replace it";
     }
 
+    /// Returns the length of the whole lines.
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {
         const std::size_t end = written.rfind('\n');
         return end == std::string_view::npos ? 0 : end + 1;
@@ -236,6 +237,7 @@ class GrowingFile {
         return reason;
     }
 
+    /// Renames NAME.part to the first free name.
     [[nodiscard]] std::string move_aside() {
         int error = EEXIST;
         for (int k = 1; error == EEXIST; ++k) {

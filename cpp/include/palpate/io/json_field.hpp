@@ -59,7 +59,7 @@ class JsonField {
         }
         return {*found, path};
     }
-    /// Refuses an object with another key.
+    /// Throws if an object has another key.
     void require_keys(const std::vector<std::string_view>& keys, const char* cure = "") const {
         require(value_.is_object(), "an object");
         for (const auto& item : value_.items()) {
@@ -153,8 +153,8 @@ class JsonField {
         }
     }
 
-    /// A value of the type of a field, with its rule. A struct is an object of its stored fields and no others; only
-    /// optional ones may be missing.
+    /// Returns a value of the type of a field, with its rule. A struct is an object with exactly its stored fields, of
+    /// which only optional ones may be missing.
     template <class T>
     [[nodiscard]] T as(Rule rule = Rule::Any, std::span<const std::string_view> choices = {}) const {
         if constexpr (HasFields<T>) {

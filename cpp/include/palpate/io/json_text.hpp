@@ -16,6 +16,7 @@
 
 namespace palpate {
 
+/// JSON in which the keys of an object keep their order.
 using Json = nlohmann::ordered_json;
 
 inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects

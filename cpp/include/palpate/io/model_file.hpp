@@ -18,13 +18,13 @@ namespace palpate {
 
 /// Content of a model file that a rendering uses.
 struct ModelFile {
-    ForceModel model;                        ///< as it was identified
-    std::string position_unit;               ///< rad, m, count or "" (unstated)
+    ForceModel model;                        ///< the identified model
+    std::string position_unit;               ///< rad, m, count or "" (not stated)
     std::string force_unit;                  ///< N*m, N, A or ""
     std::vector<std::string> inputs;         ///< one name for each input
-    std::optional<Scheme> plan;              ///< how it is to be rendered
-    std::optional<ForceModel> limited;       ///< plan.network: the plan renders it in place of `model`
-    std::optional<Certificate> certificate;  ///< of the plan; recomputed, and found the same
+    std::optional<Scheme> plan;              ///< how to render the model
+    std::optional<ForceModel> limited;       ///< replaces `model` in the plan
+    std::optional<Certificate> certificate;  ///< of the plan; recomputed
 
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }

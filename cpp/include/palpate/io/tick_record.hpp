@@ -48,7 +48,7 @@ struct RecordUnits {
     return {position, force == "N*m" ? "Nm" : force};
 }
 
-/// "_Nm": what a column's name ends in; empty for an unstated unit.
+/// Returns the end of a column name, such as "_Nm"; empty without a unit.
 [[nodiscard]] inline std::string suffix_of(const std::string& unit) {
     return unit.empty() ? "" : "_" + unit;
 }

@@ -18,8 +18,9 @@ struct Interval {
     double lower = 0.0;
     double upper = 0.0;
 
+    /// Returns the largest absolute value.
     [[nodiscard]] double largest() const noexcept { return std::max(std::abs(lower), std::abs(upper)); }
-    /// The smallest that holds both.
+    /// Returns the smallest interval that contains both.
     [[nodiscard]] Interval with(Interval other) const noexcept {
         return {std::min(lower, other.lower), std::max(upper, other.upper)};
     }
@@ -27,29 +28,29 @@ struct Interval {
 
 namespace detail {
 
-/// Where g lies over a cell, value and three derivatives known at both ends: no farther from the polynomial of
-/// degree 7 through them than max|g^(8)| h^8 / (256 * 8!), and that polynomial stays between its Bernstein
-/// coefficients. Wavelets that cancel but for a millionth leave cells as wide as a fifth of one, where sums of
-/// ranges would need thousands.
+/// Encloses g over a cell, from its value and three derivatives at both ends. The distance of g from the polynomial of
+/// degree 7 through them is at most max|g^(8)| h^8 / (256 * 8!), and that polynomial lies between its Bernstein
+/// coefficients. For wavelets that cancel to a millionth, cells of a fifth of a wavelet are sufficient; sums of ranges
+/// would need thousands of cells.
 struct BoundedCell {
     double from, to;
     Jet at_from, at_to;
     Interval range;
 
-    /// `remainder`: of the polynomial, and of rounding.
+    /// Makes a cell. `remainder` bounds the error of the polynomial and of rounding.
     BoundedCell(double left, double right, const Jet& at_left, const Jet& at_right, double remainder) noexcept
         : from{left}, to{right}, at_from{at_left}, at_to{at_right} {
         const Interval both = coefficients(at_from, to - from).with(coefficients(at_to, from - to));
         range = {both.lower - remainder, both.upper + remainder};
     }
 
-    /// The order of the search: where the largest may be comes first.
+    /// Orders the search: cells with the largest possible value come first.
     [[nodiscard]] bool operator<(const BoundedCell& other) const noexcept {
         return range.largest() < other.range.largest();
     }
 
   private:
-    /// The four on one side.
+    /// Returns the range of the four coefficients on one side.
     [[nodiscard]] static Interval coefficients(const Jet& end, double h) noexcept {
         const double first = h / 7.0 * end[1];
         const double second = h * h / 42.0 * end[2];
@@ -60,15 +61,15 @@ struct BoundedCell {
     }
 };
 
-/// The derivative of that order of a network, as one term of what is enclosed.
+/// Derivative of this order of a network, as one term of the enclosed sum.
 struct Term {
     const NetworkParameters& network;
     std::size_t order;  ///< 0 or 1
 };
 
-/// Encloses g, the sum of the terms, over [from, to] by bisection: a cell is done when it cannot raise the largest
-/// or lower the smallest value seen by more than `relative` times the largest |g| seen. Cells that are still too
-/// coarse when the budget ends only make the result wider, never wrong.
+/// Encloses g, the sum of the terms, over [from, to] by bisection. A cell is finished if it cannot raise the largest or
+/// lower the smallest sampled value by more than `relative` times the largest sampled |g|. Cells that are too coarse at
+/// the end of the budget only widen the result.
 template <std::size_t terms>
 [[nodiscard]] Interval enclose(const std::array<Term, terms>& sum, double from, double to, double relative) {
     constexpr int first_cells = 16;
@@ -140,14 +141,14 @@ template <std::size_t terms>
 
 }  // namespace detail
 
-/// Proved bounds of f over [from, to] for a network of one input, rounding included, at most `relative` times
-/// max|f| wider than the true range.
+/// Returns proved bounds of f over [from, to] for a network of one input, rounding included. They are at most
+/// `relative` times max|f| wider than the true range.
 [[nodiscard]] inline Interval value_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
     return detail::enclose(std::array{detail::Term{network, 0}}, from, to, relative);
 }
 
-/// Proved bounds of f' over [from, to], at most `relative` times max|f'| wider than the true range.
+/// Returns proved bounds of f' over [from, to], at most `relative` times max|f'| wider than the true range.
 [[nodiscard]] inline Interval slope_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
     return detail::enclose(std::array{detail::Term{network, 1}}, from, to, relative);

@@ -35,8 +35,7 @@ inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"
 struct EdgeLine {
     double edge = 0.0;                                       ///< position of the edge [m]
     Curve at_edge;                                           ///< value at the edge, and slope of the line
-    double reach = std::numeric_limits<double>::infinity();  ///< distance from the edge after which the force
-                                                             ///< is zero [m]
+    double reach = std::numeric_limits<double>::infinity();  ///< distance from the edge to zero force [m]
 
     /// Returns value, slope and antiderivatives at x, beyond the edge.
     [[nodiscard]] Curve at(double x) const noexcept {

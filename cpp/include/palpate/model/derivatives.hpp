@@ -15,10 +15,10 @@ namespace palpate {
 /// Value and first three derivatives of a function at one position.
 using Jet = std::array<double, 4>;
 
-/// Value and first four derivatives.
+/// Value and first four derivatives of a function at one position.
 using Derivatives = std::array<double, 5>;
 
-/// Of a network of one input, without continuation.
+/// Returns the derivatives of a network of one input, without continuation.
 [[nodiscard]] inline Derivatives derivatives(const NetworkParameters& network, double x) noexcept {
     const double c = network.linear[0];
     Derivatives sum{c * x + network.bias, c, 0.0, 0.0, 0.0};
@@ -36,12 +36,13 @@ using Derivatives = std::array<double, 5>;
     return sum;
 }
 
+/// Returns value and first three derivatives.
 [[nodiscard]] inline Jet jet(const NetworkParameters& network, double x) noexcept {
     const Derivatives f = derivatives(network, x);
     return {f[0], f[1], f[2], f[3]};
 }
 
-/// Highest derivative of f that `derivative_bounds` knows.
+/// Highest derivative of f in `derivative_bounds`.
 inline constexpr std::size_t highest_derivative = 9;
 
 /// Bounds of |f|, |f'|, ... of a network of one input over [from, to].
@@ -49,31 +50,23 @@ using DerivativeBounds = std::array<double, highest_derivative + 1>;
 
 namespace detail {
 
-/// Suprema of |psi^(n)|, rounded up. psi^(n) = He_{n+2} E up to its sign, so that for even n they stand at 0.
-inline constexpr DerivativeBounds hat_suprema{1.0,
-                                              wavelet_slope_bound,
-                                              wavelet_curvature_bound,
-                                              wavelet_jerk_bound,
-                                              15.0,
-                                              35.539,
-                                              105.0,
-                                              288.492,
-                                              945.0,
-                                              2913.41};
+/// Suprema of |psi^(n)|, rounded up. psi^(n) = He_{n+2} E up to its sign, so for even n they are at 0.
+inline constexpr DerivativeBounds hat_suprema{1.0,    1.3801190462, 3.0,     5.7831, 15.0,
+                                              35.539, 105.0,        288.492, 945.0,  2913.41};
 
-/// Cramer's inequality, |He_n(u)| e^{-u^2/4} <= 1.0865 sqrt(n!): what is left of psi^(n) away from its centre
-/// is at most this times e^{-u^2/4}.
+/// Factors of e^{-u^2/4} that bound psi^(n) away from its centre, from Cramer's inequality |He_n(u)|
+/// e^{-u^2/4} <= 1.0865 sqrt(n!).
 inline constexpr DerivativeBounds hat_tails{1.5366,  2.6614,   5.3228,   11.9021,   29.1540,
                                             77.1341, 218.1682, 654.5044, 2069.7211, 6864.48};
 
-/// What double precision makes of f^(n)(x), in units of epsilon times the sum of |w| alpha^n: the polynomial in
-/// u, the exponent u^2/2 and u itself are right to a few units each. Suprema over u of
-/// ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) E, P_n the polynomial of psi^(n) with absolute coefficients.
+/// Rounding error of f^(n)(x), in units of epsilon times the sum of |w| alpha^n. The polynomial in u, the exponent
+/// u^2/2 and u itself have errors of a few units each. Suprema over u of ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) E, with
+/// P_n the polynomial of psi^(n) with absolute coefficients.
 inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
 
 }  // namespace detail
 
-/// What rounding may have cost `derivatives` anywhere in [-reach, reach].
+/// Returns bounds of the rounding errors of `derivatives` in [-reach, reach].
 [[nodiscard]] inline Derivatives derivatives_rounding(const NetworkParameters& network,
                                                       double reach) noexcept {
     const double c = std::abs(network.linear[0]);
@@ -92,13 +85,14 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
     return sum;
 }
 
+/// Returns bounds of the rounding errors of `jet` in [-reach, reach].
 [[nodiscard]] inline Jet jet_rounding(const NetworkParameters& network, double reach) noexcept {
     const Derivatives f = derivatives_rounding(network, reach);
     return {f[0], f[1], f[2], f[3]};
 }
 
-/// Proved bounds of f and its first nine derivatives over [from, to]: the sum of what each wavelet can
-/// contribute at its distance. Coarser than `value_bounds` and `slope_bounds`, but without any search.
+/// Returns proved bounds of f and its first nine derivatives over [from, to]: the sum of the largest contributions of
+/// the wavelets at their distances. They are wider than `value_bounds` and `slope_bounds`, but need no search.
 [[nodiscard]] inline DerivativeBounds derivative_bounds(const NetworkParameters& network, double from,
                                                         double to) noexcept {
     const double c = std::abs(network.linear[0]);

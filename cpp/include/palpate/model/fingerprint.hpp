@@ -16,6 +16,7 @@ namespace detail {
 /// Computes FNV-1a over the bits of numbers. A changed number gives another value.
 class NumberHash {
   public:
+    /// Adds the bits of a number.
     void add(std::uint64_t bits) noexcept {
         for (unsigned byte = 0; byte < 8U; ++byte) {
             value_ = (value_ ^ ((bits >> (8U * byte)) & 0xFFU)) * 0x100000001B3U;

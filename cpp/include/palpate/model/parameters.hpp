@@ -40,6 +40,7 @@ inline void require(bool holds, const std::string& sentence) {
     }
 }
 
+/// Throws unless all values are finite.
 inline void require_finite(const std::vector<double>& values, const char* field) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         require(std::isfinite(values[i]),
@@ -47,6 +48,7 @@ inline void require_finite(const std::vector<double>& values, const char* field)
     }
 }
 
+/// Throws unless the number of values is right.
 inline void require_size(const std::vector<double>& values, std::size_t size, const char* field) {
     require(values.size() == size, std::string(field) + " has " + std::to_string(values.size()) +
                                        " values, must have " + std::to_string(size));

@@ -130,6 +130,7 @@ class PiecewiseSeptic {
     }
 
   private:
+    /// Coefficients of one cell, in one cache line.
     struct alignas(64) Piece {
         std::array<double, 8> c;
     };
@@ -138,6 +139,7 @@ class PiecewiseSeptic {
     /// rounds to a multiple of h.
     static constexpr double rounder = 0x1.8p52;
 
+    /// Index of a cell and the distance from its centre.
     struct Place {
         std::size_t piece;
         double u;

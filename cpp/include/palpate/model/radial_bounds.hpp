@@ -15,16 +15,16 @@
 
 namespace palpate {
 
-/// Where a network of d inputs and its gradient lie over a box.
+/// Bounds of the value and the gradient of a network of d inputs over a box.
 struct RadialBounds {
     Interval value;
-    std::vector<Interval> gradient;  ///< by component
+    std::vector<Interval> gradient;  ///< bounds of each component
 };
 
 namespace detail {
 
-/// Where c + b't + t'A t / 2 lies for |t_j| <= 1, a rest added: each t_j with its square exactly, products of two
-/// by their size.
+/// Returns the range of c + b't + t'A t / 2 for |t_j| <= 1, plus a remainder. The terms of each t_j and its square are
+/// exact, products of two inputs are bounded by their absolute value.
 [[nodiscard]] inline Interval quadratic_range(std::size_t d, double c, const double* b, const double* a,
                                               double rest) noexcept {
     Interval range{c - rest, c + rest};
@@ -45,7 +45,7 @@ namespace detail {
     return range;
 }
 
-/// Ranges of value and gradient over a box by Taylor's formula about its middle, the fourth derivative bounded
+/// Ranges of value and gradient over a box by Taylor's formula about its middle. The fourth derivative is bounded
 /// wavelet by wavelet at the least distance.
 class RadialEnclosure {
   public:
@@ -59,11 +59,12 @@ class RadialEnclosure {
         ranges.gradient.resize(network.dimension);
     }
 
+    /// Computes the ranges over a box.
     void over(const double* lower, const double* upper) noexcept {
         const std::size_t d = network_.dimension;
         for (std::size_t j = 0; j < d; ++j) {
             middle_[j] = 0.5 * (lower[j] + upper[j]);
-            // Rounded up, and never the 0 that the gradient could not be divided by.
+            // Rounded up, and above 0, because the gradient is divided by it.
             radius_[j] = std::max(upper[j] - middle_[j], middle_[j] - lower[j]) * (1.0 + 1e-15) + 1e-200;
         }
         hats_.expand(middle_.data(), radius_.data(), sums_);
@@ -72,7 +73,8 @@ class RadialEnclosure {
         for (const double twist : sums_.twist) {
             twists += std::abs(twist);
         }
-        // Not only their own rounding: where a box is wide for a wavelet, that of all its terms is less.
+        // The factor covers the rounding of the remainder. If a box is wide for a wavelet, it also covers the rounding
+        // of all its terms.
         constexpr double rounded_up = 1.0 + 1e-9;
         const double fourth = rounded_up * std::reduce(sums_.rest.begin(), sums_.rest.end());
         for (std::size_t j = 0; j < d; ++j) {
@@ -88,7 +90,7 @@ class RadialEnclosure {
             quadratic_range(d, value, sums_.gradient.data(), sums_.bend.data(), twists / 6.0 + fourth / 24.0);
     }
 
-    /// The input along which most may change.
+    /// Returns the input along which the value can change most.
     [[nodiscard]] std::size_t widest() const noexcept {
         std::size_t widest = 0;
         double most = 0.0;
@@ -114,18 +116,19 @@ class RadialEnclosure {
     std::vector<double> radius_;
 };
 
-/// Largest and smallest value met so far, and how far beyond it a cell may reach and still be done.
+/// Largest and smallest sampled value, and the test for finished cells.
 struct Seen {
     Interval range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 
     void add(double value) noexcept { range = range.with({value, value}); }
+    /// Returns true if a cell with this range cannot change the sampled range by more than `slack`.
     [[nodiscard]] bool settles(Interval possible, double slack) const noexcept {
         return possible.upper <= range.upper + slack && possible.lower >= range.lower - slack;
     }
 };
 
-/// What rounding may cost value and gradient anywhere in a box: 64 (N + 8) units of the sums of absolute terms,
-/// where |psi| <= d, |grad psi| and its terms <= d + 4.
+/// Bounds of the rounding errors of value and gradient in a box: 64 (N + 8) units of the sums of absolute terms, with
+/// |psi| <= d, |grad psi| and its terms <= d + 4.
 struct RadialRounding {
     double value;
     std::vector<double> gradient;
@@ -154,7 +157,7 @@ struct RadialRounding {
     }
 };
 
-/// Calls visit(x) where value or gradient may be largest: at the wavelets' centres and on their flanks.
+/// Calls visit(x) at likely positions of the largest value or gradient: at the wavelets' centres and on their flanks.
 template <class Visitor>
 void where_hats_are_steep(const NetworkParameters& network, std::span<const double> lower,
                           std::span<const double> upper, Visitor visit) {
@@ -179,9 +182,9 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
 
 }  // namespace detail
 
-/// Proved bounds over the box [lower, upper] of a network of any number of inputs without continuation, at most
-/// `relative` times the largest |f| and |df/dx_j| wider than their true ranges, by bisection of the box. Boxes
-/// that are still too coarse when the budget ends only make the result wider.
+/// Returns proved bounds over the box [lower, upper] of a network of any number of inputs without continuation, by
+/// bisection of the box. They are at most `relative` times the largest |f| and |df/dx_j| wider than the true ranges.
+/// Boxes that are too coarse at the end of the budget only widen the result.
 [[nodiscard]] inline RadialBounds radial_bounds(const NetworkParameters& network,
                                                 std::span<const double> lower, std::span<const double> upper,
                                                 double relative = 0.01, std::size_t budget = 50'000,
@@ -197,7 +200,7 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
             gradient[j].add(slopes[j]);
         }
     };
-    // What may be largest is looked at first: a search that has met it settles the rest sooner.
+    // Likely positions of the largest values come first, because known large values finish the other boxes sooner.
     std::vector<double> slopes(d);
     detail::where_hats_are_steep(network, lower, upper, [&](const std::vector<double>& x) {
         slopes = network.linear;
@@ -215,7 +218,8 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
     };
     detail::RadialEnclosure box{network, hats};
     RadialBounds bounds;
-    // The edges of all boxes, 2 d numbers each, wide ones first: where the budget ends, all are equally coarse.
+    // The edges of all boxes, 2 d numbers each, wide boxes first, so that all are equally coarse at the end of the
+    // budget.
     std::vector<double> edges{lower.begin(), lower.end()};
     edges.insert(edges.end(), upper.begin(), upper.end());
     edges.reserve(4096);

@@ -10,11 +10,6 @@ namespace palpate {
 /// any finite u; NaN stays NaN.
 inline constexpr double wavelet_reach = 40.0;
 
-/// Suprema of |psi'|, |psi''| and |psi'''| over the real line, rounded up in the last digit.
-inline constexpr double wavelet_slope_bound = 1.3801190462;  ///< at |u| = sqrt(3 - sqrt 6) = 0.741964
-inline constexpr double wavelet_curvature_bound = 3.0;       ///< at u = 0
-inline constexpr double wavelet_jerk_bound = 5.7831;
-
 /// The Mexican hat psi(u) = (u^2 - 1) e^{-u^2/2}, its derivative and its first two antiderivatives from one
 /// exponential. It is the second derivative of a Gaussian (paper eq. 5 with zeta = 1/2).
 struct MexicanHat {

@@ -25,7 +25,7 @@ concept RecordConsumer = requires(C& consumer, std::span<const Record> records) 
 template <class Record, RecordConsumer<Record> Consumer>
 class FlightRecorder {
   public:
-    /// Starts the thread, which passes records on `every` so many milliseconds.
+    /// Starts the thread, which passes records on at the interval `every`.
     FlightRecorder(Consumer& consumer, std::size_t capacity, std::chrono::milliseconds every)
         : ring_{capacity}, consumer_{consumer}, every_{every}, batch_(4096) {
         writer_ = std::thread{[this] { write_until_stopped(); }};

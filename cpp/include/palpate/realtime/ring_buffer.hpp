@@ -50,8 +50,7 @@ class RingBuffer {
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:
-    static constexpr std::size_t cache_line = 64;  ///< largest unit of memory that two cores must not write
-                                                   ///< at the same time [bytes]
+    static constexpr std::size_t cache_line = 64;  ///< memory that two cores must not share [bytes]
 
     std::vector<T> slots_;
     std::size_t mask_;

@@ -12,9 +12,9 @@
 
 namespace palpate {
 
-/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, integrated without generated energy. The object's
-/// force does exactly the work that is stored, D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}). With midpoint kinematics the
-/// load line D + p y = q has
+/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, integrated by a step that never generates energy.
+/// The object's force does exactly the work that is stored, D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}). With midpoint
+/// kinematics the load line D + p y = q has
 ///
 ///     p = 2m/T^2 + B_o/T + K_c + B_c/T,
 ///     q = (2m/T^2 + B_o/T) y_{k-1} + (2m/T) v_{k-1} + K_c x_k + B_c (v_device + y_{k-1}/T).
@@ -153,6 +153,7 @@ class EnergyConsistent {
                 memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + push};
     }
 
+    /// Returns f or D as the environment of the next step.
     [[nodiscard]] Stepped stepped(bool switched) const noexcept {
         return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
     }
@@ -213,6 +214,7 @@ class EnergyConsistent {
         return generates(any) ? end(by_energy, 0) : end(any, 0);
     }
 
+    /// Moves the object to a solution and returns the result of the tick.
     [[nodiscard]] Rendered moved_to(const Solution& solution, double force) noexcept {
         environment_.advance(solution.position, state_);
         velocity_ = 2.0 * (solution.position - position_) / period_ - velocity_;

@@ -89,8 +89,7 @@ class Probe {
         const double velocity = (position - last_) / period_ - direction_ * settings_.speed;
         last_ = position;
         const double spring = settings_.stiffness * (position - sweep_);
-        if (std::abs(spring) > settings_.force_limit) {  // The object holds the handle, so the sweep reverses
-                                                         // here.
+        if (std::abs(spring) > settings_.force_limit) {  // the object holds the handle
             const double held = std::copysign(settings_.force_limit, spring);
             sweep_ = position - held / settings_.stiffness;
             direction_ = std::copysign(1.0, spring);

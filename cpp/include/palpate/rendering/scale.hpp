@@ -24,8 +24,7 @@ struct ModelScale {
 namespace detail {
 
 inline constexpr double knob_travel = 0.5;     ///< of a model that suits the default knob [rad]
-inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device, divided by the largest
-                                               ///< force
+inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device / largest force
 
 /// Returns the force while sliding in a direction, +1 for press and -1 for release. A model of position and velocity
 /// slides at the largest velocity of its data.
@@ -39,7 +38,7 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
                                          : model.network()->at(position, {}).force;
 }
 
-/// Returns the largest force in either direction [N or N*m].
+/// Returns the largest of the forces at 1001 positions, in both directions [N or N*m]; 1 without a force.
 [[nodiscard]] inline double largest_force(const ForceModel& model) noexcept {
     const double lower = model.domain().lower[0];
     const double step = (model.domain().upper[0] - lower) / 1000.0;

@@ -22,7 +22,7 @@ namespace palpate {
 struct LoopSettings {
     double rate_hz = 1000.0;         ///< 100 to 10 000 [Hz]
     double duration_s = 10.0;        ///< infinity = endless [s]
-    double lowest_rate_share = 0.8;  ///< share of rate_hz that stops the loop; 0 = never
+    double lowest_rate_share = 0.8;  ///< least share of rate_hz over half a second; 0 = any
     std::uint64_t tolerated = 5;     ///< consecutive bad ticks; one more stops the loop
     /// Longest time between two ticks; a longer time ends the loop, because it is not certified [s].
     double longest_period_s = std::numeric_limits<double>::infinity();

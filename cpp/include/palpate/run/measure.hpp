@@ -65,7 +65,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// Measures a real object on a closed device. A hand, a probe or pushes move the object.
+/// Opens a device and measures a real object on it. A hand, a probe or pushes move the object.
 [[nodiscard]] inline Summary measure(const MeasureOptions& options, LiveDevice& device,
                                      const std::atomic<bool>& stop_requested, const Watch& watch) {
     SessionSettings session{.loop = options.loop, .real_time = options.real_time};

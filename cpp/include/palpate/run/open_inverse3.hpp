@@ -45,7 +45,8 @@ namespace palpate {
     const std::string filters = live->report().lines.front().second;
     const double period_s = 1.0 / options.loop.rate_hz;
     live->scale = scale_of(model.model, false);
-    // The service does not state the mechanics of the device: those of the certificate count, else none.
+    // The service does not state the mechanics of the device. Those of the certificate are used; without one, damping
+    // and friction are 0.
     if (!options.uncertified && model.certificate) {
         live->profile = model.certificate->device;
     } else {

@@ -115,7 +115,7 @@ namespace detail {
     return live;
 }
 
-/// Returns a closed USB device for a measurement. It makes force only for a probe and for pushes.
+/// Returns a USB device for a measurement, not open yet. It makes force only for a probe and for pushes.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> usb_to_measure(MeasureOptions& options) {
     UsbOptions usb = detail::usb_options(options);
     usb.makes_force = false;

@@ -59,7 +59,7 @@ inline constexpr auto fields_of<RunOptions> =
                Field<&RunOptions::telemetry_port>{"telemetry_port"},
                Field<&RunOptions::telemetry_hz>{"telemetry_hz"}};
 
-/// Options of a rendering. Fields that are not set follow the model and the device.
+/// Options of a rendering. Unset fields follow the model and the device.
 struct RenderOptions : RunOptions {
     bool rate_given = false;  ///< true if the user chose loop.rate_hz
     SchemeChoices scheme;

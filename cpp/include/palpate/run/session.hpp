@@ -26,7 +26,7 @@ namespace palpate {
 struct SessionSettings {
     LoopSettings loop{};
     RealTimeOptions real_time{};
-    std::chrono::milliseconds hand_over_every{20};  ///< age from which a record is written
+    std::chrono::milliseconds hand_over_every{20};  ///< largest age of an unwritten record
     double ring_s = 10.0;                           ///< longest pause of the writer [s]
     std::size_t last_ticks = 500;                   ///< saved to NAME.fault.csv after a fault
 };

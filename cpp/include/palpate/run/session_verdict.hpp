@@ -36,10 +36,9 @@ struct SessionExpectation {
 
 namespace detail {
 
-inline constexpr double tolerated_loss = 0.001;   ///< share of deadlines, samples and rows that may be lost
-inline constexpr double tolerated_change = 0.01;  ///< share of ticks whose force may differ from the model's
-                                                  ///< force
-inline constexpr double fewest_encoder_steps = 50;    ///< least number that a recording covers
+inline constexpr double tolerated_loss = 0.001;     ///< share of deadlines, samples and rows that may be lost
+inline constexpr double tolerated_change = 0.01;    ///< share of ticks with another force than the model's
+inline constexpr double fewest_encoder_steps = 50;  ///< least number that a recording covers
 inline constexpr double smallest_domain_share = 0.1;  ///< least share that a rendering covers
 
 /// Returns a text such as "12 of 1000 (1.2 %)".

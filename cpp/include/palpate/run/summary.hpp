@@ -68,7 +68,7 @@ struct Summary {
             {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
 }
 
-/// Ticks of each status that occurred.
+/// Returns the number of ticks of each status that occurred.
 [[nodiscard]] inline NamedValues ticks_by_status(const LoopReport& loop) {
     NamedValues counts;
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
@@ -79,7 +79,7 @@ struct Summary {
     return counts;
 }
 
-/// The fields of a summary, for JSON and for Python.
+/// Returns the fields of a summary, for JSON and Python.
 [[nodiscard]] inline NamedValues fields(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     std::vector<NamedValues> findings;

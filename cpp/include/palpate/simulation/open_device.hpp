@@ -84,8 +84,8 @@ namespace palpate {
                                 : open_simulated(options, model);
 }
 
-/// Returns a closed device for a measurement by its name: usb[:SERIAL], or simulated with the model `object` mounted.
-/// Sets the options that depend on the device.
+/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or simulated with the model `object`
+/// mounted. Sets the options that depend on the device.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
                                                                    const std::optional<ForceModel>& object) {
     if (options.device == "usb" || options.device.starts_with("usb:")) {

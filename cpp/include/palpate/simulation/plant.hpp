@@ -19,9 +19,9 @@ struct Mechanics {
 
 /// Base of integrators without memory and without a force transducer.
 struct PlainPlant {
-    /// Does nothing, because there is not any state.
+    /// Does nothing, because this plant is without memory.
     void start() noexcept {}
-    /// Returns NaN, because there is not a transducer.
+    /// Returns NaN, because this plant is without a transducer.
     [[nodiscard]] static double measured(const Motion& /*handle*/) noexcept {
         return std::numeric_limits<double>::quiet_NaN();
     }
@@ -72,7 +72,7 @@ struct MountedObject {
 struct EnergyAccount {
     double hand = 0.0;        ///< work on the handle [J]
     double motor = 0.0;       ///< work against the motor [J]
-    double loss = 0.0;        ///< by damping and friction [J]
+    double loss = 0.0;        ///< lost by damping and friction [J]
     double throughput = 0.0;  ///< absolute work of hand and motor, the scale of rounding errors [J]
     double least = 0.0;       ///< least of hand + 1e-12 throughput after any substep [J]
 };

@@ -203,6 +203,7 @@ class CertifiedSolver {
         return border.force + s * border.loss + p * y;
     }
 
+    /// Returns cell k of a knob after `turned`.
     [[nodiscard]] Cell cell_at(std::size_t k, double turned) const noexcept {
         return {k == 0 ? -infinity : borders_[k - 1].position + turned,
                 k == borders_.size() ? infinity : borders_[k].position + turned,
@@ -254,6 +255,7 @@ class CertifiedSolver {
         }
     }
 
+    /// Stores a confirmed solution in the memory and returns it.
     [[nodiscard]] static Solution found(const EnvironmentSample& sample, double position, double compliance,
                                         LoadLine line, int evaluations, Memory& memory) noexcept {
         memory.position = position;
@@ -368,6 +370,7 @@ class CertifiedSolver {
         return std::clamp(start, cell.low, cell.high);
     }
 
+    /// Returns a network without wavelets: a straight line.
     [[nodiscard]] static NetworkParameters straight(double slope, double at_zero) {
         return {1, {}, {}, {}, {slope}, at_zero};
     }

@@ -25,6 +25,7 @@ namespace palpate {
 template <class Solver>
 class LimitedResolvent {
   public:
+    /// State between two steps.
     struct Memory {
         typename Solver::Memory unlimited;
         WarmStart newton;

@@ -355,8 +355,7 @@ class Resolvent {
     double slope_;
     double period_;
     bool repeats_ = false;
-    double highest_ = -std::numeric_limits<double>::infinity();  ///< largest F of any branch, in the first
-                                                                 ///< turn
+    double highest_ = -std::numeric_limits<double>::infinity();  ///< largest F of all branches, first turn
     double lowest_ = std::numeric_limits<double>::infinity();
     std::vector<Branch> branches_ = std::vector<Branch>(1);
 };

@@ -21,6 +21,7 @@ namespace palpate {
 /// or above play + r, and that of release if it lies at or below play - r.
 class SlidingResolvent {
   public:
+    /// State between two steps.
     struct Memory {
         CertifiedSolver::Memory newton;
         Resolvent::Memory press;

@@ -77,7 +77,7 @@ void hash_value(NumberHash& hash, const T& value) {
         for_each_field<T>([&](const auto& field) {
             const auto& part = field.of(value);
             if constexpr (is_optional<std::remove_cvref_t<decltype(part)>>) {
-                if (part) {  // an optional field that is not given leaves older fingerprints as they are
+                if (part) {  // a missing optional field keeps older fingerprints valid
                     hash.add(std::string_view{field.name});
                     hash_value(hash, *part);
                 }

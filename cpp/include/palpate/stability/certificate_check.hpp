@@ -27,6 +27,7 @@ namespace palpate {
 
 namespace detail {
 
+/// Returns the sentence about a stored number that differs from the recomputed one.
 [[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed,
                                            const char* bound = "") {
     return "certificate." + path + " is " + readable(stored) + ": must be " + bound + readable(recomputed) +

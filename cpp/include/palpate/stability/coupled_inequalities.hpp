@@ -66,6 +66,7 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
     lines.push_back(friction);
 }
 
+/// Adds these lines for an object with mass.
 inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                           const DeviceProfile& device) {
     add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling",
@@ -86,11 +87,12 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 }  // namespace detail
 
-/// Share of the device's damping that a coupling uses where nothing else sets its stiffness.
+/// Share of the device's damping that a coupling uses, if no other setting defines its stiffness.
 inline constexpr double usual_coupling_share = 0.95;
 
-/// Largest coupling stiffness for which `share` of the device's damping is enough, with the coupling's damping and an
-/// object whose force falls with a slope of at most `falling`; 0 if there is none.
+/// Returns the largest coupling stiffness for which `share` of the device's damping is sufficient. The coupling has
+/// damping, and the force of the object falls with a slope of at most `falling`. Returns 0 if no stiffness is
+/// certified.
 [[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
                                               double share = usual_coupling_share) {
     constexpr double finer = 0.97;
@@ -117,8 +119,8 @@ inline constexpr double usual_coupling_share = 0.95;
     return low;
 }
 
-/// An object without mass behind a coupling, its force limited: slopes of the limited force are those of the force or
-/// 0. Without coupling damping a static one is a static force F(x) of slope K_c f' / (K_c + f').
+/// Returns the lines of a limited object without mass behind a coupling. Slopes of the limited force are those of the
+/// force or 0. Without coupling damping a static force acts as a static force F(x) of slope K_c f' / (K_c + f').
 [[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     const VirtualCoupling coupling = scheme.coupling;
@@ -157,7 +159,8 @@ inline constexpr double usual_coupling_share = 0.95;
     return lines;
 }
 
-/// An object with mass behind a coupling, backward Euler. The mass does not help a force that falls.
+/// Returns the lines of an object with mass behind a coupling, by backward Euler. The mass does not reduce the need of
+/// a falling force.
 [[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     const VirtualCoupling coupling = scheme.coupling;
@@ -191,8 +194,8 @@ inline constexpr double usual_coupling_share = 0.95;
     return lines;
 }
 
-/// An object with mass behind a coupling, stepped so that it stores what it is given: passive for any slope, and at any
-/// solution of the step.
+/// Returns the lines of an object with mass behind a coupling by the energy-consistent step, which stores exactly the
+/// work done on it. It is passive for any slope, and at any solution of the step.
 [[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
                                                           const ForceBounds& bounds, const Scheme& scheme,
                                                           const DeviceProfile& device) {

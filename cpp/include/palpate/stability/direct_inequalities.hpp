@@ -30,12 +30,14 @@ namespace detail {
             "Abbott and Okamura 2005; Diolaiti et al. 2006; docs/certificate.md"};
 }
 
+/// Returns the line h >= 0 for hysteresis.
 [[nodiscard]] inline Inequality loss_inequality(const ForceBounds& bounds) {
     return {"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
             Basis::Proved,      "docs/certificate.md"};
 }
 
-/// Damping that covers hold and delay of a force with these slopes, and B_v of its dependence on velocity.
+/// Returns the line for damping, which must exceed the effects of hold and delay on a force with these slopes, and B_v
+/// of its dependence on velocity.
 [[nodiscard]] inline Inequality hold_inequality(const DeviceProfile& device, SlopeRange slopes, double drag,
                                                 const std::string& formula) {
     const double T = device.longest_period_s();

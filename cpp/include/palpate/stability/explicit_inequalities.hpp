@@ -82,9 +82,9 @@ namespace palpate {
     return best;
 }
 
-/// An object with mass behind a coupling, every force one sample old (paper figure 14). No proof covers it: what
-/// is known is where its linearisation is stable at a held device, and what damping makes the linearised port
-/// passive.
+/// Returns the lines of an object with mass behind a coupling, with forces that are one sample old (paper figure 14).
+/// They are not proofs. They state the slopes for which the linearisation is stable at a held device, and the damping
+/// that makes the linearised port passive.
 [[nodiscard]] inline std::vector<Inequality> inequalities(ExplicitStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     const Inertia inertia = scheme.inertia;

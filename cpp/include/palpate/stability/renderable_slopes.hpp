@@ -127,13 +127,14 @@ template <class Holds>
     return wide;
 }
 
-/// Object and coupling of the explicit structure: the stiffest coupling, then the least object damping, for which its
-/// linearisation is stable; the last ones tried if none is. `chosen` sets mass, damping, coupling and play radius.
+/// Returns object and coupling of the explicit structure: the stiffest coupling, then the least object damping, for
+/// which its linearisation is stable; otherwise the last ones tried. `chosen` sets mass, damping, coupling and play
+/// radius.
 [[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
                                             const SchemeChoices& chosen) {
     constexpr std::array shares{0.9, 0.75, 0.6, 0.45, 0.3, 0.15};  // of the stiffest coupling
     constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};              // B_o T / m; the paper's choice is 0.5
-    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};             // slope limit over the slope that it meets
+    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};             // slope limit / steepest slope
     const double T = device.period_s;
     const double stiffest = stiffest_coupling(0.0, 0.0, device);
     Scheme scheme;

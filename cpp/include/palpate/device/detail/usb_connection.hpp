@@ -73,6 +73,7 @@ class UsbConnection {
         return opened;
     }
 
+    /// Releases the device.
     void close() noexcept {
         handle_.reset();
         context_.reset();
@@ -94,6 +95,7 @@ class UsbConnection {
   private:
     using Handle = std::unique_ptr<libusb_device_handle, CloseHandle>;
 
+    /// A suitable device, open.
     struct Candidate {
         Handle handle;
         UsbName name;
@@ -125,6 +127,7 @@ class UsbConnection {
         return {refusal(serial, fitting, others, reasons)};
     }
 
+    /// Returns the sentence about none or several suitable devices.
     [[nodiscard]] static std::string refusal(const std::string& serial, const std::vector<Candidate>& fitting,
                                              const std::vector<std::string>& others,
                                              const std::vector<std::string>& reasons) {

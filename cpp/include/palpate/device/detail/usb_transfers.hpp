@@ -151,10 +151,12 @@ class UsbTransfers {
 
     /// Returns the number of packets that wait.
     [[nodiscard]] std::size_t arrived() const noexcept { return arrivals_.size(); }
+    /// Takes the oldest packet. Returns false if there is none.
     [[nodiscard]] bool take(UsbArrival& arrival) noexcept { return arrivals_.pop({&arrival, 1}) == 1; }
 
     /// Returns true after an error that cannot be recovered: unplugged, or a repeated error.
     [[nodiscard]] bool is_gone() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
+    /// Returns the first error that cannot be recovered; 0 without one.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
     [[nodiscard]] std::uint64_t bus_errors() const noexcept {
@@ -191,6 +193,7 @@ class UsbTransfers {
 
     // ---------------------------------------------------------------------------------------- event thread
 
+    /// Runs libusb's events until the stop.
     void handle_events() noexcept {
         // This thread has a higher priority than the loop, because a waiting packet makes the loop late.
         const sched_param priority{90};
@@ -251,6 +254,7 @@ class UsbTransfers {
         read.owner->read_ended(read);
     }
 
+    /// Handles the end of a read: passes the packet on and submits the read again.
     void read_ended(Read& read) noexcept {
         const libusb_transfer& transfer = *read.transfer;
         switch (transfer.status) {
@@ -280,6 +284,7 @@ class UsbTransfers {
         }
     }
 
+    /// Passes a packet to the loop's thread.
     void deliver(const Read& read) noexcept {
         UsbArrival arrival;
         arrival.time = monotonic_now();
@@ -298,6 +303,7 @@ class UsbTransfers {
         static_cast<UsbTransfers*>(transfer->user_data)->write_ended(*transfer);
     }
 
+    /// Handles the end of a write.
     void write_ended(const libusb_transfer& transfer) noexcept {
         if (transfer.status != LIBUSB_TRANSFER_COMPLETED) {
             lost_writes_.fetch_add(1, std::memory_order_relaxed);
@@ -331,6 +337,7 @@ class UsbTransfers {
         self.changes_.happened();
     }
 
+    /// Returns the error of libusb for the status of a transfer.
     [[nodiscard]] static int error_of(libusb_transfer_status status) noexcept {
         switch (status) {
             case LIBUSB_TRANSFER_COMPLETED:
@@ -361,6 +368,7 @@ class UsbTransfers {
         return true;
     }
 
+    /// Counts an error of the bus. Many consecutive errors are final.
     void failed() noexcept {
         bus_errors_.fetch_add(1, std::memory_order_relaxed);
         if (++errors_in_a_row_ >= errors_to_give_up) {

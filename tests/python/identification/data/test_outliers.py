@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Single wrong readings are left out and reported; sparse recordings and brief contacts stay whole."""
+"""Wrong readings are left out or weighed down, and counted."""
 
 import numpy as np
 import pandas as pd
@@ -7,7 +7,7 @@ import pytest
 
 import palpate
 from imperfect import TRAVEL, Array, noise, recorded, strokes, sweep, true_nrmse, wall
-from palpate.identification.data.outliers import without_isolated
+from palpate.identification.data.outliers import suspects, without_isolated
 from palpate.identification.identify_files import identify_files
 
 N = 10_000
@@ -113,3 +113,53 @@ def test_sums_over_files_refuse_a_spike(tmp_path: pytest.TempPathFactory) -> Non
     model = identify_files(path)
     recording = palpate.read_recording(path)
     assert model.fit.nrmse == pytest.approx(palpate.verify(model, recording).nrmse, rel=1e-6)
+
+
+FEW = 4000
+
+
+def with_outliers(y: Array, share: float) -> Array:
+    """The force with that share of rows moved by ten ranges."""
+    random, wrong = np.random.default_rng(8), y.copy()
+    rows = random.choice(len(y), round(share * len(y)), replace=False)
+    wrong[rows] += random.choice([-10.0, 10.0], len(rows)) * np.ptp(y)
+    return wrong
+
+
+@pytest.mark.parametrize("positions", ["strokes", "shuffled"])
+@pytest.mark.parametrize("share", [0.01, 0.05])
+def test_outliers_of_ten_ranges_cost_nothing(share: float, positions: str) -> None:
+    x = strokes(FEW) if positions == "strokes" else np.random.default_rng(9).permutation(sweep(FEW))
+    y = wall(x) + noise(FEW)
+    clean = palpate.identify(recorded(x, y))
+    model = palpate.identify(recorded(x, with_outliers(y, share)), loss="huber")
+    assert true_nrmse(model, wall) < max(1.5 * true_nrmse(clean, wall), 0.001)
+    assert model.fit.nrmse == pytest.approx(clean.fit.nrmse, rel=0.05)
+    assert "left out as wrong readings" in str(model.verdict)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05])
+def test_outliers_do_not_hide_hysteresis(share: float) -> None:
+    x = strokes(FEW)
+    side = np.where(np.gradient(x) > 0.0, 1, -1)
+    y = wall(x) + side + noise(FEW)
+    recording = palpate.Recording.from_arrays(x, with_outliers(y, share), direction=side)
+    model = palpate.identify(recording, loss="huber")
+    assert model.fit.model_class == "hysteresis"
+    truth = wall(x) + side
+    error = model.force(x, direction=side.astype(float)) - truth
+    assert np.sqrt(np.mean(error**2)) < 0.003 * np.std(truth)
+
+
+def test_click_and_step_are_no_outliers() -> None:
+    x = sweep(FEW)
+    click = wall(x) + np.where(np.abs(x - 0.2) < 0.005, 2.0, 0.0) + np.where(x > 0.3, 5.0, 0.0)
+    assert not suspects(x[:, None], click + noise(FEW), None, None).any()
+
+
+def test_rows_without_outliers_lose_none() -> None:
+    x = strokes(FEW)
+    y = wall(x) + noise(FEW)
+    model = palpate.identify(recorded(x, y), loss="huber")
+    assert model.verdict.level == "good"
+    assert true_nrmse(model, wall) < 0.001

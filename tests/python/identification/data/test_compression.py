@@ -4,7 +4,15 @@
 import numpy as np
 import pytest
 
-from palpate.identification.data.compression import Compressed, Compressor, binning_error
+from palpate.identification.data.compression import (
+    BLOCKS,
+    Compressed,
+    Compressor,
+    binning_error,
+    gain,
+    held_out_rows,
+    inside,
+)
 from palpate.identification.network.basis import Basis
 from palpate.identification.network.separable import problem_of
 
@@ -82,3 +90,37 @@ def test_a_million_rows_compress_to_a_bounded_number() -> None:
     rows = Compressor(x[:, None], wall(x), max_positions=1024).rows()
     assert len(rows.force) == 1024
     assert rows.weight.sum() == 1_000_000
+
+
+def test_fresh_stretches_of_a_motion_are_not_scattered_rows() -> None:
+    scattered, stretches = held_out_rows(10_000, None), held_out_rows(10_000, (0,))
+    assert scattered.mean() == pytest.approx(0.2)
+    assert stretches.mean() == pytest.approx(0.2)
+    assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * BLOCKS / 5
+
+
+def test_a_gain_has_an_error_of_its_own() -> None:
+    random = np.random.default_rng(0)
+    noise = random.normal(size=50_000)
+    share, error = gain(2.0 * noise, noise)
+    assert share == pytest.approx(0.75)
+    assert error < 1e-12
+    share, error = gain(random.normal(size=50_000), noise)
+    assert abs(share) < 4.0 * error
+    assert gain(np.zeros(100), np.zeros(100)) == (0.0, 0.0)
+
+
+def test_a_trimmed_gain_leaves_out_groups_at_both_ends() -> None:
+    below, above = np.full(1000, 2.0), np.ones(1000)
+    above[:60] = 100.0
+    share, error = gain(below, above)
+    assert share < -100.0
+    assert error > 0.0
+    assert gain(below, above, trim=0.1) == (pytest.approx(0.75), pytest.approx(0.0))
+
+
+def test_rows_inside_lie_within_the_range_of_the_others_in_every_input() -> None:
+    others = np.array([[0.0, 5.0], [1.0, 6.0]])
+    rows = np.array([[0.5, 5.5], [0.0, 6.0], [1.1, 5.5], [0.5, 4.9]])
+    np.testing.assert_array_equal(inside(rows, others), [True, True, False, False])
+    assert not inside(rows, others[:0]).any()

@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Inputs by name, positions modulo a period, and the paper's filters."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate
+from palpate import InputError, Recording, identify, load_model, read_recording, verify
+from palpate._core.dynamics import environment_filters
+from palpate.cli.main import main
+from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
+from palpate.identification.data.rows import paper_target
+from palpate.recording import sample_force, sample_recording
+
+
+def hunt_crossley(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return 800.0 * np.maximum(x, 0.0) ** 1.5 * (1.0 + 1.2 * v)
+
+
+def contact(seed: int, n: int = 4000) -> Recording:
+    random = np.random.default_rng(seed)
+    x, v = random.uniform(-0.002, 0.01, n), random.uniform(-0.2, 0.2, n)
+    force = hunt_crossley(x, v)
+    noisy = force + random.normal(0.0, 0.01 * force.std(), n)
+    return Recording.from_arrays(x, noisy, inputs={"velocity": v}, units={"position": "m", "force": "N"})
+
+
+def test_a_force_of_position_and_velocity_is_identified_and_verified_on_fresh_data() -> None:
+    model = identify(contact(0))
+    assert (model.kind, model.inputs, model.fit.model_class) == (
+        "position_velocity",
+        ("position", "velocity"),
+        "velocity",
+    )
+    assert model.n_parameters == 5 * model.n_wavelets + 3
+    random = np.random.default_rng(9)
+    X = random.uniform([-0.002, -0.2], [0.01, 0.2], (5000, 2))
+    truth = hunt_crossley(*X.T)
+    assert np.sqrt(np.mean((model.predict(X) - truth) ** 2)) < 0.004 * truth.std()
+    fresh = verify(model, contact(1))
+    assert fresh.fresh
+    assert fresh.nrmse == pytest.approx(0.01, rel=0.1)
+
+
+def test_each_input_has_a_dilation_of_its_own_after_refinement() -> None:
+    random = np.random.default_rng(1)
+    X = random.uniform(0.0, 1.0, (3000, 2))
+    r2 = (20.0 * (X[:, 0] - 0.4)) ** 2 + (4.0 * (X[:, 1] - 0.6)) ** 2
+    y = (r2 - 2.0) * np.exp(-0.5 * r2) + random.normal(0.0, 0.01, len(X))
+    network = fit_environment(X, y)
+    assert len(network.weight) == 1
+    assert network.alpha[0] == pytest.approx([20.0, 4.0], rel=0.02)
+    assert network.beta[0] == pytest.approx([0.4, 0.6], abs=0.005)
+
+
+def test_an_input_without_influence_earns_no_wavelet() -> None:
+    random = np.random.default_rng(2)
+    X = random.uniform(0.0, 1.0, (2000, 3))
+    network = fit_environment(X, 3.0 * X[:, 0] - X[:, 1] + random.normal(0.0, 0.1, len(X)))
+    assert (network.model_class, len(network.weight), network.n_parameters) == ("linear", 0, 4)
+
+
+def test_six_inputs_and_many_rows_need_no_grid() -> None:
+    random = np.random.default_rng(3)
+    X = random.uniform(-1.0, 1.0, (30_000, 6))
+    truth = np.exp(-2.0 * (X[:, 0] ** 2 + X[:, 3] ** 2)) + 0.5 * X[:, 1]
+    network = fit_environment(
+        X,
+        truth + random.normal(0.0, 0.02, len(X)),
+        None,
+        IdentifyOptions(max_wavelets=6, search=SearchOptions(max_positions=64)),
+    )
+    assert network.nrmse < 0.5
+    assert any("evenly spread, stand for all of them" in note for note in network.notes)
+
+
+def test_columns_are_named_as_in_the_file_and_their_units_converted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for seed, name in enumerate(("a.csv", "b.csv")):
+        random = np.random.default_rng(seed)
+        depth, place = random.uniform(0.0, 3.0, 500), random.uniform(0.0, 40.0, 500)
+        force = depth * (1.0 + 0.5 * np.exp(-(((place - 20.0) / 6.0) ** 2))) + random.normal(0, 0.02, 500)
+        rows = np.column_stack([place, depth, force])
+        np.savetxt(name, rows, delimiter=",", header="place_mm,depth_mm,force_N", comments="")
+    reading = ["--position", "depth_mm"]
+    assert main(["identify", "a.csv", *reading, "--inputs", "position,place_mm", "-o", "m.json"]) == 0
+    model = palpate.load_model("m.json")
+    assert model.inputs == ("position", "place_m")
+    assert model.upper[1] == pytest.approx(0.04, rel=0.05)
+    capsys.readouterr()
+    assert main(["verify", "m.json", "b.csv", *reading, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["fresh"] is True
+    assert found["nrmse"] < 0.05
+
+
+def test_velocity_comes_from_time_where_it_is_no_column() -> None:
+    t = np.arange(0.0, 20.0, 1e-3)
+    x = 0.5 - 0.5 * np.cos(2.0 * np.pi * (0.5 * t + 0.02 * t**2))
+    v = np.gradient(x, t)
+    noise = np.random.default_rng(4).normal(0.0, 0.01, len(t))
+    recording = Recording.from_arrays(x, 2.0 * x + 0.3 * v + noise, time=t)
+    model = identify(recording, inputs="position,velocity")
+    assert (model.kind, model.n_wavelets) == ("position_velocity", 0)
+    assert model.linear == pytest.approx([2.0, 0.3], rel=5e-3)
+    assert verify(model, recording).rmse == pytest.approx(0.01, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "told"),
+    [
+        ("position,place", "has no input place, only position, velocity; read the recording with"),
+        ("position,hysteresis,velocity", "hysteresis is identified over position alone"),
+        ("position,position", "inputs is 'position,position'"),
+    ],
+)
+def test_an_input_that_cannot_be_had_is_refused_in_one_sentence(inputs: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        identify(contact(0, 100), inputs=inputs)
+
+
+def test_a_velocity_without_time_is_refused() -> None:
+    x = np.linspace(0.0, 1.0, 100)
+    with pytest.raises(InputError, match="velocity needs time"):
+        identify(Recording.from_arrays(x, x), inputs="position,velocity")
+
+
+def test_strokes_that_one_recording_does_not_state_leave_hysteresis_untested_and_say_so() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
+    side = np.repeat([1.0, -1.0], 200)
+    force = x + 0.2 * side + np.random.default_rng(0).normal(0.0, 0.01, 400)
+    stated = Recording.from_arrays(x, force, direction=side)
+    order = np.random.default_rng(1).permutation(400)
+    shuffled = Recording.from_arrays(x[order], force[order])
+    told = str(identify([stated, shuffled]).verdict)
+    assert "hysteresis was not tested: recording 2 has no direction" in told
+    assert identify([stated, stated]).kind == "hysteresis"
+    assert identify([stated, Recording.from_arrays(x, force)]).kind == "hysteresis"
+
+
+def test_measured_probing_of_organs_is_a_force_of_depth_and_place(data: Path) -> None:
+    """Three inputs; every fifth row held out."""
+    errors = []
+    for path in sorted((data / "organ_probing").glob("*.csv"))[::3]:
+        recording = palpate.read_recording(
+            path, position="depth_mm", force="normal_force_N", inputs=("contact_x_mm", "contact_y_mm")
+        )
+        train, test = recording.split(5)
+        errors.append(verify(identify(train), test).nrmse)
+    assert np.median(errors) < 0.4
+
+
+TURN = 2.0 * np.pi
+
+
+def knob(turns: float, n: int = 400, *, end: bool = False, seed: int = 0) -> Recording:
+    """Seven detents a turn, sampled from 0.3 rad on; without its end, one step of the turn is missing."""
+    x = 0.3 + np.linspace(0.0, turns * TURN, n, endpoint=end)
+    force = np.sin(7.0 * x) + 0.3 * np.cos(x) + np.random.default_rng(seed).normal(0.0, 0.01, n)
+    return Recording.from_arrays(x, force)
+
+
+def test_a_turn_that_lacks_one_step_is_closed_and_the_gap_is_reported(tmp_path: Path) -> None:
+    model = identify(knob(1.0), period=TURN)
+    assert float(model.upper[0] - model.lower[0]) == pytest.approx(TURN, rel=1e-12)
+    assert model.fit.nrmse < 0.03
+    (note,) = (note for note in model.notes["identification"] if note.startswith("the gap of 0.01571"))
+    assert "0.25 % of the period" in note
+    assert model.verdict.level == "good"
+    again = load_model(model.save(tmp_path / "knob.json"))
+    assert again.period == TURN
+
+
+@pytest.mark.parametrize("turns", [1.0, 2.3])
+def test_the_force_is_continuous_over_the_seam(turns: float) -> None:
+    model = identify(knob(turns, int(400 * turns)), period=TURN)
+    network = {name: getattr(model, name) for name in ("alpha", "beta", "weight", "linear", "bias")}
+    lower, upper = float(model.lower[0]), float(model.upper[0])
+
+    def evaluated(x: float) -> float:
+        u = (network["alpha"] * (x - network["beta"]))[:, 0]
+        wavelets = (u * u - 1.0) * np.exp(-0.5 * u * u)
+        return float(network["weight"] @ wavelets + network["linear"][0] * x + network["bias"])
+
+    assert evaluated(upper) == pytest.approx(evaluated(lower), abs=1e-7)
+    x = np.linspace(lower - 1.0, upper + 1.0, 3000)
+    assert np.abs(model.force(x) - np.sin(7.0 * x) - 0.3 * np.cos(x)).max() < 0.1
+    assert verify(model, knob(1.7, 900, seed=5)).nrmse < 0.03
+
+
+def test_data_longer_than_a_period_are_taken_modulo_the_period() -> None:
+    model = identify(knob(2.3, 1200), period=TURN)
+    assert any("span 2.298 periods" in note for note in model.notes["identification"])
+    assert verify(model, knob(3.0, 1000, seed=1)).extrapolated == 0
+
+
+def test_hysteresis_of_a_knob_follows_the_motion_and_not_the_wrapped_position() -> None:
+    """Two turns forth and back: the play operator must not jump at the seam."""
+    time = 1e-3 * np.arange(8000)
+    x = TURN * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
+    friction = 0.2 * np.sign(np.gradient(x))
+    force = np.sin(3.0 * x) + friction + np.random.default_rng(2).normal(0.0, 0.01, len(x))
+    model = identify(Recording.from_arrays(x, force, time), period=TURN)
+    assert model.kind == "hysteresis"
+    assert model.fit.nrmse < 0.06  # a jump at the seam leaves 0.2; friction of a smaller play leaves 0.05
+
+
+@pytest.mark.parametrize(("missing", "level"), [(0.02, "good"), (0.2, "usable"), (0.7, "no")])
+def test_a_part_of_the_period_without_rows_is_a_finding(missing: float, level: str) -> None:
+    verdict = identify(knob(1.0 - missing), period=TURN).verdict
+    assert verdict.level == level
+    assert any("no position lies between" in reason for reason in verdict.reasons) == (level != "good")
+
+
+def test_a_period_of_several_inputs_is_refused() -> None:
+    random = np.random.default_rng(0)
+    X = random.uniform(0.0, 1.0, (200, 2))
+    with pytest.raises(
+        InputError, match="period is for a force over position alone, not over position, load"
+    ):
+        fit_environment(X, X.sum(axis=1), None, IdentifyOptions(period=1.0), names=("position", "load"))
+
+
+def test_every_measured_turn_takes_its_period(data: Path) -> None:
+    for path in sorted((data / "motor_cogging").glob("map_*.csv")):
+        kept, held = read_recording(path, position="angle_rad", force="hold_current_A").split(5)
+        model = identify(kept, period=6.283185307179586)
+        assert model.period == 6.283185307179586, path.name
+        assert verify(model, held).nrmse < 1.3 * verify(identify(kept), held).nrmse, path.name
+
+
+def spring(rate: float, *, mass: float = 0.0, damping: float = 0.0) -> Recording:
+    """3 N*m/rad swept sinusoidally, with a mass and a damping."""
+    t = np.arange(0.0, 10.0, 1e-3)
+    x = 0.3 * np.sin(rate * t)
+    force = 3.0 * x - mass * rate**2 * x + damping * 0.3 * rate * np.cos(rate * t)
+    return Recording.from_arrays(x, force, time=t)
+
+
+@pytest.mark.parametrize(
+    ("filters", "mass", "damping"), [("paper-implicit", 0.02, 0.0), ("paper-explicit", 0.02, 0.5)]
+)
+def test_a_slow_motion_leaves_the_static_force(filters: str, mass: float, damping: float) -> None:
+    """G I is within 5 % of 1 well below 100 rad/s; what is left of m and B_o is small."""
+    recording = spring(4.0, mass=mass, damping=damping)
+    options = IdentifyOptions(search=SearchOptions(filters=filters, assumed_mass=0.02, assumed_damping=0.5))
+    target = paper_target(recording, options)[200:]
+    wrong = np.abs(target - 3.0 * recording.position[200:]).max()
+    assert wrong < 0.1 * np.abs(recording.force - 3.0 * recording.position).max() + 0.01
+
+
+def test_the_target_is_the_force_less_the_filtered_motion() -> None:
+    recording = spring(20.0)
+    options = IdentifyOptions(
+        search=SearchOptions(filters="paper-explicit", assumed_mass=0.01, assumed_damping=0.2)
+    )
+    pair = environment_filters("explicit")
+    velocity = pair.g2.filter(recording.position)
+    expected = recording.force - 0.01 * pair.g1.filter(velocity) - 0.2 * velocity
+    np.testing.assert_allclose(paper_target(recording, options), expected, atol=1e-12)
+
+
+def test_the_model_holds_the_assumed_mass_and_damping() -> None:
+    recording = sample_recording(1, duration_s=5.0)
+    model = identify(recording, search=SearchOptions(filters="paper-explicit"))
+    assert (model.mass, model.damping) == (1e-3, 0.5)
+    assert identify(recording, search=SearchOptions(filters="paper-implicit")).damping is None
+
+
+def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> None:
+    """Known truth: the paper's lag costs it, the matched route uses raw positions and forces."""
+    recording = sample_recording(1, duration_s=20.0)
+    x = np.linspace(-0.2, 0.469, 2001)
+    truth = sample_force(x)
+    errors = {
+        filters: float(
+            np.sqrt(
+                np.mean((identify(recording, search=SearchOptions(filters=filters)).force(x) - truth) ** 2)
+            )
+        )
+        for filters in ("matched", "paper-implicit", "paper-explicit")
+    }
+    assert errors["matched"] < 0.25 * errors["paper-implicit"] < 0.25 * errors["paper-explicit"]
+
+
+def test_other_periods_than_the_papers_are_refused() -> None:
+    x = np.linspace(0.0, 1.0, 100)
+    with pytest.raises(InputError, match=r"filters need time"):
+        identify(Recording.from_arrays(x, x), search=SearchOptions(filters="paper-implicit"))
+    with pytest.raises(InputError, match=r"made for steps of 0.001 s; the recording's are from 0.01 to 0.01"):
+        identify(
+            Recording.from_arrays(x, x, time=0.01 * np.arange(100)),
+            search=SearchOptions(filters="paper-explicit"),
+        )
