@@ -18,7 +18,7 @@ COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 # A room may import the rooms before it.
 ROOMS = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
-# Leaves may import any room but cli; they are imported by cli and the report only.
+# Leaves may import any room but cli; only cli imports them.
 LEAVES = {"plotting", "baselines"}
 
 # Folder of the headers -> what it may include, besides itself, status.hpp and fields.
@@ -132,8 +132,6 @@ HEADER_FILES = sorted(HEADERS.rglob("*.hpp"))
 def test_python_imports_point_one_way(path: Path) -> None:
     room = room_of(path)
     wrong = imported_rooms(path) - may_import(room)
-    if path.relative_to(PACKAGE).as_posix() == "verification/report.py":
-        wrong -= LEAVES
     assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
 
 
