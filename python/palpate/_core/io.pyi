@@ -21,8 +21,8 @@ def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any,
     """
 def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     """
-    Device profile of the content of a file. ValueError: the first wrong field, its value, what would
-    be right.
+    Returns the device profile in the content of a file. ValueError names the first wrong field, its
+    value and the correct ones.
     """
 def read_json(path: str) -> typing.Any:
     """
