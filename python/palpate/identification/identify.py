@@ -58,12 +58,12 @@ def identify(
     -------
     Model
         ``model.verdict`` judges it. ``model.fit`` holds its class and why growth stopped, ``model.path``
-        every network that was considered, ``model.notes["identification"]`` what was refused or left out.
+        every network that was considered, ``model.notes["identification"]`` refusals and rows left out.
 
     Raises
     ------
     palpate.InputError
-        For an unknown option or a bad value, and for data that give no force over position.
+        For an unknown option or a bad value, and for data without a force over position.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def fit_environment(
     Parameters
     ----------
     positions : (n, d)
-        Positions, growing into the object, and what else the force depends on.
+        Positions, growing into the object, and further inputs of the force.
     force : (n,)
         Force of the object against the tool.
     side : (n,), optional
@@ -139,9 +139,9 @@ def fit_environment(
     names : sequence of str, optional
         Of the inputs, for the sentences.
     weight : (n,), optional
-        Samples that each row stands for, above 0; 1 without it.
+        Samples that each row represents, above 0; 1 without it.
     within : float
-        Sum of squares of the force inside rows that stand for several samples.
+        Sum of squares of the force inside rows that represent several samples.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     found = identified(select(replace(rows, notes=(*rows.notes, left_out)).only(side != 0), options))
     if found.weight_hysteresis is not None:
         return found
-    # hysteresis was refused, so there is no reason any more to leave out rows that have no direction
+    # hysteresis was refused, so rows without a direction need not be left out
     every_row = replace(rows, side=None, starts=None, parts=(), notes=(), findings=())
     again = identified(select(every_row, options))
     return replace(

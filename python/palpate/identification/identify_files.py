@@ -2,12 +2,12 @@
 """identify_files: from files that may be larger than memory to a model, block by block.
 
 A block of rows becomes a summary: for each cell of position and each stroke the count, the mean position and
-force, and the sums of squares and products about them. Two summaries merge into one that stands for both
-(Chan, Golub and LeVeque 1979), so cells hold what one pass over all rows would have put there, to rounding.
+force, and the sums of squares and products about them. Two summaries merge into one that represents both
+(Chan, Golub and LeVeque 1979), so cells hold the sums of one pass over all rows, to rounding.
 
 Cells are single positions while these are few, else intervals [k 2^level, (k + 1) 2^level): cells of one
 level nest in those of the next, and no range has to be known before. The summary of a block depends on its
-rows alone and blocks are merged in their order, whoever made them: the result is the same to the last bit.
+rows alone, and blocks are merged in their order, not that of the workers: the result is always the same.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ LEAST_KNOWN = 0.5
 """Share of the rows whose direction must be known to test hysteresis [-]."""
 
 MOST_CELLS = 8192
-"""Cells of position that are kept apart: as fine as identification ever asks for."""
+"""Cells of position that are kept apart: as fine as identification needs."""
 
 SCATTER_ROWS = 16
 """Neighbouring cells in which the force of single rows is compared with one line."""
 
 Progress = Callable[[int, int], None]
-"""Told how many parts of how many are read."""
+"""Receives the parts that are read and the parts in all."""
 
 
 def identify_files(
@@ -100,7 +100,7 @@ def identify_files(
     Returns
     -------
     Model
-        The same to the last bit whoever read the parts.
+        The same to the last bit with any number of workers.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def identify_files(
     for recording, found in zip(recordings, of_file, strict=True):
         _require_all_rows(recording, found)
         told = found.left_out.sentences(recording.places())
-        # The columns stand in the source of the model; the form of the file does not.
+        # The source of the model holds the columns, but not the form of the file.
         told = [note for note in recording.notes[:1] if "read as" in note] + [*recording.notes[1:], *told]
         notes += [f"{recording.path}: {sentence}" for sentence in told] if len(recordings) > 1 else told
     summaries = [found.summary for found in of_file if found.summary is not None]
@@ -157,7 +157,7 @@ def identify_files(
 
 @dataclass
 class PartRead:
-    """What was read of a part of a file, or of parts that follow each other."""
+    """Rows read from a part of a file, or from parts that follow each other."""
 
     summary: Summary | None = None
     """None where no row is usable"""
@@ -320,7 +320,7 @@ class Summary:
 
     @property
     def rows(self) -> float:
-        """How many rows it stands for."""
+        """Number of rows that it represents."""
         return float(self.count.sum())
 
     @property
@@ -341,7 +341,7 @@ class Summary:
 
     @property
     def within(self) -> float:
-        """Sum of squares of the force within cells that no slope across them explains [force^2]."""
+        """Sum of squares of the force within cells that slopes across them do not explain [force^2]."""
         if self.level is None:
             return float(self.yy.sum())
         _, group = np.unique(np.floor(self.cell / POOLED_CELLS), return_inverse=True)
@@ -388,14 +388,14 @@ def merged(first: Summary, second: Summary, most_cells: int = MOST_CELLS) -> Sum
     both = _joined(first, second, max(levels) if levels else None, lower, upper)
     if both.level is None and len(np.unique(both.cell)) > most_cells:
         both = _joined(first, second, _level_for(lower, upper, most_cells), lower, upper)
-    # a coarser level that the range asks for, not the number of cells in use: gaps may be filled later
+    # a coarser level that the range requires, not the number of cells in use: gaps may be filled later
     if both.level is not None and (needed := _level_for(lower, upper, most_cells)) > both.level:
         both = _joined(first, second, needed, lower, upper)
     return both
 
 
 def _level_for(lower: float, upper: float, most_cells: int) -> int:
-    """The finest level at which the range takes no more than most_cells cells (and the one it begins in)."""
+    """The finest level at which the range takes at most most_cells cells (and the one it begins in)."""
     return math.ceil(math.log2(max(upper - lower, np.finfo(float).tiny) / most_cells))
 
 
@@ -466,16 +466,16 @@ def in_order(
     Parameters
     ----------
     work : callable
-        Its result must depend on the item alone: then nobody can tell from the results who did the work.
+        Its result must depend on the item alone: then the results do not depend on the worker.
     items : sequence
-        What a worker is sent.
+        Sent to the workers.
     jobs : int
         Processes of this machine, through joblib; 1: this process.
     scheduler : str, optional
         Address of a Dask scheduler, such as "tcp://host:8786": joblib hands the same work to it. Work that a
         lost worker had is done again by another.
     done : callable
-        Told how many items are done, whenever one is.
+        Receives the number of items that are done, after each.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from ..arguments import shown
 from ..errors import InputError
 
 RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
-"""What `inputs` may hold beside the names of columns."""
+"""Words of `inputs` that do not name columns."""
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "criterion": ("bic", "aicc", "gcv", "fpe", "fresh", "perceptual"),
@@ -26,7 +26,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
 }
-"""Settings that are words, and what each may be."""
+"""Settings that are words, and their choices."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class SearchOptions:
     Raises
     ------
     palpate.InputError
-        Naming the field, its value and what would be right.
+        Naming the field, its value and the cure.
     """
 
     selection: str = "orthogonal"
@@ -74,7 +74,7 @@ class SearchOptions:
     """Play radii tried for hysteresis where a recording has time but no direction; the best one between the
     least and the largest is found [share of the travel]"""
     contact_share: float = 0.02
-    """Where |f(lower)| is below this share of the force's range the object is left there: "free" below [-]"""
+    """Share of the force's range; with |f(lower)| below it the object is left there: "free" below [-]"""
 
     def __post_init__(self) -> None:
         _require(self)
@@ -103,7 +103,7 @@ class IdentifyOptions:
     Raises
     ------
     palpate.InputError
-        Naming the field, its value and what would be right.
+        Naming the field, its value and the cure.
     """
 
     inputs: str | tuple[str, ...] = "auto"
@@ -114,7 +114,7 @@ class IdentifyOptions:
     criterion: str = "bic"
     """Stopping rule: bic, aicc, gcv, fpe, or on held-out rows: fresh, perceptual"""
     loss: str = "squares"
-    """squares, or huber: rows far from the others pull no more than the others do"""
+    """squares, or huber: rows far from the others weigh as little as these"""
     hysteresis_nonnegative: bool = True
     """Impose h >= 0 over the domain, so that every loop loses energy"""
     slope_bounds: tuple[float, float] | None = None
@@ -151,7 +151,7 @@ class IdentifyOptions:
 
     @property
     def slope_limits(self) -> tuple[float, float] | None:
-        """All slope settings as one (min, max), infinite where nothing is asked; None if neither is set."""
+        """All slope settings as one (min, max), infinite where not limited; None if neither is set."""
         low, high = self.slope_bounds or (-math.inf, math.inf)
         if self.monotone:
             low = max(low, 0.0)
@@ -197,7 +197,7 @@ _ABOVE = {
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
-"""Real settings and what they must lie above."""
+"""Real settings and the number that they must exceed."""
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:
@@ -206,7 +206,7 @@ def _require(options: IdentifyOptions | SearchOptions) -> None:
     Raises
     ------
     InputError
-        Naming the field, its value and what would be right.
+        Naming the field, its value and the cure.
     """
     for each in fields(options):
         name, value = each.name, getattr(options, each.name)
@@ -231,7 +231,7 @@ def _parsed(name: str, text: str) -> Any:
     Raises
     ------
     InputError
-        There is no such setting, or the text is not of its type.
+        The setting is unknown, or the text is not of its type.
     """
     known = {each.name: each.default for each in fields(SearchOptions)}
     if name not in known:

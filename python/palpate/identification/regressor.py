@@ -42,7 +42,7 @@ SETTINGS = {
 """Those of :class:`IdentifyOptions` that need no recording, with defaults; search None: its own."""
 
 NARROWEST = 1e-12
-"""A column whose range is below this share of its largest value is constant but for rounding."""
+"""A column whose range is below this share of its largest value is constant except for rounding."""
 
 MOST_ROWS = 200_000
 """Rows, evenly spread, that the error is computed on: more change its third digit at most."""
@@ -62,7 +62,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     ----------
     **settings
         max_wavelets, criterion, loss and search of :class:`palpate.IdentifyOptions`, with the same defaults.
-        The settings of search that describe motion and contact have no effect.
+        The settings of search that describe motion and contact are ignored.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         X : (n, d) array_like
         y : (n,) array_like
         sample_weight : (n,) array_like, optional
-            How many samples each row stands for; 0 leaves a row out.
+            Samples that each row represents; 0 leaves a row out.
 
         Returns
         -------
@@ -182,7 +182,7 @@ def fit_regression(
     y : (n,)
         Finite numbers.
     weight : (n,), optional
-        How many samples each row stands for, >= 0; 1 without it. A row of weight 0 is left out.
+        Samples that each row represents, >= 0; 1 without it. A row of weight 0 is left out.
     options : IdentifyOptions
 
     Returns
@@ -209,7 +209,7 @@ def fit_regression(
         columns, scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
         return columns, scaled.unscaled(scale)
     varies = np.ptp(X, axis=0) > NARROWEST * np.abs(X).max(axis=0)
-    # a network needs an input: where none varies, the first stands in a box of its own width
+    # a network needs an input: where none varies, the first one gets a box as wide as its value
     columns = np.flatnonzero(varies) if varies.any() else np.zeros(1, dtype=np.int64)
     lower, upper = X[:, columns].min(axis=0), X[:, columns].max(axis=0)
     if not varies.any():
@@ -230,10 +230,10 @@ def fit_regression(
 
 
 def _margin(box: Float2D) -> float:
-    """How far the range that rows were drawn from reaches beyond them, on each side [box].
+    """Distance by which the range that rows were drawn from exceeds them, on each side [box].
 
     The extremes of m values drawn evenly from a range fall short of it by 1/(m + 1) of it on average, which
-    is 1/(m - 1) of what they span: no more than a few rows of a wavelet's core.
+    is 1/(m - 1) of their span: at most a few rows of a wavelet's core.
     """
     distinct = np.unique(box) if box.shape[1] == 1 else distinct_rows(box)[0]
     return 1.0 / max(len(distinct) - 1, 1)
@@ -245,7 +245,7 @@ def _unit(value: Float1D) -> Float1D:
 
 
 def _validated(estimator: WaveletNetworkRegressor, X: object, *y: object, **checks: Any) -> Any:
-    """What scikit-learn makes of X and y; its ValueError becomes an InputError that names them."""
+    """X and y as scikit-learn validates them; its ValueError becomes an InputError that names them."""
     for name, values in zip("Xy", (X, *y), strict=False):
         if np.ma.is_masked(values):
             raise InputError(f"{name} is a masked array; leave the masked rows out of X, y and sample_weight")

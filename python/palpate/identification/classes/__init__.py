@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model classes, and which of them earns its place."""
+"""Model classes and the selection among them."""

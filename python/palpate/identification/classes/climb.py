@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model selection: model classes in turn, the simplest first, on the rows of one recording.
+"""Model selection: model classes from the simplest on, over the rows of one recording.
 
 A class is judged on the same samples by the same criterion as the one below it, with its constraints imposed.
 It is accepted only if the criterion falls by `evidence` (of :class:`SearchOptions`) or more and if the error
-falls on held-out rows too. What a class gains, or would have gained, stands in the notes.
+falls on held-out rows too. The notes hold the gain of every class, accepted or not.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ NETWORKS = {("position",): "position", VELOCITY_INPUTS: "velocity"}
 
 
 class Climb:
-    """One model selection over the rows of one recording: what its model classes share, and the best so far.
+    """One model selection over the rows of one recording, and the best candidate so far.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Climb:
         self.take(classes)
 
     def take(self, classes: Sequence[type[ModelClass]]) -> None:
-        """Tries model classes in turn, each above the best candidate so far."""
+        """Tries model classes one after the other, each above the best candidate so far."""
         for model_class in classes:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
@@ -187,7 +187,7 @@ class Climb:
         return replace(candidate, solution=kept, n_parameters=candidate.n_parameters + more)
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
-        """The bounds that the options ask for."""
+        """The bounds that the options require."""
         slopes, reach = self.options.slope_limits, float(self.data.reach[0])
         return domain_bounds(
             problem,
@@ -241,7 +241,7 @@ class Linear(ModelClass):
 
 
 class Network(ModelClass):
-    """A wavelet network over the inputs, named by what they are."""
+    """A wavelet network over the inputs, named after them."""
 
     def __init__(self, climb: Climb) -> None:
         super().__init__(climb)

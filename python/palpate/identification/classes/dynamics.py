@@ -24,10 +24,10 @@ from ..options import IdentifyOptions
 from ..search.evidence import CRITERIA, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
-"""Stretches of the recording that are held out in turn."""
+"""Stretches of the recording that are held out one after the other."""
 
 NAMES = ("damping", "mass")
-"""What multiplies the columns v and a."""
+"""Factors of the columns v and a."""
 
 
 class FoldedRegression:
@@ -102,7 +102,7 @@ LEAST_SAMPLES = 40.0
 
 LEAST_SPREAD = 0.19
 """Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
-v is hardly more than its sign, and damping no other than friction."""
+v is close to its sign, and damping cannot be distinguished from friction."""
 
 TOO_SHORT = "velocity and mass were not tested: the motion between gaps of time is too short, or too noisy"
 
@@ -110,7 +110,7 @@ SLOW = 0.1
 """Speed at which the smoothed sign of the velocity is tanh(1), as a share of the RMS speed."""
 
 MOST_ROWS = 20_000
-"""Rows that are enough to see what a residual depends on."""
+"""Rows, evenly spread, that are enough to find the inputs of a residual."""
 
 
 class Dynamics:
@@ -134,7 +134,7 @@ class Dynamics:
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
     def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[str]]:
-        """Which of damping and mass are accepted beside f on these wavelets, and notes on each.
+        """Which of damping and mass are accepted with f on these wavelets, and notes on each.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class Dynamics:
         return regression.solved(use, names), notes
 
     def values(self, basis: Basis, side: Float1D | None, names: Sequence[str]) -> dict[str, float]:
-        """Values of these terms beside f on these wavelets; empty where the motion is too short for them."""
+        """Values of these terms with f on these wavelets; empty where the motion is too short for them."""
         regression = self._regression(basis, side)
         return {} if regression is None else regression.solved(side is not None, names)
 
@@ -235,7 +235,7 @@ class Dynamics:
         return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
 
     def _spread_of_speeds(self) -> float:
-        """Standard deviation of |v| over its mean, both along the way: rests and turns hardly count there."""
+        """Standard deviation of |v| over its mean, both along the way, where rests and turns count little."""
         speed = np.abs(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
         first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
         return float(np.sqrt(max(third * first / second**2 - 1.0, 0.0)))

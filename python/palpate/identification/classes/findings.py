@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings on an identified model: its error on the rows, its size, and what the inputs cannot explain."""
+"""Findings on an identified model: error on the rows, size, and force that the inputs cannot explain."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
 
 
 def _explained(values: Float1D, group: NDArray[np.intp]) -> float:
-    """Share of the variance of values (n,) between groups (n,), less what chance gives."""
+    """Share of the variance of values (n,) between groups (n,), less the share expected by chance."""
     _, index, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(index, values) / count
     total = float(np.sum((values - values.mean()) ** 2))
@@ -186,7 +186,7 @@ def explained_findings(
     Parameters
     ----------
     position, force, residual : (n,)
-        Rows in recorded order, and what the model leaves of their force.
+        Rows in recorded order, and the residual of the model.
     side : (n,) or None
         Direction, where the model has hysteresis.
     nrmse : float
@@ -226,13 +226,13 @@ EXTREME_SHARE = 0.01
 """Share of the rows, those with the most extreme forces, that must not decide the NRMSE alone [-]"""
 
 LEAST_ROWS = 100
-"""Rows below which one percent of them is no row."""
+"""Rows below which one percent of them is less than one row."""
 
 HIDDEN = 1.2
 """Ratio of the NRMSE without these rows to the reported NRMSE above which a finding says so [-]"""
 
 BETWEEN_ROWS = 4001
-"""Positions over the domain, beside the extrema of each wavelet, where the force between rows is computed."""
+"""Positions over the domain, with the extrema of each wavelet, where the force between rows is computed."""
 
 USABLE_BEYOND = 0.25
 """Share of the range of the recorded forces by which the model may exceed them without a finding [-].
@@ -275,7 +275,7 @@ def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
 def beyond_rows(network: FittedNetwork, force: Float1D, *, repeats: bool) -> list[Finding]:
     """A finding if a model of one input leaves the range of the recorded forces between the rows.
 
-    A stroke begins with a play of 2 r, in which no motion slides; a force that repeats has no such ends.
+    A stroke begins with a play of 2 r, without sliding; a force that repeats is without such ends.
     """
     reach = float(np.ptp(force))
     if len(network.lower) > 1 or not reach > 0.0:

@@ -41,7 +41,7 @@ WITHIN = 2.0
 """Ratio to the radius that helped most so far within which a better one is sought."""
 
 MOST_ROWS = 100_000
-"""Rows that are enough to tell one radius from another; more are thinned out evenly."""
+"""Rows that are enough to distinguish two radii; more are thinned out evenly."""
 
 
 class Hysteresis(ModelClass):
@@ -59,12 +59,12 @@ class Hysteresis(ModelClass):
 
     @classmethod
     def possible(cls, climb: Climb) -> bool:
-        """True if the options ask for hysteresis and the rows tell directions.
+        """True if the options allow hysteresis and the rows show directions.
 
         Raises
         ------
         InputError
-            The inputs name hysteresis, and nothing tells directions.
+            The inputs name hysteresis, and the rows show no directions.
         """
         inputs, data = climb.options.inputs, climb.data
         told = data.side is not None or (data.starts is not None and len(data.names) == 1)
@@ -119,9 +119,9 @@ class Hysteresis(ModelClass):
     def _grown(self, below: Candidate, found: Candidate) -> Candidate:
         """A network with hysteresis; the play radius is found once hysteresis is certain.
 
-        Wavelets grown at a wrong radius model what is wrong with it, as those of a single force do, and a
-        radius found on few wavelets makes up for those that are missing: growth begins anew, and the radius
-        is sought again whenever the network may be twice as large.
+        Wavelets grown at a wrong radius, or for a single force, model the error of the radius. A radius found
+        on few wavelets compensates for missing ones. So growth begins again from an empty basis, and the
+        radius is sought again whenever the network may be twice as large.
         """
         assert found.strokes is not None
         climb, play, most = self._climb, self._play, self._climb.options.max_wavelets
@@ -149,7 +149,7 @@ class Hysteresis(ModelClass):
     def _single_valued(self, hysteresis: Candidate) -> Candidate:
         """A force of position alone on the wavelets of hysteresis, those it does not need removed.
 
-        Where hysteresis is there but not with h >= 0, this is what remains of it. A network grown on position
+        Where hysteresis is there but not with h >= 0, this is the remaining part. A network grown on position
         alone will not do: strokes that a periodic motion samples at different places look like one rapidly
         changing force.
         """
@@ -271,7 +271,7 @@ class PlaySearch:
     def _left_by(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
         """Sum of squares that the best weights on given wavelets leave in these rows, for all radii the same.
 
-        What noise left in some row and not in another, by luck, is no reason to prefer a radius.
+        The random error of rows that only one radius knows must not decide between radii.
         """
         strokes = replace(strokes, known=known)
         problem = self._samples.problem(self._samples.rows(strokes), strokes)
@@ -279,7 +279,7 @@ class PlaySearch:
 
 
 def _thinned(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Of these rows (n,) no more than MOST_ROWS, evenly spread."""
+    """At most MOST_ROWS of these rows (n,), evenly spread."""
     thin = np.zeros_like(rows)
     thin[:: max(1, -(-len(rows) // MOST_ROWS))] = True
     return np.asarray(rows & thin)

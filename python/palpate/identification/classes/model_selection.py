@@ -22,11 +22,11 @@ MOST_HALVINGS = 3
 """Times that cells are halved at most."""
 
 DYNAMIC_ROUNDS = 2
-"""Times that the model is selected again beside velocity and mass, on ever better values of theirs."""
+"""Times that the model is selected again, with better values of damping and mass each time."""
 
 WORTH_A_VELOCITY = 0.05
-"""Share of the squared error that velocity as an input must take away beside a constant damping: a force of
-two inputs is harder to render."""
+"""Share of the squared error that velocity as an input must remove in addition to a constant damping: a force
+of two inputs is harder to render."""
 
 WORTH_FRICTION = 0.25
 """The same where no constant damping was found, such as for Coulomb friction: its sign changes with that of
@@ -52,7 +52,7 @@ LEAST_CORE = 1.0 / 64.0
 
 
 def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> Climb:
-    """Selects a model: the classes at rest, revised where the rows ask for it, then those in motion.
+    """Selects a model: the classes at rest, revised where the rows require it, then those in motion.
 
     Cells are halved until they are fine enough. Outliers are weighed down if the loss is Huber's.
     """
@@ -114,7 +114,7 @@ def correlated_noise(first: Climb) -> Climb:
     chosen = min(found, key=lambda each: each[0])[1]
     full = first.best.stop_reason == "max_wavelets"
     if full and 2 * chosen.best.n_wavelets > first.best.n_wavelets:
-        return first  # what so many wavelets left is unfitted structure rather than noise
+        return first  # the residual of so many wavelets is unfitted structure rather than noise
     return chosen
 
 
@@ -146,7 +146,7 @@ def no_finer_than_explained(first: Climb) -> Climb:
 
 
 class MassAndDamping(ModelClass):
-    """Mass and damping, beside a model at rest that is selected again without their force."""
+    """Mass and damping, added to a model at rest that is selected again without their force."""
 
     @classmethod
     def possible(cls, climb: Climb) -> bool:
@@ -235,7 +235,7 @@ AT_REST = (Linear, Network, Hysteresis)
 """Model classes above the constant force, the simplest first, that do not depend on the motion."""
 
 REVISIONS = (correlated_noise, no_finer_than_explained)
-"""What selects a model at rest again, where its residual asks for it."""
+"""Steps that select a model at rest again where its residual requires it."""
 
 IN_MOTION = (MassAndDamping, Velocity)
 """Model classes above them that need the motion."""

@@ -5,9 +5,9 @@ An encoder repeats its positions, and the least squares of eq. 4 needs of equal 
 count, their mean force and the sum of squares within the group:
 sum_k (y_k - f(x))^2 = w (mean y - f(x))^2 + within.
 Positions that do not repeat are gathered in cells. The mean position and mean force of a cell are exact
-to second order (:func:`binning_error` is what is left), and the part of the within-sum that the slope
-across the cell explains is removed, so that what remains measures noise. With many inputs no grid of cells
-is both fine and small; then a share of the rows, evenly spread over the recording, stands for all.
+to second order (:func:`binning_error` estimates the rest), and the part of the within-sum that the slope
+across the cell explains is removed, so that the remainder measures noise. With many inputs no grid of cells
+is both fine and small; then a share of the rows, evenly spread over the recording, represents all.
 """
 
 from __future__ import annotations
@@ -39,29 +39,29 @@ LEAST_PER_AXIS = 8
 
 @dataclass(frozen=True)
 class Compressed:
-    """Weighted rows that stand for a recording in every least-squares problem."""
+    """Weighted rows that represent a recording in every least-squares problem."""
 
     positions: Float2D
     """(m, d)"""
     force: Float1D
     """(m,) mean force of a row's samples"""
     weight: Float1D
-    """(m,) samples that a row stands for"""
+    """(m,) samples that a row represents"""
     side: Float1D | None
     """(m,) hysteresis input s in [-1, 1], or None"""
     spread: Float2D
     """(m, d) variance of the positions within a row; 0 where they were equal"""
     within: float
-    """Sum of squares about the rows' own forces: the error that no model of these inputs can explain"""
+    """Sum of squares about the rows' own forces: an error that models of these inputs cannot explain"""
     samples: float
-    """Rows of the recording that are stood for, or the sum of their weights"""
+    """Rows of the recording that are represented, or the sum of their weights"""
     limits: RowLimits = NO_LIMITS
-    """What limits the information in the samples"""
+    """Limits of the information in the samples"""
     cells: int = 0
     """Cells that positions are gathered in, where there are more of them"""
 
     def standing_for(self, samples: float) -> Compressed:
-        """The same rows, standing for that many samples."""
+        """The same rows, representing that many samples."""
         more = samples / self.samples
         return replace(self, weight=more * self.weight, within=more * self.within, samples=samples)
 
@@ -76,11 +76,11 @@ class Compressor:
     max_positions : int
         With more distinct positions than this they are gathered in that many cells of a regular grid.
     weight : (n,), optional
-        Samples that each row stands for, >= 0; 1 without it. A row of weight 0 is no row.
+        Samples that each row represents, >= 0; 1 without it. A row of weight 0 is left out.
     within : float
-        Sum of squares about the rows themselves, where they stand for several samples.
+        Sum of squares about the rows themselves, where they represent several samples.
     limits : RowLimits
-        What limits the information in the samples.
+        Limits of the information in the samples.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Compressor:
     ) -> None:
         self._within, self._limits, self._cells = within, limits, max_positions
         self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
-        """The rows that stand for all."""
+        """The rows that represent all."""
         self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
         if 0 < self._per_axis < LEAST_PER_AXIS:
             self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
@@ -106,17 +106,17 @@ class Compressor:
 
     @property
     def rows_used(self) -> int:
-        """How many rows of the recording stand for all."""
+        """Number of rows that represent the recording."""
         return len(self._force)
 
     def samples(self, only: NDArray[np.bool_] | None = None) -> float:
-        """Samples that the rows stand for, or only (n,) of them."""
+        """Samples that the rows represent, or only (n,) of them."""
         return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
 
     def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
         """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart.
 
-        With only (n,), no more than these rows of the recording.
+        With only (n,), these rows of the recording alone.
         """
         key = self._key
         if only is not None:
@@ -180,7 +180,7 @@ def binning_error(rows: Compressed, curvature: Float2D) -> float:
 
 
 def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], weight: Float1D) -> Float1D:
-    """Values (n,) less what one slope over each column of (n, d) explains of them in every block (n,)."""
+    """Values (n,) less the part that one slope over each column of (n, d) explains in every block (n,)."""
     d = over.shape[1]
     products = [[np.bincount(block, weight * a * b) for b in (*over.T, values)] for a in over.T]
     table = np.array(products).transpose(2, 0, 1)
@@ -243,16 +243,16 @@ def around_seam(rows: Compressed) -> Compressed:
 
 
 EVERY = 5
-"""One row of so many is kept back."""
+"""One row of so many is held out."""
 
 BLOCKS = 50
-"""A motion is kept back in stretches, of which there are so many in all: neighbours in time are no news."""
+"""Stretches of a motion, a part of which is held out: adjacent samples are correlated."""
 
 TRIM = 0.1
 """Share of the groups at each end that a robust gain leaves out."""
 
 MOST_ROWS = 20_000
-"""More fresh rows than this are thinned out evenly: they tell no more."""
+"""Held-out rows at most; more are thinned out evenly."""
 
 
 @dataclass(frozen=True)
@@ -296,7 +296,7 @@ class HeldOutRows:
 
 
 def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
-    """Which of n rows are fresh (n,): stretches of a motion, where starts tell it; else single rows."""
+    """Rows (n,) that are held out: stretches of a motion where its starts are given, else single rows."""
     index = np.arange(n)
     if starts is None or n < EVERY * BLOCKS:
         return np.asarray(index % EVERY == EVERY // 2)

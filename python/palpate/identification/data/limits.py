@@ -17,8 +17,8 @@ from ..._typing import Float1D, Float2D
 from ..options import IdentifyOptions
 
 RESOLVED = 2.0**-16
-"""Share of the force's range below which no error counts: one step of a 16-bit converter. What was rendered
-and recorded has no noise at all, and a criterion would ask for wavelets down to the last digit of it."""
+"""Share of the force's range below which errors do not count: one step of a 16-bit converter. A rendered
+force is recorded without noise, and a criterion would add wavelets down to its last digit."""
 
 REPEATED = 1.0 / 3.0
 """Share of rows equal to the row before from which repeats count once [-]"""
@@ -27,7 +27,7 @@ PROBED = 7
 """Rows whose number of occurrences is counted first, to see if a table may hold all rows several times."""
 
 LEAST_LEVELS = 3
-"""Distinct forces below which no step is sought."""
+"""Distinct forces from which a step is sought."""
 
 ROWS_PER_LEVEL = 2.0
 """Rows for each distinct force from which equal steps between forces are those of a converter [-]"""
@@ -58,12 +58,12 @@ LEAST_REVERSALS = 0.1
 """Share of the steps of position that reverse the step before, from which they show noise [-]"""
 
 ORDERED = 0.02
-"""Reversed steps above this share of the travel belong to a shuffled table and are no noise [-]"""
+"""Reversed steps above this share of the travel belong to a shuffled table, not to noise [-]"""
 
 
 @dataclass(frozen=True)
 class RowLimits:
-    """What limits the information in rows; the defaults set no limit."""
+    """Limits of the information in rows; by default there is none."""
 
     independent: float = 1.0
     """Share of the samples that are independent (0, 1]"""
@@ -81,7 +81,7 @@ ALL_BUT_TURNS = 0.99
 
 
 def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """What np.unique(table, axis=0) finds, an order of magnitude sooner: it compares whole rows as records.
+    """Finds the same as np.unique(table, axis=0), ten times faster: it compares whole rows as records.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray
     group : (n,) int
         Which of them each row is.
     count : (k,) int
-        How many rows each stands for.
+        Rows of the table for each.
     """
     order = np.lexsort(table.T[::-1])
     ordered = table[order]
@@ -219,7 +219,7 @@ class ForceScale:
         return self.offset != 0.0 or self.factor != 1.0
 
     def scaled(self, force: Float1D) -> Float1D:
-        """What the fit sees of a force (n,)."""
+        """Force (n,) that the fit uses."""
         return (force - self.offset) * self.factor
 
     def scaled_options(self, options: IdentifyOptions) -> IdentifyOptions:

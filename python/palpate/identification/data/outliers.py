@@ -84,7 +84,7 @@ def isolated(
 ) -> NDArray[np.bool_]:
     """At most so many rows (n,) beyond a gap so many times larger than the range of the others.
 
-    Each value stands for count (n,) rows that spread over a width.
+    Each value represents count (n,) rows that spread over a width.
     """
     far = np.abs(values - _median(values, count))
     order = np.argsort(far, kind="stable")
@@ -123,7 +123,7 @@ def refuse_isolated(position: Float1D, count: Float1D, width: float) -> None:
 
 
 def _median(values: Float1D, count: Float1D | None) -> float:
-    """Median of values (n,) that each stand for count (n,) rows."""
+    """Median of values (n,) that each represent count (n,) rows."""
     if count is None:
         return float(np.median(values))
     order = np.argsort(values, kind="stable")
@@ -203,13 +203,13 @@ NEIGHBOURS = 3
 """Rows before a row, and after it, whose median it is compared with."""
 
 ROUNDS = 4
-"""Fits with ever better weights."""
+"""Fits, each with better weights."""
 
 SETTLED = 1e-3
 """Mean change of the weights below which they are good."""
 
 MOST_LEFT_OUT = 0.2
-"""Share of the rows left out above which they are no outliers, and the model is unfit."""
+"""Share of the rows left out above which they cannot be outliers, and the model is unfit."""
 
 
 def standard_deviation(residual: Float1D) -> float:
@@ -248,7 +248,7 @@ def from_neighbours(
 
 
 def suspects(box: Float2D, force: Float1D, side: Float1D | None, weight: Float1D | None) -> NDArray[np.bool_]:
-    """Rows (n,) far from the median of their neighbours; rows of weight 0 are no neighbours."""
+    """Rows (n,) far from the median of their neighbours; rows of weight 0 do not count as neighbours."""
     given = np.ones(len(force), dtype=bool) if weight is None else weight > 0.0
     low, high = np.quantile(force[given], (0.05, 0.95))
     found = np.zeros(len(force), dtype=bool)
@@ -307,7 +307,7 @@ def robust_weights(
     first : (n,)
         The modelled force without the rows that are suspect.
     force, weight
-        Forces (n,), samples that each row stands for (n,) or None.
+        Forces (n,), samples that each row represents (n,) or None.
     suspect : (n,)
         Rows that may be left out.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows of an identification: which data are usable, what the force depends on, positions modulo a period."""
+"""Rows of an identification: usable data, inputs of the force, positions modulo a period."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def require_in_range(name: str, values: Float1D) -> None:
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of all recordings, one under the other, and the unit box that their positions stand in."""
+    """Rows of all recordings, one under the other, and the unit box of their positions."""
 
     names: tuple[str, ...]
     """(d,) of the inputs; the first is position"""
@@ -56,20 +56,20 @@ class Rows:
     parts: Sequence[Piece] = ()
     """The motion between gaps of time (d = 1); rows count over all recordings"""
     weight: Float1D | None = None
-    """(n,) samples that each row stands for in the fit; None: 1"""
+    """(n,) samples that each row represents in the fit; None: 1"""
     within: float = 0.0
-    """Sum of squares inside rows that stand for several samples [force^2]"""
+    """Sum of squares inside rows that represent several samples [force^2]"""
     period: float | None = None
     """Of an environment that repeats [position]"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     """Reservations for the verdict"""
     counted: Float1D | None = None
-    """(n,) samples that each row stands for in the reported error; None: 1"""
+    """(n,) samples that each row represents in the reported error; None: 1"""
     robust: Robust | None = None
     """Outliers, where the loss is Huber's"""
     limits: RowLimits = NO_LIMITS
-    """What limits the information in the rows"""
+    """Limits of the information in the rows"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) least and largest corner of the box; None: those of the positions"""
 
@@ -115,7 +115,7 @@ class Rows:
             counted = np.flatnonzero(self.weight > 0.0)
             held_out &= self.weight > 0.0
             if 2 * EVERY * np.count_nonzero(held_out) < len(counted):
-                # rows that repeat others can stand at every place that is held out
+                # rows that repeat others can fill every place that is held out
                 held_out[:] = False
                 held_out[counted] = held_out_rows(len(counted), self.starts)
         return held_out
@@ -137,9 +137,9 @@ class Rows:
         )
 
     def limited(self) -> Rows:
-        """The rows with what limits their information; rows that repeat others have no weight.
+        """The rows with the limits of their information; rows that repeat others weigh 0.
 
-        Where rows have a weight, it counts in the fit and in the error, and there are no limits.
+        A given weight counts in the fit and in the error, without limits.
         """
         if self.weight is not None:
             return replace(self, counted=self.weight)
@@ -152,7 +152,7 @@ class Rows:
 
 
 def require_usable(rows: Rows, options: IdentifyOptions) -> None:
-    """Refuse what cannot be identified.
+    """Refuses data that cannot be identified.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
 
 
 def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
-    """The rows that the options ask for.
+    """The rows that the options require.
 
     Raises
     ------
@@ -262,12 +262,12 @@ def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) 
 def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
     """Inputs (n, d) by their names in the recording or its file, and the rows (n,) that have them all.
 
-    A velocity that is no column of the recording is derived from its time.
+    A velocity that is not a column of the recording is derived from its time.
 
     Raises
     ------
     InputError
-        The recording has no such input.
+        The recording is without this input.
     """
     columns, rows = [], np.ones(len(recording), dtype=np.bool_)
     for name in names:
@@ -305,16 +305,16 @@ def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, .
 
 
 PERIOD_TOLERANCE = 0.01
-"""How far, as a share, the sample period may be from the one that the filters are made for."""
+"""Largest deviation of the sample period from that of the filters, as a share [-]."""
 
 
 def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
-    """What the network is fitted to (n,): the force less those of the assumed mass and damping.
+    """Force (n,) that the network is fitted to: without the force of the assumed mass and damping.
 
     Raises
     ------
     InputError
-        The recording has no time, or is not sampled every millisecond.
+        The recording is without time, or not sampled every millisecond.
     """
     period = recording.sample_period
     if recording.time is None or period is None:

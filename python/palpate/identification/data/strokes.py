@@ -20,7 +20,7 @@ CELLS = 32
 """Cells of the travel in which the strokes are compared."""
 
 SIGNIFICANT = 4.0
-"""Standard errors by which the strokes must differ: fewer cannot earn the model class hysteresis [-]."""
+"""Standard errors by which the strokes must differ: with fewer, hysteresis is not accepted [-]."""
 
 CONSISTENT = 0.9
 """Share of the cells in which one stroke's force must be the higher, to be taken for the press [-]."""
@@ -60,7 +60,7 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
     """Takes the strokes of recordings from their order of rows, where they do not state them.
 
     Recordings of one stroke each that all run the same way are parted by their force: a passive object
-    presses back harder than it lets go. Where press and release do not differ there is no hysteresis to test.
+    presses back harder while it is pressed. Where press and release do not differ, hysteresis is not tested.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.b
 
 
 def _ways(recordings: Sequence[Recording], directions: Sequence[Int8Vector]) -> str:
-    """How many of the recordings are strokes into the object, out of it, and both."""
+    """Number of recordings that are strokes into the object, out of it, and both."""
     ways = [(bool((each > 0).any()), bool((each < 0).any())) for each in directions]
     words = {"press": (True, False), "release": (False, True), "both": (True, True)}
     return ", ".join(f"{ways.count(way)} {word}" for word, way in words.items() if ways.count(way))
@@ -256,13 +256,13 @@ class HysteresisInput:
     side: Float1D
     """(n,) in [-1, 1]"""
     known: NDArray[np.bool_]
-    """(n,) rows whose s does not depend on what happened before the recording"""
+    """(n,) rows whose s does not depend on the motion before the recording"""
     play_radius: float | None = None
     """[box]"""
 
     @property
     def both_ways(self) -> bool:
-        """Whether the known rows hold strokes into the object and out of it."""
+        """True if the known rows hold strokes into the object and out of it."""
         side = self.side[self.known]
         return bool((side > 0.0).any() and (side < 0.0).any())
 
@@ -275,9 +275,9 @@ class HysteresisInput:
     def of_play(
         cls, motions: Sequence[Float1D], radius: float, first: Sequence[float] | None = None
     ) -> HysteresisInput:
-        """The play operator along motions that each begin with a history of their own: at s = 0, or first.
+        """The play operator along motions that each begin without a history: at s = 0, or first.
 
-        Once a motion has covered the slot's width 2 r its history is forgotten: whatever the state was, it
+        Once a motion has covered the slot's width 2 r its history is forgotten: in every state it
         has been pushed by one edge of the slot past where the other edge could have held it. Where no motion
         is that long, none of the rows is known better than another, and all count.
         """

@@ -107,7 +107,7 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
         raise InputError(f"b0 is {b0!r}; the translation step must be a finite number above 0")
     if int(whole) != whole or whole < 1:
         raise InputError(f"voices is {voices!r}; it must be a whole number of 1 or more")
-    # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, whatever the voice
+    # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, for every voice
     levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)
     frequency = np.linspace(1.0, a0, 1001)[:, None] * a0**levels
     diagonal, cross = np.zeros(len(frequency)), 0.0
@@ -150,12 +150,12 @@ def truncated_frame(
     Each level's translations are found by walking from the data to the lattice points around it, so that the
     full grid, whose size grows exponentially with the inputs, is never built. From the first level that would
     bring more than max_candidates members on, only those at lattice points that most data are nearest to are
-    taken, and finer levels are left out: refinement reaches what is finer.
+    taken, and finer levels are left out: refinement reaches finer ones.
 
     positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
     """
     d = positions.shape[1]
-    # around a lattice point stand 3^d others: beyond three inputs only those along an input are walked to
+    # a lattice point has 3^d neighbours: beyond three inputs only those along an input are walked to
     around = product((-1, 0, 1), repeat=d) if d <= 3 else (*np.eye(d), *-np.eye(d), np.zeros(d))
     offsets = np.array(list(around), dtype=np.int64)
     alpha: list[Float2D] = []

@@ -30,7 +30,7 @@ POINT_TOLERANCE = 1e-9
 """Share of the force's range by which a fixed force may be missed."""
 
 ROUNDS = 60
-"""Rounds of imposing and certifying; what is left is mixed with a network that keeps all bounds."""
+"""Rounds of imposing and certifying; the rest is mixed with a network that keeps all bounds."""
 
 CELLS = 256
 """Cells over the domain that certification starts from."""
@@ -42,7 +42,7 @@ GRID = 4096
 """Cells of the grid on which a force law is projected onto slope bounds."""
 
 ALTERNATIONS = 50
-"""Most projections onto the lower and the upper slope bound in turn."""
+"""Most alternating projections onto the lower and the upper slope bound."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ class Bound:
     readouts: tuple[float, ...]
     """Multiples of g (and h)"""
     of_slope: bool
-    """Whether the reading is the combination's slope [force/box]"""
+    """True if the reading is the combination's slope [force/box]"""
     name: str
-    """What the notes call it"""
+    """Name in the notes"""
     sign: float
     """+1: the reading stays above limit, -1: below"""
     limit: float
     unit: float
-    """How much of the reading weighs as much as a force of 1: 1 for a force"""
+    """Part of the reading that weighs as much as a force of 1: 1 for a force"""
     at: float | None = None
     """The only position where it holds [box]; None: everywhere"""
     seam: bool = False
@@ -120,7 +120,7 @@ def moved_to_bounds(
 ) -> Compressed:
     """The rows with their forces moved as the solution must move to keep the bounds, noise and all.
 
-    What the bounds forbid is no longer in these rows, so that a network grown on them has its wavelets where
+    Forces against the bounds are removed from these rows, so that a network grown on them has wavelets where
     the bounded force law needs them. h is projected pointwise, h := max(h, 0), slopes by isotonic regression.
     """
     bounds = [bound for bound in bounds if not bound.seam]
@@ -247,7 +247,7 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
 
 
 def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
-    """The nearest force (k,) with slope within [low, high]: isotonic regressions in turn (Dykstra 1983)."""
+    """Nearest force (k,) with slope within [low, high]: alternating isotonic regressions (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
     for _ in range(ALTERNATIONS):
@@ -323,7 +323,7 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
 
 
 def crossing(problem: SeparableProblem, free: Solution, lower: float, reach: float) -> str:
-    """How far release lies above press at most, and where, as the end of a sentence; empty where hardly.
+    """Largest height of release above press, and its place, as the end of a sentence; empty where small.
 
     free is a solution g + s h that h >= 0 was not imposed on, over one input from lower to lower + reach.
     Only places where both strokes were measured count.

@@ -61,7 +61,7 @@ class FittedNetwork:
     damping: float | None = None
     """B, where it was fitted [force/position s]"""
     model_class: str = ""
-    """constant, linear, position, hysteresis, velocity, mass and damping; network over several inputs"""
+    """Name of the accepted class"""
     stop_reason: str = ""
     """The criterion that stopped growth, "max_wavelets", or "data" where they allowed no further wavelet"""
     n_parameters: int = 0
@@ -73,7 +73,7 @@ class FittedNetwork:
     path: tuple[PathPoint, ...] = ()
     """Every network that was considered"""
     notes: tuple[str, ...] = ()
-    """Sentences: what was refused, left out, or imposed at what price"""
+    """Sentences on refusals, rows left out, and bounds with their price"""
     independent_rows: float = np.inf
     """Rows of the identification, fewer where repeats or correlated noise make them depend on each other"""
     findings: tuple[Finding, ...] = ()

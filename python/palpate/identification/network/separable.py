@@ -7,13 +7,13 @@ If s is only ever +1 or -1 the strokes are two independent least squares over th
 coordinates g + h and g - h: two blocks of one channel each. For s in between it is one block of two
 channels, 1 and s.
 
-Positions stand in the unit box of the data here, so that dilations and translations compare.
+Positions are those in the unit box of the data, so that dilations and translations compare.
 
 Refinement moves all dilations and translations at once, by bounded variable projection. Weights, slopes and
 biases are eliminated (Golub & Pereyra 1973, in Kaufman's form), Levenberg-Marquardt steps are taken on
 log(alpha) and beta. Unbounded, a dilation runs away on measured switch curves and the basis turns singular.
-So dilations stay within what the positions around the wavelet resolve, translations within the reach of the
-data, and a step is kept only if it lowers the objective: never worse than the start.
+So dilations stay within the resolution of the positions around the wavelet, translations near the data, and a
+step is kept only if it lowers the objective: never worse than the start.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def half_solved(gram: Float2D, right: Float2D) -> Float2D:
-    """M right with M' M the inverse of the system: products of what it returns are those of projections."""
+    """M right with M' M the inverse of the system: products of its results are those of projections."""
     factor, norm = factored(gram)
     solved, _ = dtrtrs(factor, right / norm[:, None], lower=1)
     return np.asarray(solved)
@@ -69,13 +69,13 @@ def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
 
 
 CORE = float(np.sqrt(3.0))
-"""|u| of a wavelet's side lobe: what lies within is the core that data must resolve."""
+"""|u| of a wavelet's side lobe, the limit of the core that data must resolve."""
 
 NOISE_WIDTHS = 5.0
 """Standard deviations of the position's noise that half of a wavelet's core holds at least [-]"""
 
 STRUCTURED = 3.0
-"""Standard errors of the correlation of neighbouring residuals above which they are no noise."""
+"""Standard errors of the correlation of neighbouring residuals above which they are structure."""
 
 SLIDES = 0.9
 """Hysteresis input s beyond which a row belongs to its stroke [-]"""
@@ -135,7 +135,7 @@ class Solution:
     rss: float
     """Residual sum of squares about the rows' mean forces"""
     objective: float
-    """rss plus the price of the weights' prior: what refinement lowers"""
+    """rss plus the price of the weights' prior; refinement lowers it"""
     designs: tuple[Float2D, ...]
     grams: tuple[Float2D, ...]
     """design' design of every block, plus the prior on the weights"""
@@ -160,7 +160,7 @@ class SeparableProblem:
     held_out: HeldOutRows | None = None
     """Rows held out, for the criteria that judge on them"""
     limits: RowLimits = NO_LIMITS
-    """What limits the information in the samples"""
+    """Limits of the information in the samples"""
     prior: float = 0.0
     """Price of a squared weight; see :meth:`with_prior`"""
     resolutions: tuple[Resolution, ...] = ()
@@ -202,7 +202,7 @@ class SeparableProblem:
         return float(np.sqrt((solution.rss + self.within) / self.samples))
 
     def resolved_rmse(self, solution: Solution) -> float:
-        """The same, but never less than a sensor resolves: what other errors are measured by."""
+        """The same, but never less than a sensor resolves: the unit of other errors."""
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
     def evenness(self, solution: Solution) -> float:
@@ -211,7 +211,7 @@ class SeparableProblem:
         return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
 
     def likeness(self, solution: Solution) -> float:
-        """Correlation of what is left at neighbouring positions, in standard errors; one channel, d = 1."""
+        """Correlation of residuals at neighbouring positions, in standard errors; one channel, d = 1."""
         if self.dimension > 1 or self.n_channels > 1:
             return 0.0
         (residual,) = solution.residuals
@@ -219,7 +219,7 @@ class SeparableProblem:
         return alike * float(np.sqrt(len(residual)))
 
     def structured(self, solution: Solution) -> bool:
-        """True if what is left at neighbouring rows of some block is correlated."""
+        """True if residuals at neighbouring rows of some block are correlated."""
         return any(
             float(left[1:] @ left[:-1]) * float(np.sqrt(len(left))) > STRUCTURED * float(left @ left)
             for left in solution.residuals
@@ -234,7 +234,7 @@ class SeparableProblem:
 
         The price is as firm as one sample at this noise level, from the residual sum of squares.
 
-        Without it, a stroke that has no data where the other one does could give a wavelet there any weight.
+        Without it, a stroke without data at positions of the other one could give a wavelet there any weight.
         """
         return replace(self, prior=self.total(rss) / self.samples / self.force_range**2)
 
@@ -361,7 +361,7 @@ COARSEST = 0.5
 """Smallest dilation [1/box]: over the unit box a wider wavelet is a parabola, as this one nearly is."""
 
 REACH = 0.3
-"""How far outside the unit box a translation may stand [box]."""
+"""Largest distance of a translation from the unit box [box]."""
 
 LONGEST_STEP = 0.7
 """Longest step of log(alpha) and of alpha beta: beyond it the basis changes too much to be linearised."""
@@ -400,7 +400,7 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
 def _bounded_step(
     basis: Basis, finest: Float2D, matrix: Float2D, gradient: Float1D, damping: float
 ) -> Float1D:
-    """Levenberg-Marquardt step over the unknowns that no bound holds against their push."""
+    """Levenberg-Marquardt step over the unknowns that bounds leave free."""
     d = basis.alpha.shape[1]
     push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
     held_alpha = (push_alpha > 0) & (basis.alpha >= finest * (1 - 1e-9))
@@ -434,7 +434,7 @@ def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basi
 
 
 STEPS_FOR_ONE = 10
-"""Quasi-Newton steps that are taken for each one of variable projection that is asked for."""
+"""Quasi-Newton steps that are taken for each requested step of variable projection."""
 
 
 def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:

@@ -72,7 +72,7 @@ ON_HELD_OUT_ROWS = ("fresh", "perceptual")
 def deviance(criterion: str, rss: float, n: float, p: int) -> float:
     """Value of a criterion: n ln(rss/n) + price(n, p); rss in force squared, over all n samples.
 
-    For "perceptual" rss is in just noticeable differences squared, so that 0 is what is just not felt.
+    For "perceptual" rss is in just noticeable differences squared, so that 0 is the limit of perception.
     """
     return n * math.log(rss / n) + CRITERIA[criterion](n, p)
 
@@ -88,7 +88,7 @@ def enough(criterion: str, value: float) -> bool:
 
 
 def choice(criterion: str, values: Sequence[float], n: float) -> int:
-    """Index of the network to take, from the values of ever larger networks."""
+    """Index of the network to take, from the values of networks of rising size."""
     least = min(values)
     limit = {"fresh": least + standard_error(n), "perceptual": max(0.0, least)}.get(criterion, least)
     return next(index for index, value in enumerate(values) if value <= limit)
@@ -159,7 +159,7 @@ class Moving:
 
 @dataclass(frozen=True)
 class RowError:
-    """Residuals of every row, with the samples that each stands for."""
+    """Residuals of every row, with the samples that each represents."""
 
     residual: Float1D
     """(n,) [force]"""
@@ -168,7 +168,7 @@ class RowError:
     weight: Float1D
     """(n,) samples, 0 for a row that does not count"""
     within: float = 0.0
-    """Sum of squares inside rows that stand for several samples [force^2]"""
+    """Sum of squares inside rows that represent several samples [force^2]"""
 
     @property
     def rmse(self) -> float:
@@ -308,7 +308,7 @@ class Candidate:
         )
 
     def error_on(self, samples: Float1D | None) -> RowError:
-        """Error on rows that stand for so many samples (n,), or 1; rows without a motion do not count."""
+        """Error on rows that represent so many samples (n,), or 1; rows without a motion do not count."""
         weight = np.ones(len(self.residual)) if samples is None else samples
         if self.moving is not None:
             weight = weight * self.moving.known
@@ -319,7 +319,7 @@ class Candidate:
 
 @dataclass
 class Report:
-    """What is known of a model selection beside its result."""
+    """Path, notes and findings of a model selection."""
 
     path: list[PathPoint] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -361,7 +361,7 @@ class Samples:
             limits=data.limits,
         )
         self.used = self._compressor.rows_used
-        """Rows that stand for all"""
+        """Rows that represent all"""
         self._resolved_by = options.search.resolved_by
         self._for_criterion = options.criterion in ON_HELD_OUT_ROWS
 
@@ -397,7 +397,7 @@ class Samples:
     def on_known_rows(self, below: Candidate, above: Candidate) -> Candidate:
         """The candidate below on the rows whose hysteresis input is known for the one above.
 
-        The luck of the noise in the other rows is as much as a model class has to gain.
+        The random error of the other rows is as large as the gain that a model class must show.
         """
         strokes = above.strokes
         if strokes is None or strokes.known.all() or self._for_criterion:
@@ -413,7 +413,7 @@ class Samples:
 
         Only rows inside the range of the fitted rows count: outside it a network is not defined by data. If
         the mean over all groups shows no gain, but the trimmed mean a large one, the trimmed mean counts: a
-        few groups then hold rows that no fitted row is near.
+        few groups then hold rows far from all fitted rows.
         """
         known = None if above.strokes is None else above.strokes.known
         fitted = ~self._held_out if known is None else ~self._held_out & known
@@ -439,7 +439,7 @@ class Judgement:
     earned: bool
     """The upper one is accepted"""
     why: str
-    """What it gains, in words"""
+    """Its gain, in words"""
     criterion_falls: bool
     """The criterion falls by enough: if it is not accepted, held-out rows refuse it"""
 
@@ -464,7 +464,7 @@ class Judge:
         self._samples, self._report, self.on_held_out = samples, report, on_held_out
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
-        """The upper candidate if it is accepted, else the lower one; adds a note on what it gains."""
+        """The upper candidate if it is accepted, else the lower one; adds a note on its gain."""
         return above if self.noted(below, above).earned else below
 
     def noted(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:

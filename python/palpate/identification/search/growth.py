@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many wavelets? Grow one, refine all, and when the criterion stops growth, prune and refine again.
+"""Number of wavelets: grow one, refine all, and when the criterion stops growth, prune and refine again.
 
 Growth takes the best frame member by one step of forward orthogonal selection against the refined network, so
-it sees what is still missing. Pruning removes what refinement made superfluous, coincident wavelets first of
-all, since of two that coincide one costs nothing to remove. N is thus decided again on the refined network.
+it fits the part that is still missing. Pruning removes wavelets that refinement made superfluous, coincident
+ones first, since of two that coincide one costs nothing to remove. N is decided again on the refined network.
 """
 
 from dataclasses import dataclass, replace
@@ -27,16 +27,16 @@ PRUNE_HOPE = 6.0
 """A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
 
 WITHOUT_NOISE = 5
-"""Positions that a wavelet's core must hold where there is hardly any noise to be taken for structure."""
+"""Positions that a wavelet's core must hold where noise is too small to be taken for structure."""
 
 LEAST_EVENNESS = 0.5
-"""Evenness of what a network leaves from which it is noise, and no finer wavelet is tried."""
+"""Evenness of a residual from which it is noise, and finer wavelets are not tried."""
 
 WORTH_FINER = 4.0
-"""How many times smaller the error must become by wavelets finer than noise would allow."""
+"""Factor by which the error must fall by wavelets finer than noise would allow."""
 
 SIGNIFICANT_CORRELATION = 3.0
-"""Standard errors of the correlation of what is left at neighbouring positions from which it is no noise."""
+"""Standard errors of the correlation of neighbouring residuals from which they are structure."""
 
 SMOOTH = 0.25
 """Share of the positions that a core holds at least while a force over several inputs is tried as smooth."""
@@ -130,7 +130,7 @@ class Growth:
         return replace(found, problem=problem.with_prior(found.solution.rss))
 
     def library(self, problem: SeparableProblem) -> Library:
-        """The truncated frame over the rows of a problem, down to what they resolve."""
+        """The truncated frame over the rows of a problem, down to their resolution."""
         search = self._search
         positions = np.concatenate([block.positions for block in problem.blocks])
         frame = truncated_frame(
@@ -179,7 +179,7 @@ class Growth:
         Growth continues for `patience` wavelets past the best size, and pruning starts from there: a few
         wavelets too many let refinement find a better arrangement of the others. Where held-out rows judge,
         they choose the size and nothing is pruned. With wide, wide wavelets alone have one try, once the
-        error is half way, in digits, from the force's range to what a sensor resolves.
+        error is half way, in digits, from the force's range to the resolution of a sensor.
         """
         search, criterion = self._search, self._criterion
         problem = problem.with_prior(problem.solve(start).rss)
@@ -225,8 +225,8 @@ class Growth:
         """A network of wide wavelets, if its error is small.
 
         The best candidates are mostly narrow: each corrects a few rows, and rows are far apart over several
-        inputs, so that a network of them fits the rows well and errs between and beside them. Wide ones
-        cannot. Where rows of one cell differ by more there is no need to try.
+        inputs, so that a network of them fits the rows well and errs between them. Wide ones
+        cannot. Where rows of one cell differ by more, they are not tried.
         """
         if not _little(problem, np.sqrt(problem.within / problem.samples)):
             return None
@@ -238,7 +238,7 @@ class Growth:
         return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
-        """What the criterion charges for one of the solution's wavelets."""
+        """Price of one of the solution's wavelets by the criterion."""
         price, n = CRITERIA[self._criterion], len(solution.basis)
         return price(problem.independent, problem.n_parameters(n)) - price(
             problem.independent, problem.n_parameters(n - 1)
@@ -250,8 +250,8 @@ class Growth:
         """The network with the frame member that helps most, or None where data allow no further wavelet.
 
         The frame has one dilation for all inputs. Where there are several, members are tried stretched along
-        each of them as well, and a few that differ are refined a little before one is taken: what fits best
-        unrefined often ends in a worse minimum.
+        each of them as well. A few that differ are refined a little before one is taken: the one that fits
+        best unrefined often ends in a worse minimum.
         """
         search = self._search
         if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.independent:
@@ -289,7 +289,7 @@ class Growth:
 
 
 def _little(problem: SeparableProblem, error: float) -> bool:
-    """True if an error is so near to what a sensor resolves that finer wavelets are not worth trying."""
+    """True if an error is so near to the resolution of a sensor that finer wavelets are not worth trying."""
     return bool(error <= WORTH_FINER * RESOLVED * problem.force_range)
 
 

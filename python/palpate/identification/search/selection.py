@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Selection from a library: forward orthogonal, residual-based, backward elimination (Zhang 1997).
 
-Forward orthogonal least squares (Chen, Billings & Luo 1989) asks what a candidate adds to those before it.
+Forward orthogonal least squares (Chen, Billings & Luo 1989) measures the gain of a new candidate.
 
 Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates
 the projections of all others by one product with its orthonormalised columns. Linear and bias columns are
@@ -21,7 +21,7 @@ from ..network.separable import COARSEST, SeparableProblem, Solution, half_solve
 from .evidence import deviance
 
 DEPENDENT = 1e-5
-"""Share of a candidate's squared norm that must stand outside the design for it to be a new direction: more
+"""Share of a candidate's squared norm that must lie outside the design for it to be a new direction: more
 than the rounding of seven digits."""
 
 AT_ONCE = 64
@@ -31,13 +31,13 @@ UNLIKE = 1.0
 """Distance in units of a wavelet, or difference of log(alpha), from which two may end in different minima."""
 
 STRETCHES = (0.25, 0.5, 2.0, 4.0)
-"""What the dilation of a candidate along one input is multiplied by."""
+"""Factors of the dilation of a candidate along one input."""
 
 
 class Library:
     """Candidate wavelets with their weighted columns on every block, computed once.
 
-    Seven digits are enough to rank candidates and take half the memory, which is what a library costs.
+    Seven digits are enough to rank candidates and take half the memory of a library.
     """
 
     def __init__(self, problem: SeparableProblem, candidates: Basis) -> None:
@@ -76,7 +76,7 @@ class Library:
         return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
 
     def unlike(self, order: NDArray[np.intp], count: int) -> list[int]:
-        """The first of these numbers, so many at most, that stand apart or differ in a dilation."""
+        """The first of these numbers, so many at most, that lie apart or differ in a dilation."""
         chosen: list[int] = []
         while len(order) and len(chosen) < count:
             chosen.append(int(order[0]))
@@ -88,7 +88,7 @@ class Library:
 
 
 class OrthogonalSelection:
-    """One forward selection: start from a solved basis, ask for gains, take candidates.
+    """One forward selection: start from a solved basis, compute gains, take candidates.
 
     For each block a candidate's columns (one a channel) have a projected Gram matrix S and a product z with
     the residual; the residual sum of squares falls by z' S^-1 z, summed over the blocks.
@@ -139,7 +139,7 @@ class OrthogonalSelection:
 def _falls(gram: Float2D, left: Float2D, product: Float2D) -> Float1D:
     """z' S^-1 z of every candidate (n,): gram, S (channels, channels, n), z (channels, n).
 
-    Directions in which a candidate does not stand outside the design do not count.
+    Directions in which a candidate does not lie outside the design do not count.
     """
     if len(product) == 1:
         new = left[0, 0] > DEPENDENT * gram[0, 0]
@@ -155,7 +155,7 @@ def _falls(gram: Float2D, left: Float2D, product: Float2D) -> Float1D:
 def orthogonal_gains(library: Library, current: Solution) -> Float1D:
     """(candidates,) fall of the residual sum of squares if a candidate were added to a solved basis.
 
-    What a selection's gains are at its start, from the solution's own Gram matrix.
+    The gains at the start of a selection, from the solution's own Gram matrix.
     """
     total = np.zeros(len(library))
     for columns, gram, design, own, residual in zip(
@@ -169,7 +169,7 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
 def residual_gains(library: Library, current: Solution) -> Float1D:
     """(candidates,) fall of the residual sum of squares if a candidate were fitted to the residual alone.
 
-    What the candidate shares with the network is not taken out of it first: cheaper, and less sharp.
+    The part that the candidate shares with the network is not removed first: cheaper, less exact.
     """
     total = np.zeros(len(library))
     for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
@@ -222,7 +222,7 @@ def select_forward(
 def select_by_residual(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
 ) -> SelectionPath:
-    """Residual-based: at every step the wavelet that fits what is left best; then all weights anew."""
+    """Residual-based: at every step the wavelet that fits the residual best; then all weights again."""
     current = problem.solve(Basis.empty(problem.dimension))
     order: list[int] = []
     errors = [problem.total(current.rss)]
@@ -242,7 +242,7 @@ def select_backward(
 ) -> SelectionPath:
     """Backward elimination: from max_wavelets down, always the wavelet whose loss costs least.
 
-    A whole library has more members than data can tell apart, so it starts from what forward selection takes.
+    A whole library has more members than data can distinguish, so forward selection comes first.
     """
     forward = select_forward(problem, library, max_wavelets=max_wavelets, criterion=criterion)
     left = list(forward.order)
