@@ -80,7 +80,7 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL] or inverse3"),
         ([MODEL, "--record", "/no/such/folder/out.csv"], "cannot be written: No such file or directory"),
         ([MODEL, "--record", "/tmp"], "cannot be written: it is not an ordinary file"),
-        ([MODEL, "--record", MODEL], "is the model"),
+        ([MODEL, "--record", MODEL], ", the model; writing there would destroy it"),
         ([MODEL, "--coupling-stiffness", "-1"], "--coupling-stiffness: must be a number above 0, not -1"),
         ([MODEL, "--coupling-stiffness", "hard"], "--coupling-stiffness: must be a number above 0, not hard"),
         ([MODEL, "--damping", "-1"], "--damping: must be a number of 0 or more, not -1"),
