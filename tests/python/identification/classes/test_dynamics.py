@@ -9,6 +9,7 @@ import pytest
 
 from palpate import Recording, identify, read_recording, verify
 from palpate._core.model import play
+from palpate.identification.classes.dynamics import Dynamics
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,
@@ -217,6 +218,18 @@ def test_a_negative_damping_is_refused() -> None:
     told = " ".join(model.notes["identification"])
     assert "damping refused" in told
     assert "it would be -0.0" in told
+
+
+def test_a_damping_that_the_last_fit_makes_negative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Dynamics, "accepted", lambda *_: ({"damping": -0.01}, []))
+    model = identify(moved(1))
+    assert (model.fit.model_class, model.damping) == ("position", None)
+
+
+def test_values_of_the_first_round_stay_if_the_second_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Dynamics, "values", lambda *_: {})
+    model = identify(moved(1, damping=0.03))
+    assert (model.fit.model_class, model.damping) == ("velocity", pytest.approx(0.03, rel=0.1))
 
 
 def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
