@@ -54,8 +54,8 @@ INSTEAD = {
     # indirect subjects and negated nouns
     r"what": "the noun itself",
     r"somebody(?: else)?|nobody|who(?:m)?ever|whatever|wherever": "the user, a hand, no, any",
-    r"(?:is|are|was|were|be|has|have|had|makes?|gives?) no (?!longer)\w+": "is not a, does not have",
-    r"(?:that|which) (?:is|are|was|has|have|had)? ?(?:none|no)": "without",
+    r"(?<!there )(?:is|are|was|were|be) no (?!longer)\w+": "is not a",
+    r"(?:that|which) (?:is|are|was) none": "no X",
     r"but for|nothing but": "except, only",
     r"no (?:more|less|fewer|other) than": "at most, at least, only",
     r"as (?:\w+ ){1,3}as (?:it|they|if) \w+": "a number",
@@ -137,7 +137,8 @@ def cpp_texts(file: Path) -> Iterator[Text]:
     message, started, line = "", 0, 1
     for kind, value in CppLexer().get_tokens(source):
         if kind in Token.Comment.Single and "SPDX" not in value:
-            lines.append((line, value.lstrip("/<! ").rstrip()))
+            # The comment of a member is a separate text.
+            lines.append((-line if value.startswith("///<") else line, value.lstrip("/<! ").rstrip()))
         elif kind in Token.Comment.Multiline:
             lines += [(line + at, each.strip("/* ")) for at, each in enumerate(value.splitlines())]
         if kind in Token.Literal.String:
@@ -173,19 +174,19 @@ def _joined(file: Path, lines: list[tuple[int, str]]) -> Iterator[Text]:
     """Comments on lines that follow each other are one text."""
     block: list[tuple[int, str]] = []
     for line, words in lines:
-        if block and line != block[-1][0] + 1:
-            yield Text(file, block[0][0], "comment", _prose("\n".join(each for _, each in block)))
+        if block and line != abs(block[-1][0]) + 1:
+            yield Text(file, abs(block[0][0]), "comment", _prose("\n".join(each for _, each in block)))
             block = []
         block.append((line, words))
     if block:
-        yield Text(file, block[0][0], "comment", _prose("\n".join(each for _, each in block)))
+        yield Text(file, abs(block[0][0]), "comment", _prose("\n".join(each for _, each in block)))
 
 
 def _prose(words: str) -> str:
-    """The text without code, formulas in backquotes and addresses."""
+    """The text without code, formulas in backquotes, options and addresses."""
     words = re.sub(r"(?:^|\n)\s*(?:>>>|\.\.\.) .*", "\n", words)
     words = re.sub(r"``.*?``|`[^`\n]*`|:\w+:`.*?`", "N", words)
-    return re.sub(r"https?://\S+|\]\([^)]*\)", "", words).strip()
+    return re.sub(r"https?://\S+|\]\([^)]*\)|--[a-z][\w-]*", "", words).strip()
 
 
 def sentences(text: Text) -> list[str]:

@@ -260,7 +260,8 @@ def main() -> None:
             if options.each and "nrmse" in row:
                 passive = row["passive_splines"]
                 print(
-                    f"  {row['file'][:48]:50}{row['nrmse']:9.4f}{row['n_parameters']:6d} {row['model_class']:12}"
+                    f"  {row['file'][:48]:50}{row['nrmse']:9.4f}{row['n_parameters']:6d} "
+                    f"{row['model_class']:12}"
                     f"{row['seconds']:7.2f} s   splines {row['splines']['nrmse']:.4f} "
                     f"{row['splines']['n_parameters']:5d}"
                     + (f", with h >= 0 {passive['nrmse']:.4f}" if passive else "")

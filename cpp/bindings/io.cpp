@@ -117,8 +117,8 @@ void bind_io(py::module_& module) {
             return read;
         },
         "content"_a,
-        "Device profile of the content of a file. ValueError: the first wrong field, its value, what would\n"
-        "be right.");
+        "Returns the device profile in the content of a file. ValueError names the first wrong field, its\n"
+        "value and the correct ones.");
     module.def(
         "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
         "plan"_a, "Scheme of the plan of a model file.");

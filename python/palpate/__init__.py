@@ -28,30 +28,23 @@ if TYPE_CHECKING:
     from .verification import Verification, verify
 
 _HOME = {
-    "DeviceProfile": "planning",
-    "Hand": "planning",
-    "Scheme": "planning",
-    "__version__": "_core",
-    "InputError": "errors",
-    "IdentifyOptions": "identification",
-    "SearchOptions": "identification",
-    "frame_bounds": "identification",
-    "identify": "identification",
-    "identify_files": "identification.identify_files",
-    "Model": "model",
-    "load_model": "model",
-    "Plan": "planning",
-    "plan": "planning.search",
-    "simulate": "planning",
-    "Recording": "recording",
-    "read_recording": "recording",
-    "Finding": "verdict",
-    "Verdict": "verdict",
-    "Verification": "verification",
-    "verify": "verification",
-    "WaveletNetworkRegressor": "identification.regressor",
+    name: home
+    for home, names in {
+        "_core": ("__version__",),
+        "errors": ("InputError",),
+        "verdict": ("Finding", "Verdict"),
+        "recording": ("Recording", "read_recording"),
+        "model": ("Model", "load_model"),
+        "identification": ("IdentifyOptions", "SearchOptions", "frame_bounds", "identify"),
+        "identification.identify_files": ("identify_files",),
+        "identification.regressor": ("WaveletNetworkRegressor",),
+        "verification": ("Verification", "verify"),
+        "planning": ("DeviceProfile", "Hand", "Plan", "Scheme", "simulate"),
+        "planning.search": ("plan",),
+    }.items()
+    for name in names
 }
-"""Where each public name lives."""
+"""Module of each public name."""
 
 __all__ = [
     "DeviceProfile",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists that a new field, structure or verb must not have to enter: each is made from one table."""
+"""A new field, structure or verb enters one table; all other lists are made from it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_every_structure_is_a_candidate_of_the_plan_and_described_in_its_help() 
         assert f"{name}: {candidate.use}\n" in (command.help or "")
 
 
-def test_a_structure_that_is_none_is_refused_with_the_names_of_all() -> None:
+def test_an_unknown_structure_is_refused_with_all_names() -> None:
     with pytest.raises(ValueError, match="structure is 'soft'") as refused:
         Scheme(structure="soft")
     assert all(name in str(refused.value) for name in structure_names)
@@ -75,7 +75,13 @@ def test_no_other_file_lists_them(names: list[str], most: int) -> None:
     assert listed <= {"planning/candidates.py"}
 
 
-def test_every_field_of_a_profile_stands_in_schema_and_stub_with_its_unit() -> None:
+def test_no_line_of_the_pages_lists_all_structures() -> None:
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    lines = [line for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    assert [line for line in lines if all(name in line for name in structure_names)] == []
+
+
+def test_every_field_of_a_profile_is_in_schema_and_stub_with_its_unit() -> None:
     stub = (PACKAGE / "_core" / "device.pyi").read_text(encoding="utf-8")
     assert list(SCHEMA["Device"]["properties"]) == FIELDS
     for name in FIELDS:

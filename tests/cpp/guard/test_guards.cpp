@@ -1,15 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that each guard acts on a fault, and does not act without one.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "limits/hands.hpp"
+#include "palpate/device/device.hpp"
+#include "palpate/device/device_profile.hpp"
 #include "palpate/guard/guards.hpp"
+#include "palpate/model/energy.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/run/controller.hpp"
 #include "palpate/simulation/closed_loop.hpp"
+#include "palpate/stability/certificate.hpp"
 #include "scenes.hpp"
 #include "support.hpp"
 
@@ -310,6 +323,472 @@ TEST(GuardSettings, RefusesWhatIsImpossible) {
         settings.*field = std::nan("");
         EXPECT_THROW(validate(settings), std::invalid_argument);
     }
+}
+
+// The energy account with all guards. A handle with a prescribed motion computes an independent account from the acting
+// force, its true motion, and the losses by damping and friction.
+
+/// A device whose handle follows positions given by the test, at constant speed within each tick.
+class GuidedHandle {
+  public:
+    GuidedHandle(DeviceProfile device, double start) : device_{std::move(device)}, at_{start}, to_{start} {}
+
+    [[nodiscard]] static Opened open() { return {}; }
+    static void close() noexcept {}
+    void go_to(double position) noexcept { to_ = position; }
+
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        const auto delay = static_cast<std::size_t>(device_.whole_delay_samples());
+        const double step = device_.force_step;
+        pending_[(ticks_ + delay) % pending_.size()] =
+            step > 0.0 ? step * std::round(command.force / step) : command.force;
+        const double force = pending_[ticks_ % pending_.size()];
+        const double way = to_ - at_;
+        motor_ += force * way;
+        loss_ += std::abs(way) *
+                 (device_.viscous_damping * std::abs(way) / device_.period_s + device_.coulomb_friction);
+        least_ = std::min(least_, energy());
+        at_ = to_;
+        ++ticks_;
+        return {encoded(at_),
+                0.0,
+                force,
+                std::numeric_limits<double>::quiet_NaN(),
+                static_cast<double>(ticks_) * device_.period_s,
+                ticks_,
+                Status::Ok};
+    }
+
+    /// Return the energy that the hand put in, and its least value so far [J].
+    [[nodiscard]] double energy() const noexcept { return motor_ + loss_; }
+    [[nodiscard]] double least() const noexcept { return least_; }
+    [[nodiscard]] double motor() const noexcept { return motor_; }
+    void begin_account() noexcept { motor_ = loss_ = least_ = 0.0; }
+
+  private:
+    [[nodiscard]] double encoded(double position) const noexcept {
+        const double step = device_.encoder_step;
+        return step > 0.0 ? step * std::floor(position / step + 0.5) : position;
+    }
+
+    DeviceProfile device_;
+    double at_;
+    double to_;
+    double motor_ = 0.0;
+    double loss_ = 0.0;
+    double least_ = 0.0;
+    std::uint64_t ticks_ = 0;
+    std::array<double, longest_delay_samples + 2> pending_{};
+};
+
+/// Returns the bench knob of the package.
+DeviceProfile bench_knob() {
+    DeviceProfile device;
+    device.id = "bench-knob";
+    device.jitter_s = 2e-4;
+    device.coulomb_friction = 0.01;
+    return device;
+}
+
+/// Returns the knob of the README, as `palpate demo` and `palpate identify` make it.
+ForceModel readme_knob() {
+    NetworkParameters network;
+    network.alpha = {14.065144146110542, 4.162057332442819, 5.888611543700749, 36.06654311080214,
+                     6.664738379356768,  41.52923490349144, 56.94283014365128};
+    network.beta = {0.5078861161881123,   0.6697168372310223, 0.2474086359804909, 0.3957300688865673,
+                    0.028856055274948916, 0.3459005107773592, 0.3611594362786021};
+    network.weight = {-1.676664574504042,   -5.438124858723128,   -1.0018247819200101, 0.18985264042413774,
+                      -0.25599214321014574, 0.033236368235800215, 0.022776608906540038};
+    network.linear = {4.599103438500333};
+    network.bias = 0.9042297017519991;
+    return {network,
+            {{-0.19999274522059046}, {0.46901462589603476}, Continuation::Linear, Continuation::Linear, {}}};
+}
+
+/// Returns the guards of a run with a certificate, or without one.
+Guards certified_guards(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
+                        bool certified = true) {
+    GuardSettings settings;
+    settings.force_limit = device.force_limit;
+    settings.slew_s = 0.0;
+    settings.certified = certified;
+    settings.device_damping = device.viscous_damping;
+    settings.device_friction = device.coulomb_friction;
+    settings.encoder_step = device.encoder_step;
+    settings.largest_speed = 1e9;
+    settings.frozen_s = 0.0;
+    return guards_of(settings, model, scheme, device.period_s);
+}
+
+struct Pressed {
+    std::size_t drained = 0;
+    std::size_t softened = 0;
+    double least = 0.0;  ///< of the true account after the ramp [J]
+    std::uint64_t ticks = 0;
+};
+
+/// Presses the knob of the README from below its click into its wall and back. One press in 50 is ten times slower, one
+/// in 1000 is a hundred times slower.
+Pressed press_readme_knob(int presses) {
+    const DeviceProfile device = bench_knob();
+    const ForceModel model = readme_knob();
+    EXPECT_TRUE(certify(model, direct(), device).certified());
+    const double released = 0.2;
+    GuidedHandle handle{device, released};
+    Controller controller{handle, Direct{CompiledNetwork{*model.network()}},
+                          certified_guards(model, direct(), device)};
+    EXPECT_EQ(controller.start(), Status::Ok);
+    Pressed run;
+    const auto tick = [&] {
+        const Status status = controller.tick().status;
+        run.drained += status == Status::Drained ? 1 : 0;
+        run.softened += status == Status::Softened ? 1 : 0;
+        ++run.ticks;
+    };
+    for (int k = 0; k < 300; ++k) {  // the ramp
+        tick();
+    }
+    handle.begin_account();
+    test::Random random{7};
+    for (int k = 0; k < presses; ++k) {
+        const double slower = k % 1000 == 17 ? 0.01 : k % 50 == 7 ? 0.1 : 1.0;
+        const double speed = slower * test::uniform(random, 0.8, 1.0) * device.encoder_step;
+        const double bottom = test::uniform(random, 0.44, 0.46);
+        const auto half = static_cast<int>((bottom - released) / speed);
+        for (int way = 0; way <= 2 * half; ++way) {
+            handle.go_to(bottom - speed * std::abs(half - way));
+            tick();
+        }
+    }
+    run.least = handle.least();
+    return run;
+}
+
+double knob_energy(double x) {
+    return readme_knob().network()->curve().inside(x).integral;
+}
+
+TEST(GuardedAccount, SlowPressesOfTheReadmeKnobNeverDrainTheTankNorGiveEnergy) {
+    const Pressed run = press_readme_knob(test::cases(2000));
+    EXPECT_EQ(run.drained, 0U) << "of " << run.ticks << " ticks";
+    EXPECT_EQ(run.softened, 0U);
+    const double held = knob_energy(0.2) - energy_range(readme_knob()).least;
+    EXPECT_GE(run.least, -held);
+}
+
+// A reading that flickers between two counts adds L Delta^2 for a cycle of the read motion, and the tank does not act.
+TEST(GuardedAccount, AFlickeringCountDoesNotDrainTheTank) {
+    const DeviceProfile device = bench_knob();
+    const ForceModel model = readme_knob();
+    const double border = device.encoder_step * (std::floor(0.4 / device.encoder_step) + 0.5);
+    GuidedHandle handle{device, border};
+    Controller controller{handle, Direct{CompiledNetwork{*model.network()}},
+                          certified_guards(model, direct(), device)};
+    ASSERT_EQ(controller.start(), Status::Ok);
+    std::size_t drained = 0;
+    const int ticks = test::cases(2'000'000);
+    for (int k = 0; k < ticks; ++k) {
+        handle.go_to(border + (k % 2 == 0 ? 1e-12 : -1e-12));
+        drained += controller.tick().status == Status::Drained ? 1 : 0;
+    }
+    EXPECT_EQ(drained, 0U);
+    EXPECT_LT(controller.guards().tank.most_given(), 1e-6);
+    EXPECT_NEAR(controller.guards().observer.energy(), handle.motor(), 1e-4);
+}
+
+/// Motions from sample to sample that try to drain the tank.
+class Motions {
+  public:
+    Motions(test::Random& random, const test::Scene& scene)
+        : kind_{random() % 6},
+          centre_{random() % 2 == 0 ? scene.steepest : test::uniform(random, 0.0, 1.0)},
+          reach_{std::exp(test::uniform(random, -6.0, -1.0))},
+          angle_{random() % 2 == 0 ? std::numbers::pi : test::uniform(random, 0.01, std::numbers::pi)} {
+        if (random() % 4 == 0 && scene.device.encoder_step > 0.0) {
+            reach_ = scene.device.encoder_step * test::uniform(random, 0.1, 6.0);
+        }
+    }
+
+    double next(test::Random& random, int tick) { return std::clamp(wanted(random, tick), -0.1, 1.1); }
+
+  private:
+    double wanted(test::Random& random, int tick) {
+        switch (kind_) {
+            case 0:
+            case 1:
+            case 2:
+                return centre_ + reach_ * std::cos(angle_ * tick);
+            case 3:
+                return centre_ + reach_ * test::uniform(random, -1.0, 1.0);
+            case 4:  // back and forth at constant speed
+                return centre_ + reach_ * (2.0 * std::abs(std::remainder(angle_ * tick, 2.0)) - 1.0);
+            default:
+                walked_ = std::clamp(walked_ + 0.3 * reach_ * test::uniform(random, -1.0, 1.0), -1.0, 1.0);
+                return centre_ + walked_;
+        }
+    }
+
+    std::uint64_t kind_;
+    double centre_;
+    double reach_;
+    double angle_;
+    double walked_ = 0.0;
+};
+
+// Tests any motion on devices with exactly the damping and friction that a certificate requires.
+TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
+    test::Random random{31};
+    double most = 0.0;
+    std::map<std::string, int> scenes;
+    for (int k = 0; k < test::cases(400); ++k) {
+        test::Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
+        scene.device.force_limit = std::exp(test::uniform(random, -2.0, 3.0));
+        if (!certify(scene.model, scene.scheme, scene.device).certified()) {
+            continue;  // the proof does not include the limit here
+        }
+        ++scenes[std::string(name_of(scene.scheme.structure))];
+        Motions motion{random, scene};
+        GuidedHandle handle{scene.device, scene.start};
+        const Guards guards = certified_guards(scene.model, scene.scheme, scene.device);
+        with_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit,
+                       [&](auto structure) {
+                           Controller controller{handle, std::move(structure), guards};
+                           ASSERT_EQ(controller.start(), Status::Ok);
+                           std::size_t drained = 0;
+                           for (int tick = 0; tick < 3000; ++tick) {
+                               handle.go_to(tick < 5 ? scene.start : motion.next(random, tick));
+                               drained += controller.tick().status == Status::Drained ? 1 : 0;
+                           }
+                           const EnergyTank& tank = controller.guards().tank;
+                           EXPECT_EQ(drained, 0U) << "scene " << k << ": " << scene << "; given "
+                                                  << tank.most_given() << " of " << tank.stored().most();
+                           most = std::max(most, tank.most_given() / tank.stored().most());
+                       });
+    }
+    EXPECT_GT(most, 0.3);  // the bound of the stored energy is close to the energy given
+    EXPECT_GE(scenes.size(), 2U);
+    for (const auto& [structure, count] : scenes) {
+        RecordProperty(structure, count);
+    }
+}
+
+// A spring of exactly 2 b / T, moved back and forth at every sample, gives exactly the energy that the damping
+// dissipates.
+TEST(GuardedAccount, RubbingASpringAtItsBoundNeedsFullCredit) {
+    DeviceProfile device;
+    device.encoder_step = 0.0;
+    const double stiffness = (2.0 - 1e-8) * device.viscous_damping / device.period_s;
+    const ForceModel spring{NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0},
+                            {{-0.04}, {0.04}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+    ASSERT_TRUE(certify(spring, direct(), device).certified());
+    const auto drained = [&](bool certified) {
+        GuidedHandle handle{device, 0.0};
+        Guards guards = certified_guards(spring, direct(), device, certified);
+        guards.buzz = {};
+        Controller controller{handle, Direct{CompiledNetwork{*spring.network()}}, guards};
+        EXPECT_EQ(controller.start(), Status::Ok);
+        std::size_t count = 0;
+        for (int k = 0; k < 10'000; ++k) {
+            handle.go_to(k % 2 == 0 ? 0.03 : -0.03);
+            count += controller.tick().status == Status::Drained ? 1 : 0;
+        }
+        return count;
+    };
+    EXPECT_EQ(drained(true), 0U);
+    EXPECT_GT(drained(false), 1000U);
+}
+
+// A hand may press an object further than it was measured; the energy stored there is returned.
+TEST(GuardedAccount, PressesBeyondTheDomainDoNotDrainTheTank) {
+    const DeviceProfile device = bench_knob();
+    const ForceModel model = readme_knob();
+    GuidedHandle handle{device, 0.4};
+    Controller controller{handle, Direct{CompiledNetwork{*model.network()}},
+                          certified_guards(model, direct(), device)};
+    ASSERT_EQ(controller.start(), Status::Ok);
+    std::size_t drained = 0;
+    for (int k = 0; k < 20'000; ++k) {
+        handle.go_to(0.6 - 0.2 * std::cos(2.0 * std::numbers::pi * k / 1000.0));
+        drained += controller.tick().status == Status::Drained ? 1 : 0;
+    }
+    EXPECT_EQ(drained, 0U);
+    const StoredEnergy& stored = controller.guards().tank.stored();
+    EXPECT_NEAR(stored.most() - stored.within(), 5.0 * (0.8 - model.domain().upper[0]), 0.01);
+}
+
+/// A wheel with one peak of 8 N*m and a constant that balances the peak clipped at 5 N*m.
+struct Wheel {
+    using State = Stateless;
+    double pull = 0.0;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double u = std::remainder(x, 2.0 * std::numbers::pi) / 0.2;
+        return {8.0 * std::exp(-u * u) - pull, 0.0, 0.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+Wheel balanced_wheel(double limit) {
+    const auto work = [&](double pull) {
+        double sum = 0.0;
+        for (int k = 0; k < 20'000; ++k) {
+            const double force = Wheel{pull}.at(2.0 * std::numbers::pi * k / 20'000.0, {}).force;
+            sum += std::clamp(force, -limit, limit);
+        }
+        return sum;
+    };
+    double low = 0.0;
+    double high = limit;
+    for (int k = 0; k < 60; ++k) {
+        const double middle = 0.5 * (low + high);
+        (work(middle) > 0.0 ? low : high) = middle;
+    }
+    return {low};
+}
+
+// Softening scales a force that is balanced with its limit. If it were scaled before the limit, it would drive the
+// wheel.
+TEST(GuardedAccount, ASoftenedWheelWithAForceLimitIsNoMotor) {
+    DeviceProfile device;
+    device.encoder_step = device.viscous_damping = 0.0;
+    Guards guards;
+    guards.limit = {5.0};
+    LimitCycleDetector buzz{{0.05, 25, 0.0}};
+    for (int k = 0; buzz.buzzes() == 0; ++k) {
+        buzz.watch(k % 2 == 0 ? 0.01 : -0.01, k % 2 == 0 ? 1.0 : -1.0);
+    }
+    ASSERT_NEAR(buzz.scale(), 0.7, 1e-12);
+    guards.buzz = buzz;
+    GuidedHandle handle{device, 0.0};
+    Controller controller{handle, Direct{balanced_wheel(5.0)}, guards};
+    ASSERT_EQ(controller.start(), Status::Ok);
+    constexpr int turn = 20'000;
+    for (const int direction : {1, -1}) {
+        (void)controller.tick();
+        handle.begin_account();
+        for (int k = 1; k <= turn; ++k) {
+            handle.go_to(direction * 2.0 * std::numbers::pi * (direction > 0 ? k : k - turn) / turn);
+            (void)controller.tick();
+        }
+        EXPECT_NEAR(handle.energy(), 0.0, 1e-3) << "J in a turn, direction " << direction;
+    }
+    EXPECT_EQ(controller.guards().buzz.buzzes(), 1U);
+}
+
+TEST(GuardedAccount, ALimitedForceIsScaledAfterItsLimit) {
+    DeviceProfile device;
+    GuidedHandle handle{device, 0.1};
+    Guards guards;
+    guards.limit = {2.0};
+    guards.ramp = {4, 0};
+    Controller controller{handle, Direct{test::Spring{100.0}}, guards};
+    ASSERT_EQ(controller.start(), Status::Ok);
+    for (const double force : {0.0, 0.5, 1.0, 1.5, 2.0, 2.0}) {
+        EXPECT_DOUBLE_EQ(controller.tick().command.force, force);
+    }
+}
+
+// While the forces increase, a handle can be moved in against a small force and pushed out with a larger one. The
+// account of the given energy starts after that, and the energy given before is stated separately.
+TEST(GuardedAccount, WhatARampGivesIsBookedByItself) {
+    constexpr double stiffness = 20.0;
+    constexpr double reach = 0.1;
+    constexpr double stored = 0.5 * stiffness * reach * reach;
+    for (const bool during : {true, false}) {
+        DeviceProfile device;
+        device.encoder_step = device.viscous_damping = 0.0;
+        Guards guards;
+        guards.limit = {5.0};
+        guards.ramp = {200, 0};
+        GuidedHandle handle{device, 0.0};
+        Controller controller{handle, Direct{test::Spring{stiffness}}, guards};
+        ASSERT_EQ(controller.start(), Status::Ok);
+        double after_ramp = 0.0;
+        for (int k = 0; k < 400; ++k) {
+            const int out = during ? 150 : 250;
+            handle.go_to(reach * std::clamp(k < out ? k / 20.0 : 1.0 - (k - out) / 20.0, 0.0, 1.0));
+            (void)controller.tick();
+            if (k == 200) {
+                after_ramp = handle.energy();
+            }
+        }
+        const double in_ramp = -controller.guards().at_start.least();
+        const double after = -controller.guards().observer.least();
+        EXPECT_LT(in_ramp, stored);
+        EXPECT_LT(after, 1.2 * stored);  // without damping each sample on the way out adds K d^2 / 2
+        EXPECT_NEAR(-controller.guards().observer.energy(), after_ramp - handle.energy(), 1e-12);
+        if (during) {
+            EXPECT_GT(in_ramp, 0.5 * stored);
+            EXPECT_NEAR(in_ramp, -handle.least(), 1e-12);
+            EXPECT_EQ(after, 0.0);
+        } else {
+            EXPECT_LT(in_ramp, 1e-9);
+            EXPECT_GT(after, 0.9 * stored);
+        }
+    }
+}
+
+/// Returns int c(f) over the domain from its least to its largest, by a fine sum, and the energy stored by bending.
+double stored_span(const ForceModel& model, double limit) {
+    constexpr int cells = 200'000;
+    const double lower = model.domain().lower[0];
+    const double travel = model.domain().upper[0] - lower;
+    const HysteresisNetwork* both = model.hysteresis();
+    const NetworkCurve& force = both != nullptr ? both->force() : model.network()->curve();
+    double energy = 0.0;
+    double least = 0.0;
+    double largest = 0.0;
+    for (int k = 0; k < cells; ++k) {
+        const double x = lower + travel * (k + 0.5) / cells;
+        energy += std::clamp(force.inside(x).value, -limit, limit) * travel / cells;
+        least = std::min(least, energy);
+        double bent = 0.0;  // S - C with the play at its end, at some positions
+        if (both != nullptr && k % 1000 == 0) {
+            const double r = both->play_radius();
+            for (int j = 0; j < 100; ++j) {
+                const double at = x - r + r * (j + 0.5) / 100.0;
+                const double g = force.at(at).value;
+                const double pull = (at - (x - r)) / r * both->loss().at(at).value;
+                bent += (std::clamp(g + pull, -limit, limit) - std::clamp(g, -limit, limit)) * r / 100.0;
+            }
+        }
+        largest = std::max(largest, energy + bent);
+    }
+    return largest - least;
+}
+
+TEST(MostEnergy, IsABoundOfTheEnergyOfTheClippedForce) {
+    test::Random random{12};
+    double worst = 1.0;
+    for (int k = 0; k < test::cases(60); ++k) {
+        const ForceModel model = test::random_model(random, k % 2 == 0);
+        const double limit = std::exp(test::uniform(random, -3.0, 2.0));
+        const double span = stored_span(model, limit);
+        const double most = most_energy(model, direct(), limit);
+        EXPECT_GE(most, span * (1.0 - 1e-5)) << "model " << k << ", limit " << limit;
+        const double bend =
+            model.hysteresis() == nullptr
+                ? 0.0
+                : 0.5 * model.hysteresis()->play_radius() * model.hysteresis()->loss().value_bounds().upper;
+        if (energy_range(model, limit).least > -1e300 && model.domain().below == Continuation::Linear) {
+            worst = std::max(worst, (most - bend) / std::max(span, 1e-3));
+        }
+    }
+    RecordProperty("largest over the sum", std::to_string(worst));
+}
+
+// The energy of a clipped force can have a larger range than that of the force, because the energy of a peak is cut
+// off.
+TEST(MostEnergy, CanBeLargerThanThatOfTheForce) {
+    NetworkParameters network;
+    network.alpha = {6.0};
+    network.beta = {1.5};
+    network.weight = {-8.0};  // a peak of 8 between two valleys
+    network.linear = {0.0};
+    network.bias = -0.5;
+    const ForceModel model{network, {{0.0}, {3.0}, Continuation::Linear, Continuation::Linear, {}}};
+    EXPECT_GT(most_energy(model, direct(), 3.0), 1.2 * most_energy(model, direct(), 1e9));
 }
 
 }  // namespace

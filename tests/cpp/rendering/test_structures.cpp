@@ -19,6 +19,7 @@
 #include "palpate/simulation/closed_loop.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
+#include "rendering/time_step_checks.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -401,6 +402,18 @@ TEST(Compensated, IsTheCurveWithTheSpringTakenOut) {
         EXPECT_NEAR(shifted.slope, 100.0 * original.slope / (100.0 - original.slope),
                     1e-6 * (1.0 + std::abs(shifted.slope)));
     }
+}
+
+TEST(Structure, ExplicitIsOfFirstOrder) {
+    EXPECT_NEAR(
+        test::order([](double T) { return Explicit{test::Hardening{}, test::inertia, test::coupling, T}; }),
+        1.0, 0.1);
+}
+
+TEST(Structure, ImplicitIsOfFirstOrder) {
+    EXPECT_NEAR(
+        test::order([](double T) { return Implicit{test::Hardening{}, test::inertia, test::coupling, T}; }),
+        1.0, 0.1);
 }
 
 template <class S>

@@ -76,7 +76,7 @@ def test_force_is_enabled_and_disabled(told: dict[str, Any]) -> None:
 
 
 def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(told: dict[str, Any]) -> None:
-    assert "enabling its force: it refuses the request (stall)" in told["enabled after an emergency stop"]
+    assert "enabling its force: it refused a request" in told["enabled after an emergency stop"]
     assert told["enabled after it was cleared"]
 
 

@@ -53,7 +53,7 @@ class EnergyConsistent {
     /// Returns p of every step behind the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
-        return inertia.midpoint_slope(period) + coupling.stiffness + coupling.damping / period;
+        return inertia.midpoint_slope(period) + coupling.load_line_slope(period);
     }
 
     /// Sets the object at rest at a position.

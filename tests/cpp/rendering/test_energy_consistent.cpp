@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the order and of the conserved quantities of the structures' time steps.
+// Tests of the order and of the conserved quantities of the time steps.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -23,15 +23,7 @@ using test::Hardening;
 using test::inertia;
 using test::order;
 
-TEST(Steppers, ExplicitIsOfFirstOrder) {
-    EXPECT_NEAR(order([](double T) { return Explicit{Hardening{}, inertia, coupling, T}; }), 1.0, 0.1);
-}
-
-TEST(Steppers, ImplicitIsOfFirstOrder) {
-    EXPECT_NEAR(order([](double T) { return Implicit{Hardening{}, inertia, coupling, T}; }), 1.0, 0.1);
-}
-
-TEST(Steppers, EnergyConsistentIsOfSecondOrderAndOfFirstWithItsSwitch) {
+TEST(EnergyConsistent, IsOfSecondOrderAndOfFirstWithItsSwitch) {
     EXPECT_NEAR(
         order([](double T) { return EnergyConsistent{Hardening{}, inertia, coupling, T, 1e-4, false}; }), 2.0,
         0.1);
@@ -40,7 +32,7 @@ TEST(Steppers, EnergyConsistentIsOfSecondOrderAndOfFirstWithItsSwitch) {
 }
 
 // spec section 5: "undamped amplitude constant"
-TEST(Steppers, EnergyConsistentKeepsTheEnergyOfAnUndampedObject) {
+TEST(EnergyConsistent, KeepsTheEnergyOfAnUndampedObject) {
     const Hardening object;
     EnergyConsistent structure{object, {0.001, 0.0}, coupling, 1e-3, 1e-4, false};
     structure.reset(0.3);
@@ -54,7 +46,7 @@ TEST(Steppers, EnergyConsistentKeepsTheEnergyOfAnUndampedObject) {
     }
 }
 
-TEST(Steppers, TheSwitchNeverGivesEnergy) {
+TEST(EnergyConsistent, TheSwitchNeverGivesEnergy) {
     const Hardening object;
     EnergyConsistent structure{object, {0.001, 0.0}, coupling, 1e-3};
     structure.reset(0.3);
@@ -124,7 +116,7 @@ struct SwitchedStep {
 };
 
 // With s = 1.5 p the switched step has up to three roots.
-TEST(Steppers, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
+TEST(EnergyConsistent, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
     test::Random random{91};
     int three = 0;
     int tried = 0;
@@ -163,7 +155,7 @@ TEST(Steppers, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
 }
 
 // docs/certificate.md, behind a coupling: G eta >= the gain of stored and kinetic energy, for any slope and any root.
-TEST(Steppers, TheSwitchKeepsTheEnergyInequalityOfEveryStep) {
+TEST(EnergyConsistent, TheSwitchKeepsTheEnergyInequalityOfEveryStep) {
     test::Random random{92};
     int most = 0;
     int most_without_tables = 0;
@@ -216,7 +208,7 @@ TEST(Steppers, TheSwitchKeepsTheEnergyInequalityOfEveryStep) {
     EXPECT_LE(most_without_tables, 48);
 }
 
-TEST(Steppers, SettleOnTheSameForceBehindTheCoupling) {
+TEST(EnergyConsistent, SettleOnTheSameForceBehindTheCoupling) {
     test::expect_the_force_of_the_coupling_at_rest(Implicit{Hardening{}, inertia, coupling, 1e-3});
     test::expect_the_force_of_the_coupling_at_rest(EnergyConsistent{Hardening{}, inertia, coupling, 1e-3});
     test::expect_the_force_of_the_coupling_at_rest(
@@ -224,7 +216,7 @@ TEST(Steppers, SettleOnTheSameForceBehindTheCoupling) {
     test::expect_the_force_of_the_coupling_at_rest(Explicit{Hardening{}, inertia, coupling, 1e-3});
 }
 
-TEST(Steppers, RefuseNanAndGoOn) {
+TEST(EnergyConsistent, RefuseNanAndGoOn) {
     test::expect_nan_is_refused(EnergyConsistent{Hardening{}, inertia, coupling, 1e-3});
 }
 

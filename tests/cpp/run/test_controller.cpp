@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/run/controller.hpp"
+
+#include <cstdint>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/implicit.hpp"
+#include "support.hpp"
+
+namespace palpate {
+namespace {
+
+/// A device with prescribed readings, for tests of the controller with invalid ones.
+class ScriptedDevice {
+  public:
+    Opened open() { return {}; }
+    Reading exchange(const Command& command) noexcept {
+        sent = command.force;
+        Reading reading = next;
+        reading.sequence = ++sequence;
+        return reading;
+    }
+    void close() noexcept {}
+
+    Reading next;
+    double sent = 0.0;
+    std::uint64_t sequence = 0;
+};
+
+TEST(Controller, SendsZeroForceOnAnyReadingThatIsNotSound) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
+                                                                ForceLimit{5.0}};
+    ASSERT_EQ(controller.start(), Status::Ok);
+    for (const Status bad : {Status::Timeout, Status::Lost, Status::Fault}) {
+        device.next.status = Status::Ok;
+        (void)controller.tick();
+        EXPECT_EQ(controller.tick().command.force, 2.0);
+        EXPECT_EQ(device.sent, 2.0);
+        device.next.status = bad;
+        (void)controller.tick();
+        EXPECT_EQ(controller.tick().status, bad);
+        EXPECT_EQ(device.sent, 0.0);
+    }
+    device.next = {};
+    device.next.position = std::numeric_limits<double>::quiet_NaN();
+    (void)controller.tick();
+    EXPECT_EQ(controller.tick().status, Status::NonFinite);
+    EXPECT_EQ(device.sent, 0.0);
+}
+
+TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
+    const VirtualCoupling coupling;
+    Implicit expected{test::Spring{10.0}, Inertia{}, coupling, 1e-3};
+    expected.reset(0.2);
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice, Implicit<test::Spring>> controller{
+        device, Implicit{test::Spring{10.0}, Inertia{}, coupling, 1e-3}, ForceLimit{5.0}};
+    (void)controller.start();
+    EXPECT_EQ(controller.tick().command.force, expected.step(0.2).force);
+}
+
+TEST(Controller, RaisesTheForceFromZeroAndSaysSo) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
+                                                                Guards{.limit = {5.0}, .ramp = {4, 0}}};
+    (void)controller.start();
+    for (const double expected : {0.0, 0.5, 1.0, 1.5}) {
+        EXPECT_EQ(controller.tick().status, Status::Ramp);
+        EXPECT_EQ(device.sent, expected);
+    }
+    EXPECT_EQ(controller.tick().status, Status::Ok);
+    EXPECT_EQ(device.sent, 2.0);
+}
+
+TEST(Controller, ClipsToTheForceLimitAndSaysSo) {
+    ScriptedDevice device;
+    device.next.position = -3.0;
+    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
+                                                                ForceLimit{5.0}};
+    (void)controller.start();
+    const Tick tick = controller.tick();
+    EXPECT_EQ(device.sent, -5.0);
+    EXPECT_EQ(tick.rendered.force, -30.0);
+    EXPECT_EQ(tick.status, Status::Limited);
+}
+
+}  // namespace
+}  // namespace palpate
