@@ -52,10 +52,12 @@ def moved(
 
 def test_mass_and_damping_are_recovered_from_a_minute_of_motion() -> None:
     for seed in range(1 if SCALE == 1 else 20):
-        model = identify(moved(seed, seconds=60.0, mass=1e-3, damping=0.06))
+        recording = moved(seed, seconds=60.0, mass=1e-3, damping=0.06)
+        model = identify(recording)
         assert (model.kind, model.fit.model_class) == ("position", "mass and damping")
         assert model.mass == pytest.approx(1e-3, rel=0.05)
         assert model.damping == pytest.approx(0.06, rel=0.05)
+        assert model.fit.nrmse == pytest.approx(verify(model, recording).nrmse, rel=1e-6)
         fresh = verify(model, moved(seed + 1000, mass=1e-3, damping=0.06))
         assert fresh.rmse == pytest.approx(NOISE, rel=0.03)
         assert fresh.n < 10_000
@@ -128,7 +130,8 @@ def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input
     result = verify(model, held)
     assert result.nrmse < 0.1
     assert result.n < len(held)
-    assert any("give --negate force" in reason for reason in model.verdict.reasons)
+    (gains,) = (reason for reason in model.verdict.reasons if reason.startswith("hysteresis gains energy"))
+    assert "give --negate force" in gains
     assert any(
         note.startswith("velocity accepted as an input: a network over position and velocity lowers")
         for note in model.notes["identification"]
