@@ -9,6 +9,7 @@ import pytest
 
 from palpate import Recording, identify, read_recording, verify
 from palpate._core.model import play
+from palpate.identification.classes.dynamics import Dynamics
 from palpate.recording import sample_force
 from palpate.recording.motion import (
     LowPass,
@@ -51,10 +52,12 @@ def moved(
 
 def test_mass_and_damping_are_recovered_from_a_minute_of_motion() -> None:
     for seed in range(1 if SCALE == 1 else 20):
-        model = identify(moved(seed, seconds=60.0, mass=1e-3, damping=0.06))
+        recording = moved(seed, seconds=60.0, mass=1e-3, damping=0.06)
+        model = identify(recording)
         assert (model.kind, model.fit.model_class) == ("position", "mass and damping")
         assert model.mass == pytest.approx(1e-3, rel=0.05)
         assert model.damping == pytest.approx(0.06, rel=0.05)
+        assert model.fit.nrmse == pytest.approx(verify(model, recording).nrmse, rel=1e-6)
         fresh = verify(model, moved(seed + 1000, mass=1e-3, damping=0.06))
         assert fresh.rmse == pytest.approx(NOISE, rel=0.03)
         assert fresh.n < 10_000
@@ -127,7 +130,8 @@ def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input
     result = verify(model, held)
     assert result.nrmse < 0.1
     assert result.n < len(held)
-    assert any("give --negate force" in reason for reason in model.verdict.reasons)
+    (gains,) = (reason for reason in model.verdict.reasons if reason.startswith("hysteresis gains energy"))
+    assert "give --negate force" in gains
     assert any(
         note.startswith("velocity accepted as an input: a network over position and velocity lowers")
         for note in model.notes["identification"]
@@ -217,6 +221,18 @@ def test_a_negative_damping_is_refused() -> None:
     told = " ".join(model.notes["identification"])
     assert "damping refused" in told
     assert "it would be -0.0" in told
+
+
+def test_a_damping_that_the_last_fit_makes_negative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Dynamics, "accepted", lambda *_: ({"damping": -0.01}, []))
+    model = identify(moved(1))
+    assert (model.fit.model_class, model.damping) == ("position", None)
+
+
+def test_values_of_the_first_round_stay_if_the_second_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Dynamics, "values", lambda *_: {})
+    model = identify(moved(1, damping=0.03))
+    assert (model.fit.model_class, model.damping) == ("velocity", pytest.approx(0.03, rel=0.1))
 
 
 def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
