@@ -86,8 +86,8 @@ struct EnergyAccount {
 /// the remaining speed.
 class Midpoint : public PlainPlant {
   public:
-    // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): known by its type, never through the base
     /// Resets the energy account.
+    // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): never called through the base
     void start() noexcept { account_ = {}; }
 
     /// Moves the handle over one tick and updates the energy account.
