@@ -19,7 +19,7 @@ LONGEST = 60
 
 
 def shown(value: object) -> str:
-    """The value as a message shows it: one line, cut where it is long."""
+    """Returns the value as a message shows it: one line, cut where it is long."""
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     text = " ".join(repr(value).split())
@@ -27,7 +27,7 @@ def shown(value: object) -> str:
 
 
 def path_of(name: str, value: object) -> Path:
-    """The path that an argument names.
+    """Returns the path that an argument names.
 
     Raises
     ------
@@ -55,7 +55,8 @@ def instance_of(name: str, value: object, kind: type | tuple[type, ...], cure: s
 
 
 def real_of(name: str, value: object) -> float:
-    """The real number that an argument is; NaN and infinity are left to the range check of the caller.
+    """Returns the real number that an argument is; NaN and infinity are left to the range check of the
+    caller.
 
     Raises
     ------
@@ -71,7 +72,7 @@ def real_of(name: str, value: object) -> float:
 
 
 def number_of(name: str, value: object) -> float:
-    """The finite number that an argument is.
+    """Returns the finite number that an argument is.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def number_of(name: str, value: object) -> float:
 
 
 def vector_of(name: str, values: object) -> Float1D:
-    """The finite numbers (n,) of an array, a list, a column of a frame; a copy.
+    """Returns the finite numbers (n,) of an array, a list, a column of a frame; a copy.
 
     Raises
     ------

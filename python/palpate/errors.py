@@ -21,7 +21,7 @@ class InputError(ValueError):
 
 
 def visible(text: str) -> str:
-    """The text with its control and format characters escaped, so that no terminal acts on them."""
+    """Returns the text with its control and format characters escaped, so that no terminal acts on them."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(
@@ -33,7 +33,7 @@ def visible(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
-    """The visible text, with its end left out where it is long."""
+    """Returns the visible text, with its end left out where it is long."""
     shown = visible(text)
     return shown if len(shown) <= longest else f"{shown[:longest]}..."
 

@@ -60,16 +60,16 @@ class Verdict:
         return f"{self.level}: {'; '.join(self.reasons)}" if self.findings else self.level
 
     def __add__(self, other: Verdict) -> Verdict:
-        """The verdict on both results together."""
+        """Returns the verdict on both results together."""
         return Verdict(tuple(dict.fromkeys(self.findings + other.findings)))
 
     def record(self) -> list[dict[str, str]]:
-        """The findings as they stand in a model file."""
+        """Returns the findings as they stand in a model file."""
         return [{"level": finding.level, "sentence": finding.sentence} for finding in self.findings]
 
     @classmethod
     def from_record(cls, record: Iterable[Mapping[str, Any]]) -> Verdict:
-        """The verdict of a model file; what is not a finding is left out."""
+        """Returns the verdict of a model file; what is not a finding is left out."""
         return cls(
             tuple(
                 Finding(item["level"], str(item.get("sentence", "")))
@@ -93,10 +93,10 @@ recording because recordings reach from nanonewtons to kilograms, scaled before 
 
 
 def usable(sentence: str) -> Finding:
-    """A reservation that leaves the result usable."""
+    """Returns a reservation that leaves the result usable."""
     return Finding("usable", sentence)
 
 
 def no(sentence: str) -> Finding:
-    """A finding that makes the result unfit for use."""
+    """Returns a finding that makes the result unfit for use."""
     return Finding("no", sentence)

@@ -68,7 +68,7 @@ def comparable(recording: Recording) -> NDArray[np.bool_]:
 
 
 def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
-    """Fit each baseline to all rows but every `every`-th, and judge it on those.
+    """Fits each baseline to all rows but every `every`-th, and judge it on those.
 
     Where the recordings tell strokes each baseline is fitted to press and release apart, which is two models
     where an identified one is one; rows without a direction are left out.

@@ -58,7 +58,8 @@ class Estimator(Protocol):
 def best_of(
     candidates: Iterable[C], fitted: Callable[[C, Float2D, Float1D], Estimator], X: Float2D, y: Float1D
 ) -> C:
-    """The simplest candidate that is within one standard error of the best on every fifth row, held out.
+    """Returns the simplest candidate that is within one standard error of the best on every fifth row, held
+    out.
 
     Candidates stand in order, the simplest first; one that cannot be fitted is out. This is what a competent
     user does before comparing: no method is shown with a setting that suits it badly.
@@ -105,7 +106,7 @@ class PerStroke:
     passive: bool = False
 
     def fit(self, X: Float2D, y: Float1D) -> PerStroke:
-        """Fit one copy to the press rows of X (n, d) and one to the release rows."""
+        """Fits one copy to the press rows of X (n, d) and one to the release rows."""
         press = X[:, -1] > 0
         self.press_ = deepcopy(self.estimator).fit(X[press, :-1], y[press])
         self.release_ = deepcopy(self.estimator).fit(X[~press, :-1], y[~press])
@@ -140,7 +141,7 @@ class LookupTable:
     size: int | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> LookupTable:
-        """Fit to the first column of X (n, d), the position, and y (n,)."""
+        """Fits to the first column of X (n, d), the position, and y (n,)."""
         size = self.size or best_of(SIZES, lambda entries, A, b: LookupTable(entries).fit(A, b), X, y)
         x, mean, count = merged(X[:, 0], y)
         # entries that no row lies between would be free: leave out those
@@ -184,7 +185,7 @@ class SmoothingSpline:
     smoothing: float | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> SmoothingSpline:
-        """Fit to the first column of X (n, d), the position, and y (n,)."""
+        """Fits to the first column of X (n, d), the position, and y (n,)."""
         multiple = self.smoothing or best_of(
             SMOOTHINGS, lambda smoothing, A, b: SmoothingSpline(smoothing).fit(A, b), X, y
         )
@@ -223,7 +224,7 @@ class HuntCrossley:
     """
 
     def fit(self, X: Float2D, y: Float1D) -> HuntCrossley:
-        """Fit to X (n, 1 to 3), position and velocity, and y (n,)."""
+        """Fits to X (n, 1 to 3), position and velocity, and y (n,)."""
         X = X[:, :2]
         step = -(-len(y) // MOST_FITTED_ROWS)
         rows, force = X[::step], y[::step]
@@ -283,7 +284,7 @@ class TissueParameters:
     order: int = 3
 
     def fit(self, X: Float2D, y: Float1D) -> TissueParameters:
-        """Fit to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        """Fits to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
         self.scale_ = np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
         self.parameters_ = np.linalg.lstsq(self._columns(X), y, rcond=None)[0]
         self.n_parameters_ = len(self.parameters_)
@@ -316,7 +317,7 @@ class LinearZones:
     threshold: float | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> LinearZones:
-        """Fit to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        """Fits to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
         threshold = self.threshold or best_of(
             THRESHOLDS, lambda share, A, b: LinearZones(share).fit(A, b), X, y
         )
@@ -350,7 +351,7 @@ def _solved(design: Float2D, y: Float1D) -> Float1D:
 
 
 def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | None:
-    """The row before which to divide a zone, or None where it is good enough or cannot be divided."""
+    """Returns the row before which to divide a zone, or None where it is good enough or cannot be divided."""
     least = LEAST_ZONE_ROWS * design.shape[1]
     rest = y - design @ _solved(design, y)
     if len(y) < 2 * least or float(np.sqrt(np.mean(rest**2))) <= allowed:

@@ -137,7 +137,7 @@ def demo(output: Path, as_json: bool) -> None:
 
 
 def _require_folder(folder: Path) -> None:
-    """Refuse, before the work, a folder that could not be made or written after it."""
+    """Refuses, before the work, a folder that could not be made or written after it."""
     if folder.is_dir():
         require_writable(folder / "model.json")
     elif folder.exists():

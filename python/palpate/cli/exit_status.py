@@ -43,7 +43,7 @@ class Ending:
     help: str = ""
 
     def tell(self, *, as_json: bool) -> None:
-        """Print the sentence: as one object on standard output with --json, else on standard error.
+        """Prints the sentence: as one object on standard output with --json, else on standard error.
 
         A stream that cannot be written leaves the exit code alone.
         """
@@ -69,7 +69,7 @@ def terminated_as_interrupted() -> Iterator[None]:
 
 @contextmanager
 def interrupted_at_once() -> Iterator[None]:
-    """End the process soon after Ctrl-C, also while a library computes.
+    """Ends the process soon after Ctrl-C, also while a library computes.
 
     Python raises KeyboardInterrupt between two of its own instructions, but one matrix or one file can take
     seconds. If it was not raised soon, a thread ends the process. Results must be written inside `finishing`,
@@ -109,7 +109,7 @@ def interrupted_at_once() -> Iterator[None]:
 
 
 def ending_of(error: BaseException) -> Ending:
-    """The ending that belongs to an exception which left a verb."""
+    """Returns the ending that belongs to an exception which left a verb."""
     if isinstance(error, click.exceptions.Exit):
         return Ending(error.exit_code)
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
@@ -147,7 +147,7 @@ def _one_line(text: str) -> str:
 
 
 def end_with(verdict: Verdict) -> None:
-    """End the verb with the exit code of its verdict.
+    """Ends the verb with the exit code of its verdict.
 
     Raises
     ------

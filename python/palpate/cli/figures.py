@@ -57,7 +57,7 @@ _DRIVEN = {
 def figure_file(
     path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1, title: str = ""
 ) -> Iterator[list[Axes]]:
-    """Give axes one below the other, of the given shares of the height; the file is complete or not there.
+    """Gives axes one below the other, of the given shares of the height; the file is complete or not there.
 
     Several axes share their position axis; in several columns, row by row, each has its own. The title stands
     above them, wrapped to the width of the figure.
@@ -114,7 +114,7 @@ def _is_simulated(recording: Recording) -> bool:
 
 
 def source_name(files: Iterable[str]) -> str:
-    """The names of source files without their folders, for the title of a figure."""
+    """Returns the names of source files without their folders, for the title of a figure."""
     names = [Path(file).name for file in files]
     if len(names) > _MOST_NAMES:
         return f"{names[0]} and {len(names) - 1} more"
@@ -122,7 +122,7 @@ def source_name(files: Iterable[str]) -> str:
 
 
 def _error_text(reference: NDArray[np.float64], other: NDArray[np.float64]) -> str:
-    """The NRMSE of the forces that a figure compares."""
+    """Returns the NRMSE of the forces that a figure compares."""
     spread = float(np.std(reference))
     error = float(np.sqrt(np.mean((other - reference) ** 2)))
     return f"NRMSE {number(error / spread) if spread else 'not defined'} on {len(reference)} rows"
@@ -221,7 +221,7 @@ def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[Close
 
 
 def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, *, of: str) -> None:
-    """The force error of each structure that was rendered; `of` says what was rendered."""
+    """Returns the force error of each structure that was rendered; `of` says what was rendered."""
     from ..plotting import draw_structures
 
     shown = [(row.name, row.error) for row in rows if row.error is not None]

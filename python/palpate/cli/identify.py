@@ -271,7 +271,7 @@ def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
 
 
 def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -> list[Compared]:
-    """The baselines, fitted to what is not held out."""
+    """Returns the baselines, fitted to what is not held out."""
     if hold_out_every is None:
         raise click.UsageError("--baselines compares on held-out rows and needs --hold-out-every K")
     talk("fitting the baselines ...")
@@ -279,7 +279,7 @@ def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) 
 
 
 def _print_beside(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
-    """The model first, then the baselines."""
+    """Returns the model first, then the baselines."""
     rows = [("wavelet network", number(nrmse), str(n_parameters), f"{seconds:.2f}")]
     rows += [
         (each.name, "refused", "", "")

@@ -68,7 +68,7 @@ accepted. Nothing is written then.
 
 
 def _list_examples(*, as_json: bool) -> None:
-    """Print every example profile with its file and its sources."""
+    """Prints every example profile with its file and its sources."""
     examples = example_profiles()
     if as_json:
         print_json(
@@ -173,7 +173,7 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
 
 
 def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
-    """Print the verdict, the plan, the refused structures, and every inequality."""
+    """Prints the verdict, the plan, the refused structures, and every inequality."""
     print_verdict(plan.verdict)
     file = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
     if plan.verdict.level == "no":
@@ -194,7 +194,7 @@ def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: 
 
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
-    """Draw the root locus of the explicit structure."""
+    """Draws the root locus of the explicit structure."""
     from ..plotting import draw_root_locus
 
     title = f"model of {source_name(plan.model.data.files)}, explicit, on {profile.id}"

@@ -45,7 +45,7 @@ class OutputError(Exception):
 
 
 def prepare_streams() -> None:
-    """Make the three standard streams safe to use, whatever the caller did with them.
+    """Makes the three standard streams safe to use, whatever the caller did with them.
 
     A closed descriptor is taken, so that no file which is opened later gets its number. Writing to a closed
     standard output fails like writing to a full disk does. A character that the encoding does not have is
@@ -67,7 +67,7 @@ def prepare_streams() -> None:
 
 
 def visible(text: str) -> str:
-    """The text with every character that does not print as itself written as its escape."""
+    """Returns the text with every character that does not print as itself written as its escape."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
@@ -84,7 +84,7 @@ def terminal_width(*, err: bool = False) -> int | None:
 
 
 def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere: int | None = None) -> None:
-    """Print one item: a line, wrapped on a terminal with a hanging indent beyond its own.
+    """Prints one item: a line, wrapped on a terminal with a hanging indent beyond its own.
 
     `elsewhere` is the width where there is no terminal; None leaves the line as it is.
 
@@ -111,7 +111,7 @@ def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere
 
 
 def print_value(name: str, value: str, name_width: int) -> None:
-    """Print a name, padded, and its value; a long value continues below itself on a terminal."""
+    """Prints a name, padded, and its value; a long value continues below itself on a terminal."""
     width = terminal_width()
     hanging = name_width + 2
     if width is not None and width - hanging < _NARROWEST_VALUE:
@@ -120,7 +120,7 @@ def print_value(name: str, value: str, name_width: int) -> None:
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
-    """Write text as it is: for text that is known to hold no control character from outside."""
+    """Writes text as it is: for text that is known to hold no control character from outside."""
     if err:
         with suppress(OSError):
             click.echo(text, err=True, nl=nl)
@@ -134,13 +134,13 @@ def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
 
 
 def end_line_on_terminal() -> None:
-    """Leave a line that is being overwritten on standard error."""
+    """Leaves a line that is being overwritten on standard error."""
     if terminal_width(err=True) is not None:
         echo("", err=True)
 
 
 def drop_what_cannot_be_written() -> None:
-    """Leave the interpreter nothing to flush at exit: a full disk or a closed pipe was reported before."""
+    """Leaves the interpreter nothing to flush at exit: a full disk or a closed pipe was reported before."""
     for stream, number in ((sys.stdout, 1), (sys.stderr, 2)):
         try:
             stream.flush()
@@ -149,12 +149,12 @@ def drop_what_cannot_be_written() -> None:
 
 
 def talk(sentence: str) -> None:
-    """Print a sentence for a person, on standard error."""
+    """Prints a sentence for a person, on standard error."""
     print_line(sentence, err=True)
 
 
 def print_json(result: Mapping[str, Any]) -> None:
-    """Print one object on standard output, in ASCII; a number that is not finite becomes null."""
+    """Prints one object on standard output, in ASCII; a number that is not finite becomes null."""
     echo(json.dumps(_finite(result), allow_nan=False))
 
 
@@ -174,21 +174,21 @@ def number(value: float) -> str:
 
 
 def print_numbers(rows: Mapping[str, str]) -> None:
-    """Print one line for each number: its name, aligned, and its value."""
+    """Prints one line for each number: its name, aligned, and its value."""
     width = max(map(len, rows))
     for name, value in rows.items():
         print_value(name, value, width)
 
 
 def print_verdict(verdict: Verdict) -> None:
-    """Print the verdict on standard output, before any number: its level, then a line for each reason."""
+    """Prints the verdict on standard output, before any number: its level, then a line for each reason."""
     print_line(f"verdict: {verdict.level}")
     for reason in verdict.reasons:
         print_paragraph(reason, indent="  ")
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table whose first column is text and whose others are numbers, aligned right.
+    """Prints a table whose first column is text and whose others are numbers, aligned right.
 
     On a terminal that is too narrow the numbers stand on a line of their own, below the text.
     """
@@ -208,7 +208,7 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def print_paragraph(text: str, *, indent: str = "") -> None:
-    """Print text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
+    """Prints text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
     print_line(indent + text, elsewhere=WIDEST)
 
 
@@ -220,21 +220,21 @@ class OverwrittenLine:
         self._used = False
 
     def show(self, text: str) -> None:
-        """Replace the line, cut to the width of the terminal."""
+        """Replaces the line, cut to the width of the terminal."""
         if self.on_terminal:
             width = shutil.get_terminal_size().columns - 1
             echo(f"\r{visible(text):<{width}.{width}}", err=True, nl=False)
             self._used = True
 
     def clear(self) -> None:
-        """Remove the line."""
+        """Removes the line."""
         if self._used:
             self.show("")
             echo("\r", err=True, nl=False)
             self._used = False
 
     def end(self) -> None:
-        """Leave the line as it is and begin the next one."""
+        """Leaves the line as it is and begins the next one."""
         if self._used:
             echo("", err=True)
             self._used = False
@@ -249,7 +249,7 @@ class Progress:
         self._start = self._shown = time.monotonic()
 
     def __call__(self, state: str) -> None:
-        """Report a state; it is printed if the last one was long enough ago."""
+        """Reports a state; it is printed if the last one was long enough ago."""
         now = time.monotonic()
         if now - self._shown >= (_REFRESH_S if self._line.on_terminal else _EVERY_S):
             self._shown = now
@@ -260,13 +260,13 @@ class Progress:
                 talk(text)
 
     def clear(self) -> None:
-        """Remove the line from a terminal."""
+        """Removes the line from a terminal."""
         self._line.clear()
 
 
 @contextmanager
 def progress(work: str) -> Iterator[Progress]:
-    """Give a `Progress` whose line is removed at the end, also when the work fails."""
+    """Gives a `Progress` whose line is removed at the end, also when the work fails."""
     shown = Progress(work)
     try:
         yield shown

@@ -91,7 +91,7 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
 def _compare(
     model: Model, model_file: Path, other: Model, other_file: Path, *, plot: Path | None, as_json: bool
 ) -> None:
-    """Print how far two models are from each other, with a verdict on both and on their difference."""
+    """Prints how far two models are from each other, with a verdict on both and on their difference."""
     strokes = compare(model, other)
     verdict = model.verdict + other.verdict + _noticed(strokes)
     with finishing():
@@ -116,7 +116,7 @@ def _compare(
 
 
 def _noticed(strokes: tuple[Stroke, ...]) -> Verdict:
-    """A finding if a hand notices the difference between two models."""
+    """Returns a finding if a hand notices the difference between two models."""
     worst = max(stroke.worst for stroke in strokes)
     if worst <= 1.0:
         return GOOD

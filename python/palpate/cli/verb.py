@@ -35,7 +35,7 @@ _SCHEME = Scheme()
 def verb(
     example: str, *, cls: type[click.Command] = Verb, ends_at_once: bool = True, **settings: Any
 ) -> Callable[[Callable[..., Any]], click.Command]:
-    """Make a function a verb: a command whose help ends with an example.
+    """Makes a function a verb: a command whose help ends with an example.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class ReadingOptions:
     options: dict[str, Any] = field(default_factory=dict)
 
     def read(self, path: Path, inputs: Sequence[str] = ()) -> Recording:
-        """Read a recording with further inputs, and say first what was read and which columns were chosen."""
+        """Reads a recording with further inputs, and says first what was read and which columns were chosen."""
         recording = read_recording(path, inputs=inputs, **self.options)
         chosen, *others = recording.notes
         talk(f"read {path}: {len(recording)} rows; {chosen}")

@@ -105,7 +105,7 @@ class Check:
         )
 
     def profile_notes(self) -> tuple[str, ...]:
-        """The origin of each number of the profile."""
+        """Returns the origin of each number of the profile."""
         stated = self.coulomb_friction is not None
         friction = "stated, not measured" if stated else "measured, less its uncertainty: a lower bound"
         delay = "measured" if self.numbers["delay_s"] is not None else "not measured; assumed to be 0"
@@ -301,7 +301,7 @@ def _sign(push: Push, step: float) -> Observation:
 
 
 def _expected(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:
-    """The devices to compare with, by the name of the observation."""
+    """Returns the devices to compare with, by the name of the observation."""
     devices: dict[str, CoreProfile] = {} if profile is None else {"profile": profile}
     if model is not None:
         if model.certificate is None:

@@ -115,7 +115,7 @@ def _period(period: Mapping[str, float], wanted: float) -> Observation:
 
 
 def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
-    """The device's own clock between samples that follow each other."""
+    """Returns the device's own clock between samples that follow each other."""
     steps = np.diff(ticks["device_time"])[np.diff(ticks["sequence"].astype(np.int64)) == 1]
     if not steps.size:
         return Observation("clock of the device", "no two samples in a row", False, _CABLE)
@@ -158,7 +158,7 @@ def _encoder(position: Float1D, step: float, rate_hz: float) -> Observation:
 
 
 def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
-    """The velocity beside the way that it should explain: damping of a wrong sign would give energy."""
+    """Returns the velocity beside the way that it should explain: damping of a wrong sign would give energy."""
     name = "sign of the velocity"
     position, time, velocity = (np.asarray(ticks[key]) for key in ("position", "device_time", "velocity"))
     if np.ptp(position) < _MOVED_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
@@ -177,7 +177,7 @@ def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
 
 
 def _transducer(position: Float1D, measured: Float1D, step: float) -> Observation:
-    """An object that is pressed pushes back: its force grows with position, where it changes at all."""
+    """Returns an object that is pressed pushes back: its force grows with position, where it changes at all."""
     name = "sign of the transducer"
     if np.ptp(position) < _MOVED_STEPS * step or np.ptp(measured) == 0.0:
         return Observation(name, "not seen", None, "move the handle against an object while this runs")

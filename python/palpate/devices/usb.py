@@ -30,7 +30,7 @@ class DeviceError(Exception):
 
 
 def device_error(device: str, doing: str, error: Any) -> DeviceError:
-    """The sentence for an error of pyusb while `doing` something with `device`."""
+    """Returns the sentence for an error of pyusb while `doing` something with `device`."""
     cause = core.usb_cause(getattr(error, "backend_error_code", None) or 0)
     said = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return DeviceError(f"{device}, {doing}: {cause or f'{said}; plug it in again'}")
@@ -133,7 +133,7 @@ class UsbSetup:
         return bytes(answer) if size else b""
 
     def _string(self, index: int) -> str:
-        """A string descriptor without control characters; empty if the device has none."""
+        """Returns a string descriptor without control characters; empty if the device has none."""
         import usb.util
 
         try:

@@ -166,7 +166,7 @@ class Model(ForceModel):
         upper: npt.ArrayLike,
         **arguments: Any,
     ) -> Model:
-        """A model of given numbers that was not identified.
+        """Returns a model of given numbers that was not identified.
 
         Parameters
         ----------
@@ -247,7 +247,7 @@ class Model(ForceModel):
         return Model.from_dict(content)
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of a model file."""
+        """Returns the content of a model file."""
         notes = dict(self.notes)
         if self.data.held_out_every:
             notes[_HELD_OUT] = self.data.held_out_every
@@ -291,7 +291,7 @@ class Model(ForceModel):
 
     @classmethod
     def from_dict(cls, content: Any) -> Model:
-        """A model from the content of a model file.
+        """Returns a model from the content of a model file.
 
         Raises
         ------
@@ -322,7 +322,7 @@ class Model(ForceModel):
         )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the model file; it appears under its name only when it is complete.
+        """Writes the model file; it appears under its name only when it is complete.
 
         Raises
         ------
@@ -338,7 +338,7 @@ class Model(ForceModel):
         return Model.from_dict, (self.to_dict(),)
 
     def __eq__(self, other: object) -> bool:
-        """True if both would give the same model file."""
+        """Returns True if both would give the same model file."""
         return self._text() == other._text() if isinstance(other, Model) else NotImplemented
 
     def __hash__(self) -> int:
@@ -355,7 +355,7 @@ class Model(ForceModel):
 
 
 def _require_numbers(name: str, value: object) -> None:
-    """Refuse an argument of a network that is not made of real numbers."""
+    """Refuses an argument of a network that is not made of real numbers."""
     if value is None and name in _OPTIONAL:
         return
     try:
@@ -371,7 +371,7 @@ def _require_numbers(name: str, value: object) -> None:
 
 
 def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model:
-    """Read a model file.
+    """Reads a model file.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ class Fit:
     path: Sequence[PathStep] = ()
 
     def record(self) -> dict[str, Any]:
-        """The fit in a model file, with numbers of NumPy as those of Python."""
+        """Returns the fit in a model file, with numbers of NumPy as those of Python."""
         return {
             "model_class": self.model_class,
             "stop_reason": self.stop_reason,
@@ -65,7 +65,7 @@ class Fit:
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
-    """The certificate in a model file. Its scheme stands in the plan."""
+    """Returns the certificate in a model file. Its scheme stands in the plan."""
     record = certificate.to_dict()
     del record["scheme"]
     return {
@@ -132,7 +132,7 @@ def describe(model: Model) -> str:
 
 
 def _terms(model: Model, force: str) -> list[str]:
-    """The force as a formula, and its wavelets as a table."""
+    """Returns the force as a formula, and its wavelets as a table."""
     names = ["x"] if model.dimension == 1 else [f"x{k + 1}" for k in range(model.dimension)]
     linear = " ".join(f"{c:+.6g} {name}" for c, name in zip(model.linear, names, strict=True))
     network = "sum_i w_i psi(alpha_i (x - beta_i)) " if model.n_wavelets else ""

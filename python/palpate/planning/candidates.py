@@ -105,12 +105,12 @@ class Task:
         return self.play_radius or default_play_radius(self.model, self.device.encoder_step)
 
     def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
-        """A scheme for the model, or for a network in its place, with its certificate."""
+        """Returns a scheme for the model, or for a network in its place, with its certificate."""
         rendered = rendered or self.model
         return Candidate(rendered, certify(rendered, scheme, self.device))
 
     def direct_scheme(self, rendered: ForceModel) -> Scheme:
-        """The direct structure; it has the narrowest play that is certified for a network."""
+        """Returns the direct structure; it has the narrowest play that is certified for a network."""
         radius = self.play_radius or 0.0
         if self.chooses_play:
             radius = min(play_radius_for(rendered, self.device), self.longest_play)
@@ -144,7 +144,7 @@ _NOT_LIMITED = Refusal("the model is to be rendered as it was identified")
 
 
 def _direct(task: Task) -> Candidate | Refusal:
-    """The model as it was identified."""
+    """Returns the model as it was identified."""
     if refusal := task.not_direct():
         return refusal
     found = task.certified(task.direct_scheme(task.model))
@@ -157,7 +157,7 @@ def _direct(task: Task) -> Candidate | Refusal:
 
 
 def _direct_limited(task: Task) -> Candidate | Refusal:
-    """The nearest force that the device can render."""
+    """Returns the nearest force that the device can render."""
     if refusal := task.not_direct():
         return refusal
     if not task.may_limit:
@@ -216,7 +216,7 @@ def _massless(task: Task) -> Candidate | Refusal:
 
 
 def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
-    """The model with its mass behind a coupling."""
+    """Returns the model with its mass behind a coupling."""
     if not task.dynamic:
         return Refusal("the object has no mass or damping of its own")
     if not task.mass:
@@ -242,7 +242,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
 
 
 def _explicit(task: Task) -> Candidate | Refusal:
-    """The paper's structure: stable at best."""
+    """Returns the paper's structure: stable at best."""
     if refusal := task.only_direct():
         return refusal
     scheme = explicit_scheme(
@@ -261,7 +261,7 @@ Propose = Callable[[Task], Candidate | Refusal]
 
 
 def _of_position(propose: Propose) -> Propose:
-    """The candidate structure, refused for a force of velocity."""
+    """Returns the candidate structure, refused for a force of velocity."""
 
     def guarded(task: Task) -> Candidate | Refusal:
         if not task.model.of_velocity:
@@ -307,7 +307,7 @@ def _direct_with(play_radius: float, predict: int) -> Scheme:
 
 
 def _predicted(found: Candidate, task: Task) -> Candidate:
-    """The same with the fewest samples of prediction that are certified; without where none are.
+    """Returns the same with the fewest samples of prediction that are certified; without where none are.
 
     A prediction spends damping, and with it the time that a tick may be late: it must leave `_LATE_TICK`, or
     the time without it. Where nothing is certified without a prediction, any that is certified is taken.
@@ -331,7 +331,7 @@ def _no_slope(device: DeviceProfile) -> Refusal:
 
 
 def _within(model: ForceModel, low: float, high: float, device: DeviceProfile) -> ForceModel | None:
-    """The model itself where its slopes lie within limits, else the nearest that does; balanced."""
+    """Returns the model itself where its slopes lie within limits, else the nearest that does; balanced."""
     limited = model if _fits(model, low, high) else limit_slopes(model, low, high)
     return None if limited is None else _balanced(limited, device)
 
@@ -342,7 +342,7 @@ def _fits(model: ForceModel, low: float, high: float) -> bool:
 
 
 def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
-    """The model, shifted if it repeats: limited by the device, its mean force must be 0."""
+    """Returns the model, shifted if it repeats: limited by the device, its mean force must be 0."""
     shift = balancing_shift(model, device.force_limit)
     return with_network(model, bias=model.bias + shift) if shift else model
 

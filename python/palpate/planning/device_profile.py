@@ -25,7 +25,7 @@ EXAMPLES = Path(__file__).parent / "profiles"
 
 
 def example_profiles() -> dict[str, tuple[Path, tuple[str, ...]]]:
-    """The example profiles: name -> file, and the paragraphs that say where its numbers are from."""
+    """Returns the example profiles: name -> file, and the paragraphs that say where its numbers are from."""
     examples = {}
     for file in sorted(EXAMPLES.glob("*.toml")):
         comment = []
@@ -61,7 +61,7 @@ class DeviceProfile(_core.device.DeviceProfile):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> DeviceProfile:
-        """Read a profile from a TOML file: every field that is not optional, and no others.
+        """Reads a profile from a TOML file: every field that is not optional, and no others.
 
         Raises
         ------
@@ -90,7 +90,7 @@ class DeviceProfile(_core.device.DeviceProfile):
             raise InputError(f"{file}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, notes: Sequence[str] = ()) -> Path:
-        """Write the profile as a TOML file; it appears under its name only when it is complete.
+        """Writes the profile as a TOML file; it appears under its name only when it is complete.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class DeviceProfile(_core.device.DeviceProfile):
 
 
 def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) -> _core.device.DeviceProfile:
-    """A device by object, by the name of an example profile, or by the path of its TOML file.
+    """Returns a device by object, by the name of an example profile, or by the path of its TOML file.
 
     Raises
     ------

@@ -73,7 +73,7 @@ def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBou
 
 
 def sliding_slopes(model: ForceModel) -> tuple[float, float]:
-    """The smallest and largest slope of these bounds."""
+    """Returns the smallest and largest slope of these bounds."""
     bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
@@ -104,7 +104,7 @@ def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
 
 
 def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | None:
-    """The model with every slope proved to lie within limits; None where no such network was found.
+    """Returns the model with every slope proved to lie within limits; None where no such network was found.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | Non
 
 
 def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
-    """The model with h multiplied by a share: the two strokes differ by less."""
+    """Returns the model with h multiplied by a share: the two strokes differ by less."""
     names = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
     return with_network(model, **{name: share * getattr(model, name) for name in names})
 
@@ -133,7 +133,7 @@ def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
 def _limited_once(
     model: ForceModel, low: float, high: float, sigma: float, restoring: bool
 ) -> ForceModel | None:
-    """The model with the change fitted; None if its continuations are steeper than the limit."""
+    """Returns the model with the change fitted; None if its continuations are steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
     changes = _changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
@@ -201,7 +201,7 @@ def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high:
 
 
 def _extended(force: Float1D, margin: int) -> Float1D:
-    """A force and its straight continuations."""
+    """Returns a force and its straight continuations."""
     steps = np.arange(1, margin + 1)
     before = force[0] - steps[::-1] * (force[1] - force[0])
     after = force[-1] + steps * (force[-1] - force[-2])

@@ -113,7 +113,7 @@ class Plan:
 
     @classmethod
     def of(cls, model: Model) -> Plan:
-        """The plan in a model file, with its certificate.
+        """Returns the plan in a model file, with its certificate.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class Plan:
         )
 
     def stored(self) -> Model:
-        """The identified model with this plan and its certificate in it, ready to be saved.
+        """Returns the identified model with this plan and its certificate in it, ready to be saved.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class Plan:
         return Model.from_dict(content)
 
     def record(self) -> dict[str, Any]:
-        """The plan as it stands in a model file."""
+        """Returns the plan as it stands in a model file."""
         scheme = self.scheme
         return {
             "structure": scheme.structure,
@@ -190,7 +190,7 @@ class Plan:
         return felt, felt if self.scheme.compensated else steepest
 
     def rows(self) -> dict[str, str]:
-        """The numbers of a certified plan for a person, each under its name."""
+        """Returns the numbers of a certified plan for a person, each under its name."""
         assert self.certificate is not None
         scheme, error = self.scheme, self.force_error
         rows = {"structure": self.description}
@@ -219,7 +219,7 @@ class Plan:
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
-        """The same plan with its certificate on a device, which may be a refusal."""
+        """Returns the same plan with its certificate on a device, which may be a refusal."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
@@ -278,7 +278,7 @@ class Plan:
 
 
 def describe(scheme: Scheme) -> str:
-    """A scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
+    """Returns a scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
     mass = [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"] if scheme.has_mass else []
     return ", ".join([*_words(scheme), *mass])
 
@@ -345,12 +345,12 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
 
 
 def with_network(model: ForceModel, **changes: Any) -> ForceModel:
-    """A force model with other arguments; what is not given stays."""
+    """Returns a force model with other arguments; what is not given stays."""
     return ForceModel(**{name: getattr(model, name) for name in (*NETWORK, *_DOMAIN)} | changes)
 
 
 def network_of(model: ForceModel) -> dict[str, Any]:
-    """The network of a model as it stands in a model file."""
+    """Returns the network of a model as it stands in a model file."""
     return {name: np.asarray(getattr(model, name)).tolist() for name in NETWORK}
 
 

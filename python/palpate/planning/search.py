@@ -186,7 +186,7 @@ class _Property:
 
 
 def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
-    """The device property that a model needs, for instance "needs b >= 6.07 N*s/m (has 0.005)".
+    """Returns the device property that a model needs, for instance "needs b >= 6.07 N*s/m (has 0.005)".
 
     Empty where no property helps.
 
@@ -233,7 +233,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 
 
 def _candidates(task: Task) -> tuple[str, ...]:
-    """The candidate structures that render the identified model as the caller requires."""
+    """Returns the candidate structures that render the identified model as the caller requires."""
     if task.dynamic:
         return tuple(CANDIDATES)  # those without mass do not apply
     if task.coupling:
@@ -279,7 +279,9 @@ def _properties(
 
 
 def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits) -> DeviceProfile | None:
-    """The device with the least improvement of these properties that fits; None where no improvement does."""
+    """Returns the device with the least improvement of these properties that fits; None where no improvement
+    does.
+    """
 
     def after(doublings: Sequence[float]) -> DeviceProfile:
         changed = device

@@ -46,7 +46,7 @@ _NAMES = {int(value): name for name, value in Status.__members__.items()}
 
 
 def rig_for(model: Model) -> TestRig:
-    """Return the test rig for a model: default knob and hand, scaled to the model unless it is an angle."""
+    """Returns the test rig for a model: default knob and hand, scaled to the model unless it is an angle."""
     return _core.simulation.rig_for(model, is_angle=model.units["position"] == "rad")
 
 
@@ -237,7 +237,8 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
 
 
 def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Float1D:
-    """The identified force along a motion, without structure or coupling, play state and velocity included.
+    """Returns the identified force along a motion, without structure or coupling, play state and velocity
+    included.
 
     Parameters
     ----------

@@ -41,12 +41,12 @@ class Scale:
     unit: str
 
     def label(self, name: str) -> str:
-        """The label of an axis: name and unit."""
+        """Returns the label of an axis: name and unit."""
         return label(name, self.unit)
 
 
 def scale_for(unit: str, *values: npt.ArrayLike) -> Scale:
-    """Choose the SI prefix with which the largest of the values is at least 0.1 and less than 1000.
+    """Chooses the SI prefix with which the largest of the values is at least 0.1 and less than 1000.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def _least(size: float) -> float:
 
 
 def legend_above(axes: Axes) -> None:
-    """A legend above the axes, where it hides nothing that is drawn."""
+    """Returns a legend above the axes, where it hides nothing that is drawn."""
     axes.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, borderaxespad=0.2)
 
 
@@ -96,7 +96,8 @@ def thinned(*arrays: Float1D, most: int = MOST_POINTS) -> list[Float1D]:
 
 
 def strokes(direction: NDArray[np.int8] | None, n: int) -> list[tuple[str, NDArray[np.bool_]]]:
-    """The strokes that are told apart: press and release where a recording has both, else all rows at once.
+    """Returns the strokes that are told apart: press and release where a recording has both, else all rows at
+    once.
 
     Pauses belong to no stroke and are left out beside strokes.
     """

@@ -93,7 +93,7 @@ def draw_measured_and_modelled(
 
 
 def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
-    """The edges of a band about zero: lines stay visible in front of dots, in black and white too."""
+    """Returns the edges of a band about zero: lines stay visible in front of dots, in black and white too."""
     order = np.argsort(position, kind="stable")
     at, width = thinned(position[order], half[order])
     for edge in (width, -width):

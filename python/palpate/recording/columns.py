@@ -114,7 +114,7 @@ def choose_columns(
     text: Collection[str] = (),
     steady: Collection[str] = (),
 ) -> Choice:
-    """Choose the columns of a recording by their names alone.
+    """Chooses the columns of a recording by their names alone.
 
     For position and force, in this order: (1) a named column wins; (2) where one stem stands in several
     units, the SI unit wins over a converted one, and both win over counts; (3) exactly one candidate is
@@ -163,7 +163,7 @@ def choose_columns(
 def _attempt(
     names: Sequence[str], wish: _Wish, unstated: Collection[str]
 ) -> tuple[Choice | None, dict[str, str]]:
-    """The choice, or the problems by the role or option that they concern."""
+    """Returns the choice, or the problems by the role or option that they concern."""
     problems: dict[str, str] = {}
     options = [(f"--{role}", name) for role, name in (*wish.roles.items(), ("direction", wish.direction))]
     for option, name in (*options, *(("inputs", name) for name in wish.inputs)):
@@ -193,7 +193,7 @@ def _attempt(
 
 
 def _with_units(names: Sequence[str], wish: _Wish, problems: dict[str, str]) -> list[Column]:
-    """Give every column the unit of its name, or the one the caller states."""
+    """Gives every column the unit of its name, or the one the caller states."""
     stated: dict[str, Unit] = {}
     for key, symbol in wish.units.items():
         column = key if key in names else wish.roles.get(key)
@@ -298,7 +298,7 @@ def _cure(
     steady: Collection[str],
     problems: Mapping[str, str],
 ) -> str:
-    """The options to add, which are tried before they are named."""
+    """Returns the options to add, which are tried before they are named."""
     none = "; a recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(wish.roles), dict(wish.units), wish.direction
     inputs = tuple(name for name in wish.inputs if name in names)
@@ -349,7 +349,7 @@ def _cure(
 
 
 def _silent_time(names: Sequence[str], wish: _Wish, text: Collection[str]) -> str | None:
-    """A column that is called time, but states no unit and is not used."""
+    """Returns a column that is called time, but states no unit and is not used."""
     taken = {*wish.roles.values(), *wish.inputs, *text}
     times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in taken)
     return next(times, None)
@@ -360,7 +360,7 @@ def _time_options(name: str) -> list[str]:
 
 
 def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:
-    """The column that a cure names: one with a unit of the role, else the likeliest without a unit."""
+    """Returns the column that a cure names: one with a unit of the role, else the likeliest without a unit."""
     fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
     if fitting:
         return _best(fitting, [])[0][0]

@@ -38,7 +38,7 @@ TAIL = 0.5
 
 
 def amount(value: float, unit: str) -> str:
-    """A value with its unit, for sentences; without one where the unit is not stated."""
+    """Returns a value with its unit, for sentences; without one where the unit is not stated."""
     return f"{value:.4g} {unit}".rstrip()
 
 
@@ -57,7 +57,7 @@ class Travel:
 
     @staticmethod
     def of(position: Float1D) -> Travel:
-        """The range of all rows that lie within half a travel of the inner 99 % of the rows."""
+        """Returns the range of all rows that lie within half a travel of the inner 99 % of the rows."""
         low, high = np.percentile(position, (TAIL, 100.0 - TAIL))
         margin = 0.5 * (high - low)
         inside = (position >= low - margin) & (position <= high + margin)
@@ -86,7 +86,7 @@ class CellRows:
 
 
 def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
-    """The rows by cell; None where too few rows move."""
+    """Returns the rows by cell; None where too few rows move."""
     side = sides(recording, travel)
     row = np.flatnonzero(travel.inside & (side != 0))
     row = row[:: max(1, -(-len(row) // MOST_ROWS))]
@@ -279,7 +279,9 @@ class _Strokes:
 
     @staticmethod
     def of(recording: Recording, side: Float1D | None) -> _Strokes:
-        """The curves of a recording with the direction (n,) of its rows; None takes it from the recording."""
+        """Returns the curves of a recording with the direction (n,) of its rows; None takes it from the
+        recording.
+        """
         travel = Travel.of(recording.position)
         words = sides(recording, travel) if side is None else side
         into, out = words > 0, words < 0
@@ -367,7 +369,7 @@ def _pair(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
 
 
 def _apart(one: _Strokes, other: _Strokes) -> float:
-    """The difference of two recordings; 0 where they differ as press and release of one object do."""
+    """Returns the difference of two recordings; 0 where they differ as press and release of one object do."""
     difference = _curve_difference(*_pair(one, other))
     if one.way * other.way < 0 and np.isfinite(difference):
         press, release = (one, other) if one.way > 0 else (other, one)
@@ -393,7 +395,7 @@ def _curve_difference(one: Curve, other: Curve) -> float:
 
 
 def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
-    """The role and the ratio of two units that explain the difference best; None where none does."""
+    """Returns the role and the ratio of two units that explain the difference best; None where none does."""
     x, f = other
     tried = []
     for ratio, units in UNIT_RATIOS.items():

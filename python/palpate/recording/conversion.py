@@ -111,7 +111,7 @@ class Conversion:
         negate: Sequence[str] = (),
         drop: bool,
     ) -> Conversion:
-        """Choose the columns of a table; the arguments are those of `read_recording`."""
+        """Chooses the columns of a table; the arguments are those of `read_recording`."""
         metadata = dict(table.metadata)
         layout = Layout.taken_from(name, metadata)
         choice = choose_columns(
@@ -175,7 +175,7 @@ class Conversion:
     def checked(
         self, table: Places, cells: Mapping[str, Cells], first: int = 0
     ) -> tuple[RowCheck, Int8Vector | None]:
-        """Check the rows of a table from `first` on; returns the check and the direction of every row.
+        """Checks the rows of a table from `first` on; returns the check and the direction of every row.
 
         Raises
         ------
@@ -201,7 +201,7 @@ class Conversion:
         return values if factor == 1.0 else values * factor
 
     def note(self, torque_constant: float | None = None, dialect: Sequence[str] = ()) -> str:
-        """The column of each role, and how the table was read, in one sentence."""
+        """Returns the column of each role, and how the table was read, in one sentence."""
         choice = self.choice
         parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
         if torque_constant is not None:
@@ -226,7 +226,7 @@ def converted(
     torque_constant: float | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Read a table as a whole; returns the fields of a `Recording`.
+    """Reads a table as a whole; returns the fields of a `Recording`.
 
     Parameters
     ----------
@@ -319,7 +319,9 @@ def digest_of(*arrays: NDArray[Any] | None) -> str:
 
 
 def mirrored(correlation: float, against: bool = False) -> list[str]:
-    """The note on a force that falls with position, or on a position that moves against its direction."""
+    """Returns the note on a force that falls with position, or on a position that moves against its
+    direction.
+    """
     signs = []
     if correlation < FALLING:
         signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
@@ -334,7 +336,7 @@ def mirrored(correlation: float, against: bool = False) -> list[str]:
 
 
 def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
-    """Report once what looks mirrored; no sign is turned without an option."""
+    """Reports once what looks mirrored; no sign is turned without an option."""
     x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
     against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0
@@ -342,13 +344,13 @@ def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
 
 
 def _scaled(values: Float1D) -> Float1D:
-    """The values divided by a power of two, so that no square overflows and no digit changes."""
+    """Returns the values divided by a power of two, so that no square overflows and no digit changes."""
     _, exponent = np.frexp(np.abs(values).max(initial=0.0))
     return np.asarray(np.ldexp(values, -exponent))
 
 
 def _motion(how: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
-    """The motion of all rows of a file, of which these are used; None if it has no continuous time."""
+    """Returns the motion of all rows of a file, of which these are used; None if it has no continuous time."""
     if how.choice.time is None:
         return None
     position, time = how.si(how.choice.position, cells), how.si(how.choice.time, cells)
@@ -370,7 +372,7 @@ def _row_range(name: str, rows: Range | None, total: int) -> tuple[int, int]:
 
 
 def _si_name(column: Column) -> str:
-    """The name of an input after conversion, so that the name still states the unit."""
+    """Returns the name of an input after conversion, so that the name still states the unit."""
     return column.name if column.unit is None else f"{column.stem}_{COLUMN_SUFFIX[column.unit.si]}"
 
 

@@ -135,7 +135,7 @@ class CsvFile(LongTable):
 
     @contextmanager
     def _lines(self) -> Iterator[io.TextIOWrapper]:
-        """The lines of data."""
+        """Yields the lines of data."""
         stream = self._bytes(self._dialect.start)
         with io.TextIOWrapper(stream, encoding=self._dialect.encoding, newline="") as lines:
             try:
@@ -329,7 +329,7 @@ class CsvFile(LongTable):
             raise InputError(f"{self._path} is not CSV: {str(error).strip()}") from None
 
     def _require_no_more(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
-        """Refuse a row with more cells than the header has names."""
+        """Refuses a row with more cells than the header has names."""
         if any(str(word).strip() for word in cells.cat.categories):
             more = cells.notna() & (cells.astype(str).str.strip() != "")
             row = before + int(np.flatnonzero(more)[0])
@@ -337,7 +337,7 @@ class CsvFile(LongTable):
             raise self._too_many_cells(line, len(found))
 
     def _line(self, line: int, part: tuple[int, int] | None) -> int:
-        """The line of the file that is this line of the data or of a part."""
+        """Returns the line of the file that is this line of the data or of a part."""
         if part is not None:
             with self._bytes(self._dialect.start, part[0]) as stream:
                 line += sum(1 for _ in stream)
@@ -371,7 +371,7 @@ class RowCount:
 
 
 def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int = _BLOCK) -> RowCount:
-    """Count the rows of a stream that begins with a row, and find ends of rows.
+    """Counts the rows of a stream that begins with a row, and finds ends of rows.
 
     A line break within a quoted cell ends no row. A line of white space is no row.
 

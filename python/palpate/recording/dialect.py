@@ -73,7 +73,7 @@ class Dialect:
 
 
 def recognise(file: str, head: bytes, whole: bool) -> Dialect:
-    """Recognise the dialect of a text file.
+    """Recognises the dialect of a text file.
 
     Parameters
     ----------
@@ -137,12 +137,12 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
 
 
 def not_csv(file: str, error: csv.Error) -> InputError:
-    """The refusal of text that cannot be split into cells."""
+    """Returns the refusal of text that cannot be split into cells."""
     return InputError(f"{file} is not CSV: {error}; a quotation mark may not be closed")
 
 
 def not_text(file: str) -> InputError:
-    """The refusal of a file that is neither text nor of another known format."""
+    """Returns the refusal of a file that is neither text nor of another known format."""
     return InputError(f"{file} is not text; a recording is {RECORDING_FORMATS}")
 
 
@@ -189,7 +189,7 @@ class _Found:
 
 
 def _header(file: str, lines: list[str]) -> _Found:
-    """The header with the separator that gives most columns of numbers."""
+    """Returns the header with the separator that gives most columns of numbers."""
     every = ((k, line) for k, line in enumerate(lines) if line.strip() and not _is_comment(line))
     plain = list(islice(every, HEAD_LINES))
     if not plain:
@@ -266,7 +266,7 @@ class Header:
 
 
 def find_header(rows: Sequence[Row]) -> Header | None:
-    """Find the header above the first run of rows with two or more numbers, or None without such rows.
+    """Finds the header above the first run of rows with two or more numbers, or None without such rows.
 
     The header is the row above the run that has the same number of cells, none of them a number; of several
     such rows it is the one with the most units in its names, then the lowest one.
@@ -297,12 +297,13 @@ def find_header(rows: Sequence[Row]) -> Header | None:
 
 
 def first_row_as_header(rows: Sequence[Row]) -> Header:
-    """Take the first row as the header, where no row of numbers tells."""
+    """Takes the first row as the header, where no row of numbers tells."""
     return Header(0, tuple(visible(name.strip()) for name in rows[0]), 1)
 
 
 def named(where: str, header: Header) -> tuple[Header, list[str]]:
-    """Check the names of a header. An unnamed first column gets a name; returns notes on what was recognised.
+    """Checks the names of a header. An unnamed first column gets a name; returns notes on what was
+    recognised.
 
     Raises
     ------
@@ -335,7 +336,7 @@ def named(where: str, header: Header) -> tuple[Header, list[str]]:
 
 
 def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
-    """The decimal mark of rows of data, "." or ",".
+    """Returns the decimal mark of rows of data, "." or ",".
 
     Raises
     ------
@@ -354,7 +355,7 @@ def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
 
 
 def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: str) -> None:
-    """Refuse cells that are numbers with other marks than the first rows have.
+    """Refuses cells that are numbers with other marks than the first rows have.
 
     Raises
     ------
@@ -382,7 +383,7 @@ def _either(told: str, separator: str) -> InputError:
 
 
 def _remove(mark: str, separator: str, by: str) -> str:
-    """A command that replaces a mark between digits; in a comma-separated file only within quotes."""
+    """Returns a command that replaces a mark between digits; in a comma-separated file only within quotes."""
     escaped = {".": "[.]", "'": "\\x27"}.get(mark, mark)
     digits = "[0-9]" if by else "[0-9]{3}"
     if mark == separator:

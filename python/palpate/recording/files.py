@@ -29,7 +29,7 @@ _BLOCK = 1 << 20
 
 
 def sha256_of_file(path: Path) -> str:
-    """The SHA-256 of a file's bytes, in hexadecimal digits."""
+    """Returns the SHA-256 of a file's bytes, in hexadecimal digits."""
     digest = hashlib.sha256()
     with path.open("rb") as stream:
         while block := stream.read(_BLOCK):
@@ -38,7 +38,7 @@ def sha256_of_file(path: Path) -> str:
 
 
 def require_file(path: Path) -> None:
-    """Refuse, in one sentence, what is not a readable, non-empty file."""
+    """Refuses, in one sentence, what is not a readable, non-empty file."""
     if not path.exists():
         raise InputError(f"there is no file {path}")
     if path.is_dir():
@@ -57,7 +57,7 @@ def require_file(path: Path) -> None:
 
 @contextmanager
 def readable(path: Path, kind: str) -> Iterator[None]:
-    """Turn every failure of a library that reads a file into one sentence with the name of the file.
+    """Turns every failure of a library that reads a file into one sentence with the name of the file.
 
     On broken files these libraries raise exceptions of many kinds.
 
@@ -77,7 +77,7 @@ def readable(path: Path, kind: str) -> Iterator[None]:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator[Path]:
-    """Give a temporary path beside `path`; it is renamed to `path` at the end, or removed if anything fails.
+    """Gives a temporary path beside `path`; it is renamed to `path` at the end, or removed if anything fails.
 
     The temporary name is unpredictable. An existing file keeps its mode and its owner, a symbolic link stays
     and its target is replaced. The content is on the disk before the file has its name.
@@ -124,13 +124,13 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
 
 
 def require_absent(path: Path) -> None:
-    """Refuse a recording that exists; a broken symbolic link counts as one."""
+    """Refuses a recording that exists; a broken symbolic link counts as one."""
     if os.path.lexists(path):
         raise InputError(f"{path} exists already; choose another name, or replace it with --force")
 
 
 def _create(temporary: Path, before: os.stat_result | None) -> None:
-    """Create a file that is not there, with owner and mode of the file that it will replace."""
+    """Creates a file that is not there, with owner and mode of the file that it will replace."""
     mode = 0o666 if before is None else stat.S_IMODE(before.st_mode)
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     try:
@@ -143,7 +143,7 @@ def _create(temporary: Path, before: os.stat_result | None) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Wait until a file or a folder is on the disk, where its file system can tell."""
+    """Waits until a file or a folder is on the disk, where its file system can tell."""
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)
@@ -155,7 +155,7 @@ def _sync(path: Path) -> None:
 
 
 def _rename_to_free_name(temporary: Path, target: Path) -> None:
-    """Give a file its name, unless that is taken meanwhile."""
+    """Gives a file its name, unless that is taken meanwhile."""
     try:
         os.link(temporary, target)
     except FileExistsError:
@@ -179,7 +179,7 @@ class Layout:
 
     @staticmethod
     def taken_from(file: str, metadata: dict[str, str]) -> Layout:
-        """Take the layout out of a file's metadata."""
+        """Takes the layout out of a file's metadata."""
         text = metadata.pop(_KEY, None)
         if text is None:
             return Layout()
@@ -204,7 +204,7 @@ def free_name(stem: str, suffix: str, taken: Collection[str]) -> str:
 def write_csv(
     path: Path, layout: Layout, columns: Mapping[str, Cells], metadata: Mapping[str, str], *, replace: bool
 ) -> None:
-    """Write columns and metadata; without `replace`, an existing file is refused.
+    """Writes columns and metadata; without `replace`, an existing file is refused.
 
     Raises
     ------

@@ -51,7 +51,7 @@ _COMPLEX = 1 << 11
 
 
 def open_table(path: Path) -> Table:
-    """Open a file of columns; the end of its name tells its kind.
+    """Opens a file of columns; the end of its name tells its kind.
 
     Raises
     ------
@@ -225,7 +225,7 @@ class ParquetFile(LongTable):
 def _arrow_cells(
     table: Any, names: Sequence[str], numbers: Collection[str], text: Collection[str]
 ) -> dict[str, Cells]:
-    """The columns of a table or batch of Arrow."""
+    """Returns the columns of a table or batch of Arrow."""
     columns: dict[str, Cells] = {}
     for index, name in enumerate(names):
         values = table.column(index).to_pandas().to_numpy()
@@ -246,7 +246,7 @@ def _as_objects(values: Cells) -> Cells:
 
 
 def _excel(path: Path) -> Table:
-    """The first sheet of a workbook that holds cells."""
+    """Returns the first sheet of a workbook that holds cells."""
     openpyxl = _needed("openpyxl", path, "an Excel file", "excel")
     with readable(path, "Excel (.xlsx)"):
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
@@ -325,7 +325,7 @@ def _matlab(path: Path) -> Table:
 
 
 def _refuse_damaged(content: bytes) -> None:
-    """Refuse a MATLAB file of version 5 whose elements do not fit into each other; others pass.
+    """Refuses a MATLAB file of version 5 whose elements do not fit into each other; others pass.
 
     `scipy.io.loadmat` crashes on some of them.
 
@@ -340,7 +340,7 @@ def _refuse_damaged(content: bytes) -> None:
 
 
 def _elements(content: bytes, at: int, end: int, order: str) -> list[tuple[int, int]]:
-    """Check the elements from one byte to another; returns the type and first byte of the data of each."""
+    """Checks the elements from one byte to another; returns the type and first byte of the data of each."""
     found = []
     while at < end:
         start = at
@@ -371,7 +371,7 @@ def _damaged(at: int) -> ValueError:
 
 
 def _of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
-    """The vectors of the most frequent length as columns; single values are metadata."""
+    """Returns the vectors of the most frequent length as columns; single values are metadata."""
     arrays = {visible(str(name)): np.squeeze(np.asarray(value)) for name, value in found.items()}
     vectors = {name: each for name, each in arrays.items() if each.ndim == 1 and each.dtype.kind in "iufbUO"}
     lengths = Counter(len(array) for array in vectors.values())

@@ -129,7 +129,7 @@ def _resolution(x: Float1D) -> float:
 
 
 def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
-    """The row at which each stroke ends, and its direction; a stroke ends where x moves back by more."""
+    """Returns the row at which each stroke ends, and its direction; a stroke ends where x moves back by more."""
     # On a grid, few of the rows are local extremes, whatever the noise.
     grid = np.rint(x * (GRID / back))
     steps = np.diff(grid)
@@ -240,7 +240,9 @@ class LowPass:
         return math.ceil(2.0 * MARGIN / (self.cutoff * period))
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
-        """The signal (k,) without what lies above the cutoff, and without delay; its ends are mirrored."""
+        """Returns the signal (k,) without what lies above the cutoff, and without delay; its ends are
+        mirrored.
+        """
         pole = math.exp(-self.cutoff * period)
         response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
         mirrored = min(len(signal) - 1, self.margin(period))
@@ -252,7 +254,7 @@ class LowPass:
 
 
 def pieces(recording: Recording) -> list[Piece]:
-    """The recording between its gaps, each piece on an even grid of the motion's median step of time.
+    """Returns the recording between its gaps, each piece on an even grid of the motion's median step of time.
 
     The positions are those of the whole motion; the forces are those of the recording's own rows.
 
@@ -301,7 +303,8 @@ def acceleration_of(position: Float1D, period: float) -> Float1D:
 
 
 def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
-    """The highest L whose derivative of that order holds at most NOISE_SHARE of noise; None: there is none.
+    """Returns the highest L whose derivative of that order holds at most NOISE_SHARE of noise; None: there is
+    none.
 
     The position's noise is what sixth differences leave of it, as white noise would; a hand's motion leaves
     next to nothing there. Noise of the derivative is that through the impulse response of both filters.
@@ -340,7 +343,9 @@ def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
 def at_rows(
     parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
 ) -> tuple[Float1D, NDArray[np.bool_]]:
-    """A derivative behind L at the n rows that the pieces are of (n,), and the rows that have one (n,)."""
+    """Returns a derivative behind L at the n rows that the pieces are of (n,), and the rows that have one
+    (n,).
+    """
     result, known = np.zeros(n), np.zeros(n, dtype=np.bool_)
     for part in long_enough(parts, low_pass):
         margin = low_pass.margin(part.period)

@@ -45,7 +45,7 @@ def read_recording(
     force_late_s: float = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
-    """Read a recording from a file.
+    """Reads a recording from a file.
 
     The name of a column states its unit (``displacement_mm``, ``Force [gf]``, ``Force (mN)``, ``Force / N``),
     or a second header line does. The unit is looked up in a closed table, and values are converted to SI.
@@ -130,7 +130,7 @@ def recording_from(
     inputs: Sequence[str] = (),
     name: str = "recording",
 ) -> Recording:
-    """The recording that is given, read or made of arrays.
+    """Returns the recording that is given, read or made of arrays.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def recordings_from(
     *,
     inputs: Sequence[str] = (),
 ) -> list[Recording]:
-    """The recordings that are given: one, as in :func:`recording_from`, or a list.
+    """Returns the recordings that are given: one, as in :func:`recording_from`, or a list.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def open_long_recording(
     invalid: Literal["refuse", "drop"] = "refuse",
     part_rows: int = PART_ROWS,
 ) -> LongRecording:
-    """Choose the columns of a file without reading its rows; the arguments are those of `read_recording`.
+    """Chooses the columns of a file without reading its rows; the arguments are those of `read_recording`.
 
     Raises
     ------

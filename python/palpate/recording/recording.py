@@ -84,7 +84,7 @@ class Recording:
         units: Mapping[str, str] | None = None,
         metadata: Mapping[str, str] | None = None,
     ) -> Recording:
-        """Make a recording from arrays in SI units.
+        """Makes a recording from arrays in SI units.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Recording:
         units: Mapping[str, str] | None = None,
         invalid: Literal["refuse", "drop"] = "refuse",
     ) -> Recording:
-        """Make a recording from a pandas DataFrame whose column names end in a unit, as from a file.
+        """Makes a recording from a pandas DataFrame whose column names end in a unit, as from a file.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Recording:
         return float(np.median(np.diff(self.time)))
 
     def split(self, every: int = 5) -> tuple[Recording, Recording]:
-        """Hold out every `every`-th row: (train, test), test being the rows i with i mod every = every - 1.
+        """Holds out every `every`-th row: (train, test), test being the rows i with i mod every = every - 1.
 
         Both parts keep the motion of all rows, from which velocity and play are formed.
 
@@ -268,11 +268,11 @@ class Recording:
         )
 
     def without(self, rows: npt.NDArray[np.bool_]) -> Recording:
-        """The recording without the rows (n,) that are marked."""
+        """Returns the recording without the rows (n,) that are marked."""
         return self._rows(~rows)
 
     def with_force_earlier(self, late_s: float) -> Recording:
-        """The same motion where the force was recorded late_s [s] after the position it belongs to.
+        """Returns the same motion where the force was recorded late_s [s] after the position it belongs to.
 
         Where a stroke turns on a steep force, a late one lies higher on the way back than on the way in,
         which no passive object does. Positions and further inputs become those of late_s before; the first
@@ -306,7 +306,7 @@ class Recording:
         return moved._rows(rows)
 
     def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
-        """Write the recording as CSV that :func:`palpate.read_recording` reads back exactly, with no option.
+        """Writes the recording as CSV that :func:`palpate.read_recording` reads back exactly, with no option.
 
         The file appears under its name only when it is complete. Numbers are written so that they are read
         back to the last bit; positions and forces are written in SI units.
@@ -341,7 +341,7 @@ class Recording:
 
 
 def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:
-    """A copy of an optional mapping."""
+    """Returns a copy of an optional mapping."""
     given: object = {} if value is None else value
     if not isinstance(given, Mapping):
         raise InputError(f"{name} is {shown(given)}; it must be a dictionary")

@@ -38,12 +38,12 @@ class LeftOut:
         return self.status.total() + sum(count for count, _ in self.dropped.values())
 
     def drop(self, reason: str, count: int, first: int) -> None:
-        """Count dropped rows."""
+        """Counts dropped rows."""
         known, before = self.dropped.get(reason, (0, first))
         self.dropped[reason] = known + count, min(before, first)
 
     def add(self, other: LeftOut, rows_before: int) -> None:
-        """Count the rows left out of a part that begins after so many rows."""
+        """Counts the rows left out of a part that begins after so many rows."""
         self.status += other.status
         for reason, (count, first) in other.dropped.items():
             self.drop(reason, count, rows_before + first)
@@ -87,7 +87,7 @@ class RowCheck:
         return self.left_out.sentences(self._table)
 
     def as_modelled(self, words: Cells) -> None:
-        """Leave out the rows whose status says that the force was not the model's alone: not yet all of it
+        """Leaves out the rows whose status says that the force was not the model's alone: not yet all of it
         after the start, clipped, zero because of a fault. They are no property of the object.
         """
         others = ~np.isin(words, (Status.Ok.name,)) & self.kept
@@ -103,7 +103,7 @@ class RowCheck:
         )
 
     def directions(self, name: str, cells: Cells) -> Int8Vector:
-        """The direction that each row states. A word that is not known refuses the file in any case."""
+        """Returns the direction that each row states. A word that is not known refuses the file in any case."""
         codes, words = pd.factorize(cells)
         values = np.zeros(len(words), dtype=np.int8)
         for index, word in enumerate(words):
@@ -161,7 +161,7 @@ def _rows(count: int) -> str:
 
 
 def direction_of(word: str) -> int | None:
-    """The direction that a cell states, or None for a word that is not known.
+    """Returns the direction that a cell states, or None for a word that is not known.
 
     Numbers count by their value, so ``1``, ``+1`` and ``1.0`` are the same direction.
     """

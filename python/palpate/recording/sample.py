@@ -45,7 +45,7 @@ def sample_force(x: npt.ArrayLike) -> Float1D:
 
 
 def sample_recording(seed: int, duration_s: float = 60.0) -> Recording:
-    """Simulate a recording of the sample's object: a hand that sweeps it at 0.2 to 2 Hz, sampled at 1 kHz.
+    """Simulates a recording of the sample's object: a hand that sweeps it at 0.2 to 2 Hz, sampled at 1 kHz.
 
     Parameters
     ----------

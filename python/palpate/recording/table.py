@@ -53,7 +53,7 @@ class Table(ABC):
 
     @abstractmethod
     def cell(self, row: int, name: str) -> str:
-        """The text of one cell as it stands in the table."""
+        """Returns the text of one cell as it stands in the table."""
 
 
 class LongTable(Table):
@@ -74,7 +74,9 @@ class LongTable(Table):
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
-        """The first row's number within the part, and the columns named, of each block of so many rows."""
+        """Returns the first row's number within the part, and the columns named, of each block of so many
+        rows.
+        """
 
     @abstractmethod
     def rows_before(self, part: tuple[int, int]) -> int:
@@ -82,7 +84,7 @@ class LongTable(Table):
 
 
 def parse_number(text: str) -> float | None:
-    """The number that a cell holds, or None. NaN and infinity count as numbers here."""
+    """Returns the number that a cell holds, or None. NaN and infinity count as numbers here."""
     try:
         # float() would accept 1_000, which no other reader of the file does.
         return None if "_" in text else float(text)
@@ -91,7 +93,7 @@ def parse_number(text: str) -> float | None:
 
 
 def parse_with(text: str, decimal: str) -> float | None:
-    """The number that a cell holds, written with this decimal mark, or None."""
+    """Returns the number that a cell holds, written with this decimal mark, or None."""
     if decimal == ".":
         return parse_number(text)
     return None if "." in text or text.count(",") > 1 else parse_number(text.replace(",", "."))
@@ -102,7 +104,7 @@ MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL",
 
 
 def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
-    """Turn strings into numbers, with NaN where a cell holds none."""
+    """Turns strings into numbers, with NaN where a cell holds none."""
 
     def number(cell: Any) -> float:
         value = parse_with(cell, decimal) if isinstance(cell, str) else cell
@@ -163,7 +165,7 @@ class FrameTable(Table):
         return f"row {row} (index {self._frame.index[row]!r})"
 
     def cell(self, row: int, name: str) -> str:
-        """A cell as text, cut where it is long."""
+        """Returns a cell as text, cut where it is long."""
         value = self._frame[name].iloc[row]
         return "" if value is None or value is pd.NA else shown(str(value))[1:-1]
 
@@ -177,7 +179,7 @@ def _floats(column: pd.Series[Any]) -> Cells:
 
 
 def _numbers(column: pd.Series[Any]) -> Cells:
-    """The column as float64, with NaN where a cell holds no real number."""
+    """Returns the column as float64, with NaN where a cell holds no real number."""
     if pd.api.types.is_complex_dtype(column.dtype):
         raise InputError(f"{FRAME}: column {column.name} holds complex numbers; give real ones")
     if pd.api.types.is_bool_dtype(column.dtype) or pd.api.types.is_datetime64_any_dtype(column.dtype):
@@ -198,6 +200,6 @@ def _number(cell: object) -> float:
 
 
 def _words(column: pd.Series[Any]) -> Cells:
-    """The cells of a column as text, empty where there is none."""
+    """Returns the cells of a column as text, empty where there is none."""
     missing = column.isna()
     return np.array(["" if gone else str(cell) for cell, gone in zip(column, missing, strict=True)], object)

@@ -66,7 +66,9 @@ _BRACKETS = re.compile(r"(?P<stem>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round
 
 
 def unit_of(symbol: str) -> Unit | None:
-    """The unit that a symbol stands for, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are Nm."""
+    """Returns the unit that a symbol stands for, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are
+    Nm.
+    """
     text = symbol.strip()
     if text == "°":
         return UNITS["deg"]
@@ -75,12 +77,12 @@ def unit_of(symbol: str) -> Unit | None:
 
 
 def symbols_of(si_units: tuple[str, ...]) -> str:
-    """The symbols of the table that belong to these SI units, joined by commas."""
+    """Returns the symbols of the table that belong to these SI units, joined by commas."""
     return ", ".join(symbol for symbol, unit in UNITS.items() if unit.si in si_units)
 
 
 def split_name(column: str) -> tuple[str, Unit | None]:
-    """Split a column name into its stem and its unit: ``displacement_mm`` is (``displacement``, mm).
+    """Splits a column name into its stem and its unit: ``displacement_mm`` is (``displacement``, mm).
 
     The unit stands after the last underscore (``force_N``), in brackets at the end (``Force [gf]``,
     ``Force (mN)``), after the last comma (``force, N``) or after one slash (``Force / N``). Symbols are
@@ -94,7 +96,7 @@ def split_name(column: str) -> tuple[str, Unit | None]:
 
 
 def _stated(column: str) -> list[tuple[str, str]]:
-    """The stem and the text that stands where a unit is written: one pair or none."""
+    """Returns the stem and the text that stands where a unit is written: one pair or none."""
     if brackets := _BRACKETS.fullmatch(column):
         return [(brackets["stem"], brackets["square"] or brackets["round"] or "")]
     if "," in column:

@@ -105,7 +105,7 @@ def force_driven(
     period_s: float = paper_sample_time_s,
     stroke_speed: float | None = None,
 ) -> ClosedLoop:
-    """The recorded force drives the environment alone (paper figure 14).
+    """Returns the recorded force drives the environment alone (paper figure 14).
 
     Force over the resulting position is the paper's figure 15.
 
@@ -220,7 +220,7 @@ class EvenMotion:
 
 
 def even_motion(recording: Recording, period_s: float, stroke_speed: float | None = None) -> EvenMotion:
-    """Sample a recording every `period_s`, with straight lines between its rows.
+    """Samples a recording every `period_s`, with straight lines between its rows.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
 
 
 def require_period(period_s: float) -> None:
-    """Refuse a sample time that is not positive."""
+    """Refuses a sample time that is not positive."""
     if not 0 < period_s < np.inf:
         raise InputError(f"period_s is {period_s}; it must be > 0 and finite")
 

@@ -46,7 +46,7 @@ class Explanation:
 
 
 def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
-    """The simplest change of the recording that at least halves the error, or None.
+    """Returns the simplest change of the recording that at least halves the error, or None.
 
     The changes are: the sign of the force, press and release exchanged, the sign of the position, an offset
     of the force, another unit of force or position, an offset of the position, and a factor of the force.
@@ -74,7 +74,7 @@ def _share(error: Float1D, force: Float1D) -> float:
 
 
 def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanation]:
-    """The sign, an offset and a factor of the force."""
+    """Yields the sign, an offset and a factor of the force."""
     yield Explanation(
         _share(modelled + force, force),
         "the recording fits with the sign of its force turned; give --negate force",
@@ -102,7 +102,7 @@ def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanat
 def _of_position(
     model: Model, position: Float1D, side: Float1D | None, force: Float1D, recording: Recording
 ) -> Iterator[Explanation]:
-    """The direction, and the sign, the unit and an offset of the position."""
+    """Yields the direction, and the sign, the unit and an offset of the position."""
 
     def left(at: Float1D, s: Float1D | None) -> float:
         modelled = model.force(at) if s is None else model.force(at, direction=s)
@@ -148,7 +148,7 @@ def _of_position(
 
 
 def _unit_of(factor: float, unit: str) -> str | None:
-    """The mistaken unit that a factor corrects, in words, or None."""
+    """Returns the mistaken unit that a factor corrects, in words, or None."""
     for symbol, other in UNITS.items():
         if other.si == unit and other.factor != 1.0:
             if abs(factor / other.factor - 1.0) < SAME_FACTOR:

@@ -53,7 +53,7 @@ def durbin_watson(residual: Float1D) -> float:
 
 
 def force_floor(force: Float1D) -> float:
-    """The absolute floor for a recording of this force, in the force's unit."""
+    """Returns the absolute floor for a recording of this force, in the force's unit."""
     return FORCE_FLOOR * float(np.abs(force).max())
 
 
@@ -124,7 +124,7 @@ class Stroke:
 
 
 def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
-    """Compare the forces of two models over the positions that both were identified on.
+    """Compares the forces of two models over the positions that both were identified on.
 
     Just noticeable is 7 % of the first model's local force, or 1 % of its largest force where that is more.
 

@@ -50,7 +50,7 @@ class Prediction:
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
-    """The model's force along a recording.
+    """Returns the model's force along a recording.
 
     A hysteresis model takes the recording's direction as s = +-1 and leaves out rows that have none. Without
     direction, time and play radius, the strokes are those of the order of rows. Without a direction, or with
@@ -176,7 +176,7 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
 
 
 def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:
-    """The play radius, and where it comes from."""
+    """Returns the play radius, and where it comes from."""
     for radius, origin in (
         (play_radius, "as given"),
         (flight.play_radius, "that of the flight record"),
@@ -197,7 +197,7 @@ def _gaps(time: Float1D | None) -> NDArray[np.intp]:
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:
-    """Refuse a recording in other units than the model's; units that are not stated fit all."""
+    """Refuses a recording in other units than the model's; units that are not stated fit all."""
     for role in ("position", "force"):
         ours, theirs = model.units[role], units[role]
         if ours != theirs and _UNSTATED not in (ours, theirs):
@@ -218,7 +218,7 @@ class FlightRecord:
 
 
 def flight_of(recording: Recording) -> FlightRecord:
-    """Read what the metadata and the columns of a flight record state."""
+    """Reads what the metadata and the columns of a flight record state."""
     structure = recording.metadata.get(_STRUCTURE, "")
     found = re.search(r"\br = ([0-9.eE+-]+)", structure)
     radius = float(found.group(1)) if found else None
@@ -234,7 +234,7 @@ def flight_of(recording: Recording) -> FlightRecord:
 
 
 def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
-    """The recording with the strokes that its order of rows gives, and a note; else as it is.
+    """Returns the recording with the strokes that its order of rows gives, and a note; else as it is.
 
     Used where the model differs between press and release, and neither time nor a play radius is known. A
     recording that never turns back may be sorted by position: it is the stroke whose force is nearer.
