@@ -31,7 +31,7 @@ from .verb import PATH, json_option, plot_option, require_writable, verb
 
 
 class Samples(click.ParamType[int | str]):
-    """A number of samples, auto or off; the function that takes it checks the range."""
+    """A number of samples, auto or off. The called function checks the range."""
 
     name = "M|auto|off"
 
@@ -45,7 +45,7 @@ class Samples(click.ParamType[int | str]):
 
 
 class _PlanVerb(Verb):
-    """The verb, or the list of example profiles, which needs neither model nor device."""
+    """Verb or list of example profiles, which needs neither model nor device."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if "--examples" in args:
@@ -125,7 +125,7 @@ def plan(
     """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
-    require_writable(output, plot, inputs=(profile_path,))  # the model's own file may be written anew
+    require_writable(output, plot, inputs=(profile_path,))  # the model file may be replaced
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
