@@ -6,7 +6,7 @@
     print(palpate.verify(model, "fresh.csv").nrmse)
     model.save("press.json")
 
-Names are loaded when they are first used, so that the command line starts fast.
+Names are loaded at their first use, so that the command line starts fast.
 """
 
 from importlib import import_module
@@ -94,7 +94,8 @@ def _has_scikit_learn() -> bool:
 
 
 if not _has_scikit_learn():
-    # `from palpate import *`, help() and inspect.getmembers() leave it out; naming it states what to install.
+    # It is left out of `from palpate import *`, help() and inspect.getmembers(); using the name reports the
+    # missing package.
     __all__.remove("WaveletNetworkRegressor")
 
 
