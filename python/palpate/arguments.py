@@ -110,9 +110,7 @@ def vector_of(name: str, values: object) -> Float1D:
 
 
 def named_arguments(kind: Any) -> None:
-    """Makes the constructor of a compiled class raise an InputError that names an argument of a wrong
-    type.
-    """
+    """Makes the constructor of a compiled class name an argument of a wrong type in an InputError."""
     construct = kind.__init__
     known = re.findall(r"(\w+): ", (construct.__doc__ or "").partition("*, ")[2])
 

@@ -21,9 +21,7 @@ class InputError(ValueError):
 
 
 def visible(text: str) -> str:
-    """Returns the text with control and format characters escaped, so that they have no effect on a
-    terminal.
-    """
+    """Returns the text with control and format characters escaped, for a terminal."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(

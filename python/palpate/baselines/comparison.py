@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison of all baselines on one recording: fitted to the rows of the model, judged on the held-out
-rows.
-"""
+"""Comparison of all baselines on one recording: fitted to the model's rows, judged on held-out rows."""
 
 from __future__ import annotations
 
@@ -115,9 +113,7 @@ def _has_strokes(recording: Recording) -> bool:
 
 
 def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:
-    """Returns position, velocity and acceleration if time gives them, the stroke last; and the usable
-    rows.
-    """
+    """Returns position, velocity and acceleration if known, the stroke last; and the usable rows."""
     columns, rows = [recording.position], np.ones(len(recording), dtype=np.bool_)
     if recording.time is not None:
         try:

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observations of a device: its stream, encoder and signs without force, and comparison with an expected
-profile.
-"""
+"""Observations of a device: stream, encoder and signs without force, and an expected profile."""
 
 from __future__ import annotations
 

@@ -204,9 +204,7 @@ def _mechanics(
 
 
 def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2D, Float2D, Float2D]:
-    """Returns force (p, n), displacement (p, n + 1) and duration (p, n) of each push and an equal time after
-    it.
-    """
+    """Returns force (p, n), displacement (p, n + 1), duration (p, n) of each push and an equal time after."""
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     ends = np.flatnonzero(~pushing[1:] & pushing[:-1])

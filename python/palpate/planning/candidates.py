@@ -179,9 +179,7 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
 
 
 def _massless(task: Task) -> Candidate | Refusal:
-    """Renders the model behind a coupling, minus the coupling's spring and with the slope limits of this
-    structure.
-    """
+    """Renders the model minus the coupling's spring behind the coupling, with limited slopes."""
     if refusal := task.not_static():
         return refusal
     if not task.coupling:

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the plan of a model on a device: the first certified candidate, and the device property that it
-needs.
-"""
+"""Search for the plan of a model: the first certified candidate, and the device property that it needs."""
 
 from __future__ import annotations
 

@@ -360,9 +360,7 @@ def _time_options(name: str) -> list[str]:
 
 
 def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:
-    """Returns the column that a cure names: one with a unit of the role, else the likeliest one without a
-    unit.
-    """
+    """Returns the column that a cure names: one with a unit of the role, else the likeliest one."""
     fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
     if fitting:
         return _best(fitting, [])[0][0]

@@ -282,9 +282,7 @@ class _Strokes:
 
     @staticmethod
     def of(recording: Recording, side: Float1D | None) -> _Strokes:
-        """Returns the curves of a recording with the direction (n,) of its rows; None uses the recording's
-        direction.
-        """
+        """Returns the curves of a recording; `side` (n,) is the direction of its rows, None: as recorded."""
         travel = Travel.of(recording.position)
         words = sides(recording, travel) if side is None else side
         into, out = words > 0, words < 0
@@ -386,9 +384,7 @@ def _apart(one: _Strokes, other: _Strokes) -> float:
 
 
 def _curve_difference(one: Curve, other: Curve) -> float:
-    """Returns the RMS difference over the spread of the first force; infinite if the positions do not
-    overlap.
-    """
+    """Returns the RMS difference over the spread of the first force; infinite without overlap."""
     (x, f), (at, force) = one, other
     shared = (at >= x[0]) & (at <= x[-1])
     reach = min(x[-1], at[-1]) - max(x[0], at[0])

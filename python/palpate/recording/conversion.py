@@ -322,9 +322,7 @@ def digest_of(*arrays: NDArray[Any] | None) -> str:
 
 
 def mirrored(correlation: float, against: bool = False) -> list[str]:
-    """Returns the note on a force that falls with position, or on a position that moves against its
-    direction.
-    """
+    """Returns the note on a force that falls with position, or on a mirrored position."""
     signs = []
     if correlation < FALLING:
         signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")

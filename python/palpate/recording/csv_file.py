@@ -147,9 +147,7 @@ class CsvFile(LongTable):
                 raise not_csv(str(self._path), error) from None
 
     def _rows(self, lines: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
-        """Yields line number and cells of each row. Slow: only for the start of a file and for error
-        messages.
-        """
+        """Yields line number and cells of each row. Slow: only for the first rows and for error messages."""
         reader = csv.reader(lines, delimiter=self._dialect.separator)
         for cells in reader:
             if len(cells) > 1 or (cells and cells[0].strip()):

@@ -117,9 +117,7 @@ def turns_of(direction: Int8Vector) -> int:
 
 
 def _noise(x: Float1D) -> float:
-    """Returns the standard deviation of the noise from third differences; turns and jumps are too few to
-    matter.
-    """
+    """Returns the standard deviation of the noise from third differences; turns are too few to matter."""
     differences = np.abs(x[3:] - x[:-3] - 3.0 * (x[2:-1] - x[1:-2]))
     return float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]) / (0.6745 * math.sqrt(20.0)))
 
@@ -131,9 +129,7 @@ def _resolution(x: Float1D) -> float:
 
 
 def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
-    """Returns the last row of each stroke and its direction; a stroke ends where x moves back by more than
-    `back`.
-    """
+    """Returns last row and direction of each stroke; a stroke ends where x moves back by more than `back`."""
     # On a grid few rows are local extremes, at any noise.
     grid = np.rint(x * (GRID / back))
     steps = np.diff(grid)

@@ -151,9 +151,7 @@ def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) -> list[Finding]:
-    """Returns findings on a reversed direction, a loop that generates energy, and a force that falls with
-    position.
-    """
+    """Returns findings on a reversed direction, an active loop, and a force that falls with position."""
     words = recording.direction
     if words is not None and len(words) > 1:
         # a spike goes both ways and does not count
@@ -332,9 +330,7 @@ def _held(recording: Recording, what: str, rows: int, other: str) -> list[Findin
 
 
 def _held_for(values: Float1D) -> int:
-    """Returns the number of rows for which a column is held; 1 if the runs of equal values have no common
-    length.
-    """
+    """Returns the number of rows for which a column is held; 1 without a common length."""
     edges = np.flatnonzero(np.diff(values)) + 1
     lengths = np.diff(edges)
     lengths = lengths[lengths < LONGEST_RUN]

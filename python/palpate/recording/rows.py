@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of every row of the chosen columns. The first bad row refuses the file, or bad rows are dropped and
-counted.
-"""
+"""Checks of every row of the chosen columns. Bad rows refuse the file, or are dropped and counted."""
 
 from __future__ import annotations
 

@@ -45,9 +45,7 @@ class ClosedLoop:
     recorded_position: Float1D
     recorded_force: Float1D
     rendered_position: Float1D
-    """Motion-driven: recorded position. Force-driven: position to which the recorded force moves the
-    environment.
-    """
+    """Motion-driven: recorded position. Force-driven: resulting position of the environment."""
     rendered_force: Float1D
     """Motion-driven: rendered force. Force-driven: recorded force."""
     environment_position: Float1D

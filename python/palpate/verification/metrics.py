@@ -59,7 +59,7 @@ def force_floor(force: Float1D) -> float:
 
 
 def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
-    """Returns the share of samples with an error below 7 % of the local reference force, or below the floor."""
+    """Returns the share of samples with an error below 7 % of the local force, or below the floor."""
     allowed = np.maximum(FORCE_JND * np.abs(reference), force_floor(reference))
     return float(np.mean(np.abs(error) <= allowed))
 
