@@ -71,8 +71,7 @@ def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
     """Fits each baseline to all rows except every `every`-th, and judges it on those.
 
     If the recordings distinguish strokes, each baseline is fitted to press and release separately. These are
-    two models,
-    but the identified one is a single model. Rows without a direction are left out.
+    two models, but the identified one is a single model. Rows without a direction are left out.
     """
     strokes = all(map(_has_strokes, recordings))
     tables = [_columns(part, strokes) for part in recordings]

@@ -61,8 +61,7 @@ def best_of(
     """Returns the simplest candidate within one standard error of the best, on held-out rows.
 
     Every fifth row is held out. Candidates are sorted, the simplest first; one that cannot be fitted is
-    skipped. So no
-    method is compared with an unsuitable setting.
+    skipped. So no method is compared with an unsuitable setting.
     """
     kept = np.arange(len(y)) % HELD_OUT != HELD_OUT - 1
     if kept.all():

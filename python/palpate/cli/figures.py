@@ -61,8 +61,7 @@ def figure_file(
     not at all.
 
     Several axes share their position axis. In several columns, filled row by row, each has a separate one.
-    The title is
-    above them, wrapped to the width of the figure.
+    The title is above them, wrapped to the width of the figure.
     """
     import matplotlib
 
@@ -91,8 +90,7 @@ def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
     """Closes the loop in both ways.
 
     The recorded motion drives the device. The recorded force drives the object: once with the mass and
-    damping of the
-    paper's explicit environment, once with the small values that the implicit one needs.
+    damping of the paper's explicit environment, once with the small values that the implicit one needs.
     """
     paper = force_driven(model, recording)
     light = Scheme(

@@ -4,8 +4,7 @@
 No other module writes to these streams. Control characters are escaped here, so that no column name, file
 name or
 model can control a terminal. On a terminal, lines are wrapped between words; files and programs get one line
-for
-each item. Paragraphs are always wrapped.
+for each item. Paragraphs are always wrapped.
 """
 
 from __future__ import annotations
@@ -50,8 +49,8 @@ def prepare_streams() -> None:
     """Makes the three standard streams safe to use in any state.
 
     A closed descriptor is occupied, so that no file that is opened later gets its number. Writing to a closed
-    standard
-    output then fails like writing to a full disk. A character outside the encoding is written as its escape.
+    standard output then fails like writing to a full disk. A character outside the encoding is written as its
+    escape.
     """
     for number in (0, 1, 2):
         try:

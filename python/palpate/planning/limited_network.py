@@ -2,14 +2,10 @@
 """Search for the nearest network that a device can render: slopes limited, otherwise as identified.
 
 The nearest force with slopes between two limits is an isotonic regression. It differs from the model on
-intervals
-around slopes that are too steep, and has kinks at their ends. Smoothing by a narrow positive kernel rounds
-the
-kinks and keeps the limits. Further wavelets represent only the change; they are chosen one by one (orthogonal
-least
-squares, values and slopes). A last least squares over all wavelets imposes the limits. So the limits are
-certified,
-and elsewhere the model does not change.
+intervals around slopes that are too steep, and has kinks at their ends. Smoothing by a narrow positive kernel
+rounds the kinks and keeps the limits. Further wavelets represent only the change; they are chosen one by one
+(orthogonal least squares, values and slopes). A last least squares over all wavelets imposes the limits. So
+the limits are certified, and elsewhere the model does not change.
 """
 
 from __future__ import annotations
@@ -194,10 +190,8 @@ def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high:
     n).
 
     Beyond the edge h decreases with g over g / g', and the slope of pressing is g' (1 + h / g). At the limit
-    this is too
-    steep if pressing begins above `high` / slope times the end of releasing. The slope is that of releasing
-    over the
-    `near` samples that the rounding of kinks reaches.
+    this is too steep if pressing begins above `high` / slope times the end of releasing. The slope is that of
+    releasing over the `near` samples that the rounding of kinks reaches.
     """
     press, release = strokes
     first = release[edge]

@@ -145,8 +145,8 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     """Returns the errors of a simulated rendering against the identified model, at the true handle position.
 
     With F the force of the device, x the true motion and T the period, the error of the mean over tick k is
-    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is its sequence after
-    a low-pass filter without phase.
+    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is its sequence after a
+    low-pass filter without phase.
 
     Parameters
     ----------

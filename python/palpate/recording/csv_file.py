@@ -244,8 +244,7 @@ class CsvFile(LongTable):
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
         wanted = [name for name in self.names if name in numbers or name in text]
         # Most files contain only numbers in number columns and are read fast. If a block does not, the part
-        # is
-        # read again as text, without the rows that were already returned.
+        # is read again as text, without the rows that were already returned.
         given = 0
         for as_text in ({*text}, {*text, *numbers}):
             types = {name: "str" if name in as_text else "float64" for name in wanted}

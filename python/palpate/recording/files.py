@@ -2,8 +2,7 @@
 """Fingerprints of files, atomic writing, and recordings as CSV files.
 
 The CSV file states the role of each column and can be read without options. A flight record has the
-additional
-role "status": the column states for every row if its force was the model's alone.
+additional role "status": the column states for every row if its force was the model's alone.
 """
 
 from __future__ import annotations
@@ -80,8 +79,7 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
     """Yields a temporary path in the folder of `path`, and renames it to `path` at the end.
 
     An error removes the temporary file. Its name is unpredictable. An existing file keeps its mode and owner.
-    A symbolic
-    link is kept and its target is replaced. The content is on the disk before the file is renamed.
+    A symbolic link is kept and its target is replaced. The content is on the disk before the file is renamed.
 
     Parameters
     ----------

@@ -304,8 +304,7 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
     """Returns the highest L whose derivative of that order contains at most NOISE_SHARE of noise, or None.
 
     Sixth differences of the position estimate its noise, because a hand's motion leaves almost nothing in
-    them. The noise
-    of the derivative follows from the impulse response of both filters.
+    them. The noise of the derivative follows from the impulse response of both filters.
     """
     sixth = [np.diff(part.position, 6) for part in parts if len(part.position) > 6]
     if not sixth:

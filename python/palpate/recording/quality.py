@@ -275,8 +275,7 @@ def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
     """Returns the largest distance of the force inside a run of consecutive rows from both ends of the run.
 
     A hand is at rest when it reverses, while friction changes its sign. The force then changes from one end
-    of the run to
-    the other, but does not leave that range.
+    of the run to the other, but does not leave that range.
     """
     first = np.flatnonzero(np.diff(rows, prepend=-2) != 1)
     last = np.r_[first[1:], len(rows)] - 1

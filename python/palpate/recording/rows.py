@@ -88,8 +88,7 @@ class RowCheck:
 
     def as_modelled(self, words: Cells) -> None:
         """Removes the rows whose status states that the force was not the model's alone: start ramp, clipped,
-        or zero
-        after a fault. They do not describe the object.
+        or zero after a fault. They do not describe the object.
         """
         others = ~np.isin(words, (Status.Ok.name,)) & self.kept
         if others.any():

@@ -45,8 +45,7 @@ class Table(ABC):
     @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
         """Returns all columns. Those in `numbers` become float64, those in `text` become strings. Any other
-        column is
-        numeric if all its cells are.
+        column is numeric if all its cells are.
         """
 
     @abstractmethod

@@ -51,7 +51,7 @@ class Uncertainty:
     """Lag-1, of the residuals in recorded order"""
 
     def force(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
-        """Returns the standard error of the force (n,); outside the domain that at its edge."""
+        """Returns the standard error (n,) of the force; twice it is a 95 % band. Outside: as at the edge."""
         inside = np.clip(position, self.model.lower[0], self.model.upper[0])
         return self._error(_jacobian(self.model, inside, direction))
 
