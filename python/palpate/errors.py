@@ -21,7 +21,7 @@ class InputError(ValueError):
 
 
 def visible(text: str) -> str:
-    """Returns the text with control and format characters escaped, for a terminal."""
+    """Returns the text with its control and format characters escaped to protect the terminal."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(

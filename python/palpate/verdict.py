@@ -35,7 +35,7 @@ class Verdict:
     """Judges a result by its findings; the most serious one sets the level.
 
     ``str(verdict)`` is ``"good"``, ``"usable: ..."`` or ``"no: ..."``. Semicolons join the sentences, and the
-    most serious comes first. Every verb prints it first, and ends with exit code 1 where the level is "no".
+    most serious comes first. Every verb prints it first, and ends with exit code 1 if the level is "no".
     """
 
     findings: tuple[Finding, ...] = ()

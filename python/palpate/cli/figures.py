@@ -222,7 +222,7 @@ def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[Close
 
 
 def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, *, of: str) -> None:
-    """Draws the force error of each rendered structure; `of` names the model."""
+    """Draws the force error of each rendered structure; `of` describes the rendering."""
     from ..plotting import draw_structures
 
     shown = [(row.name, row.error) for row in rows if row.error is not None]

@@ -2,9 +2,8 @@
 """Output of text: results on standard output, notes and progress on standard error.
 
 No other module writes to these streams. Control characters are escaped here, so that no column name, file
-name or
-model can control a terminal. On a terminal, lines are wrapped between words; files and programs get one line
-for each item. Paragraphs are always wrapped.
+name or model can control a terminal. On a terminal, lines are wrapped between words; files and programs get
+one line for each item. Paragraphs are always wrapped.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ class Check:
 
     @property
     def may_push(self) -> bool:
-        """True if a small force is allowed. A device whose only fault is delay allows it."""
+        """True if a small force is allowed. A host that is only late allows it."""
         return not any(each.right is False and each.forbids_force for each in self.observations)
 
     @property

@@ -61,7 +61,7 @@ class Observation:
 
 
 def observe_at_rest(listened: Mapping[str, Any]) -> list[Observation]:
-    """Judges a summary of `measure` with its ticks, taken without force."""
+    """Judges a summary of `measure` with its ticks, measured without force."""
     ticks, wanted = listened["kept"], listened["wanted_rate_hz"]
     step = listened["profile"].encoder_step
     observations = [
@@ -202,7 +202,7 @@ def compare(expected: DeviceProfile, measured: Mapping[str, float | None], *, na
         The profile, or the device of a certificate.
     measured : mapping
         ``period_s``, ``jitter_s``, ``delay_s``, ``encoder_step``, ``force_limit``,
-        ``viscous_damping``, ``coulomb_friction``; None where it was not measured.
+        ``viscous_damping``, ``coulomb_friction``; None if it was not measured.
     name : str
         Name of the observation.
     """

@@ -112,7 +112,7 @@ def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) ->
     Raises
     ------
     InputError
-        The value is neither; the message names the argument, or file and field.
+        The value is not a device; the message names the argument, or file and field.
     """
     if isinstance(device, _core.device.DeviceProfile):
         return device

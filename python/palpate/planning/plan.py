@@ -372,7 +372,7 @@ def _share(error: float, size: float, force: Float2D) -> float:
 
 
 def _behind_coupling(model: ForceModel, scheme: Scheme, x: Float1D) -> Float2D:
-    """Returns the force (k, n) of each stroke at a handle that rests at x behind the coupling."""
+    """Returns the force (k, n) of each stroke at a handle at rest, from the load line without mass."""
     at_rest = Scheme(structure="massless", coupling_stiffness=scheme.coupling_stiffness, coupling_damping=0.0)
     return np.array([motion_driven(stroke, at_rest, x, 1.0)["force"] for stroke in _single_strokes(model)])
 

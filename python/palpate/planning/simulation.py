@@ -279,7 +279,7 @@ class Comparison:
 def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Comparison, ...]:
     """Renders a model with each structure and measures its force error.
 
-    The structures are sorted by their usual force errors: direct, with and without prediction; massless
+    The order is that of the usual force errors: direct, with and without prediction; massless
     behind a coupling, with the coupling's spring subtracted from the model; massless. Implicit with mass
     alone, implicit with the damping of the explicit structure, and explicit follow. A structure that does not
     suit the model or the device is refused with its reason.

@@ -46,7 +46,7 @@ def draw_real_against_rendered(
     units : mapping
         {"position": "rad", "force": "N*m"}.
     title : str
-        Name of the driving signal.
+        Title, which states how the loop was closed.
     real_name : str
         Name of the recorded curve.
     """

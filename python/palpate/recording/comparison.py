@@ -58,7 +58,7 @@ class Travel:
 
     @staticmethod
     def of(position: Float1D) -> Travel:
-        """Returns the range of all rows that lie within half a travel of the inner 99 % of the rows."""
+        """Returns the range of all rows within half a travel of the inner 99 % of the rows."""
         low, high = np.percentile(position, (TAIL, 100.0 - TAIL))
         margin = 0.5 * (high - low)
         inside = (position >= low - margin) & (position <= high + margin)
@@ -81,7 +81,7 @@ class CellRows:
     cells: int
     """Position cells"""
     loop: Float1D
-    """(m,) press minus release force, where both are known"""
+    """(m,) press minus release force, if both are known"""
     loop_error: Float1D
     """(m,) standard error of `loop`"""
 
@@ -192,7 +192,7 @@ The release begins where the press ends. 74 measured pairs have 0.9 to 1.2.
 """
 
 MOST_RECORDINGS = 20
-"""Most recordings among which the one that agrees best with the others is searched."""
+"""Largest number of recordings in the search for the one that agrees best with the others."""
 
 Curve = tuple[Float1D, Float1D]
 """Mean positions in rising order, and mean forces."""
@@ -303,7 +303,7 @@ def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None)
     ----------
     recordings : sequence of Recording
     side : (n,) array, optional
-        Direction of the rows of all recordings, where it was taken from their order or from the force.
+        Direction of the rows of all recordings, if it was computed from their order or from the force.
     """
     if len(recordings) < 2 or any(recording.input_names for recording in recordings):
         return []

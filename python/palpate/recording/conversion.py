@@ -183,7 +183,7 @@ class Conversion:
         Raises
         ------
         InputError
-            A row cannot be used and rows are not to be dropped, or its direction is not known.
+            A row cannot be used and rows may not be dropped, or its direction is not known.
         """
         check = RowCheck(self.name, table, first, len(cells[self.choice.position.name]), self.drop)
         if self.status is not None:
@@ -337,7 +337,7 @@ def mirrored(correlation: float, against: bool = False) -> list[str]:
 
 
 def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
-    """Reports a force or position that looks mirrored. No sign changes without an option."""
+    """Reports once a force or position that looks mirrored. No sign changes without an option."""
     x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
     against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0

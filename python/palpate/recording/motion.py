@@ -129,7 +129,7 @@ def _resolution(x: Float1D) -> float:
 
 
 def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
-    """Returns last row and direction of each stroke; a stroke ends where x moves back by more than `back`."""
+    """Returns last row and direction of each stroke; a stroke ends if x moves back by more than `back`."""
     # On a grid few rows are local extremes, at any noise.
     grid = np.rint(x * (GRID / back))
     steps = np.diff(grid)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sample recording of the package. It is simulated, and every use says so."""
+"""Sample recording of the package. It is simulated and always labelled as simulated."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from ..model import Model
 from ..verdict import FORCE_FLOOR, FORCE_JND
 
 STIFFNESS_JND = 0.23
-"""Just noticeable difference of stiffness (Jones and Hunter 1990: about 23 %)."""
+"""Just noticeable difference of stiffness, as a share of it (Jones and Hunter 1990: about 23 %)."""
 
 STIFFNESS_CELLS = 20
 """Number of equal cells over the range of positions in which a local stiffness is computed."""
