@@ -94,8 +94,7 @@ def _has_scikit_learn() -> bool:
 
 
 if not _has_scikit_learn():
-    # It is left out of `from palpate import *`, help() and inspect.getmembers(); using the name reports the
-    # missing package.
+    # Not part of `from palpate import *` and help(), because using it may report a missing package.
     __all__.remove("WaveletNetworkRegressor")
 
 

@@ -57,8 +57,7 @@ _DRIVEN = {
 def figure_file(
     path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1, title: str = ""
 ) -> Iterator[list[Axes]]:
-    """Yields axes one below the other, with the given shares of the height. The file is written completely or
-    not at all.
+    """Yields axes one below the other, with the given shares of the height, and writes the file atomically.
 
     Several axes share their position axis. In several columns, filled row by row, each has a separate one.
     The title is above them, wrapped to the width of the figure.

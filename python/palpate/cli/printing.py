@@ -48,8 +48,7 @@ def prepare_streams() -> None:
     """Makes the three standard streams safe to use in any state.
 
     A closed descriptor is occupied, so that no file that is opened later gets its number. Writing to a closed
-    standard output then fails like writing to a full disk. A character outside the encoding is written as its
-    escape.
+    standard output then fails like writing to a full disk. A character outside the encoding is escaped.
     """
     for number in (0, 1, 2):
         try:

@@ -327,8 +327,7 @@ class Model(ForceModel):
         Raises
         ------
         InputError
-            The folder does not exist or cannot be written, or a field has a value that a model file cannot
-            store.
+            The folder does not exist or cannot be written, or a model file cannot store a field.
         """
         target = path_of("path", path)
         content = self.to_dict()

@@ -311,8 +311,7 @@ def _predicted(found: Candidate, task: Task) -> Candidate:
     """Adds a prediction with the fewest certified samples; returns `found` if none is certified.
 
     A prediction needs damping, which shortens the allowed delay of a tick. That time must remain
-    `_LATE_TICK`, or the time without prediction. If nothing is certified without prediction, any certified
-    one is chosen.
+    `_LATE_TICK`, or the time without prediction. If only predictions are certified, any is allowed.
     """
     if task.predict is not None or task.model.of_velocity:
         return found

@@ -186,8 +186,7 @@ def _changes_needed(
 
 
 def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
-    """Lowers the pressing force at the start of contact if it is too steep beyond the lower edge. Returns (2,
-    n).
+    """Returns strokes (2, n) with less pressing force at the start of contact if it is too steep there.
 
     Beyond the edge h decreases with g over g / g', and the slope of pressing is g' (1 + h / g). At the limit
     this is too steep if pressing begins above `high` / slope times the end of releasing. The slope is that of

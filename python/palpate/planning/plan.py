@@ -107,8 +107,7 @@ class Plan:
     def verdict(self) -> Verdict:
         """Verdict on the plan: on its certificate and its force error.
 
-        It is "no" if no structure is certified or stable on the device, or if the force error exceeds the
-        limit.
+        It is "no" if no structure holds on the device, or if the force error exceeds the limit.
         """
         return Verdict((*self._certificate_findings(), *self._force_findings()))
 
@@ -179,11 +178,9 @@ class Plan:
 
     @property
     def felt_slopes(self) -> tuple[float, float]:
-        """Steepest felt slope and steepest slope of the model; a coupling makes the felt one softer
-        [force/position].
+        """Steepest felt slope and that of the model; a coupling makes it softer [force/position].
 
-        If the spring of the coupling was subtracted from the model, the bounds of the certificate are those
-        of the remainder.
+        If the coupling was subtracted from the model, the bounds of the certificate are for the remainder.
         """
         assert self.certificate is not None
         steepest = max(0.0, self.certificate.bounds.slope_max)
@@ -226,8 +223,7 @@ class Plan:
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
-        """Refuses a plan that diverges on this device, and a device that differs from that of the
-        certificate.
+        """Refuses a plan that diverges on this device, and a device other than that of the certificate.
 
         Raises
         ------
@@ -312,8 +308,7 @@ def _percent(share: float) -> str:
 class StaticForceError:
     """Felt minus identified force at rest, over the domain and both strokes.
 
-    It contains the effect of a limited network and a soft coupling, but not of damping, delay and encoder
-    steps.
+    It contains the effect of a limited network and a soft coupling, not of damping, delay or encoder.
     """
 
     largest: float

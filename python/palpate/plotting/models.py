@@ -109,8 +109,7 @@ def draw_two_models(
     *,
     names: tuple[str, str],
 ) -> None:
-    """Draws the forces of two models over position; below, second minus first with the just noticeable
-    difference.
+    """Draws the forces of two models over position; below, second minus first and the JND.
 
     Parameters
     ----------

@@ -118,8 +118,7 @@ def draw_structures(
 class RootLocus:
     """Poles of the linearised explicit structure (paper figure 14) at a held device, over its damping.
 
-    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the sum of slope and K_c, B the sum of both
-    dampings.
+    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, K = slope + K_c, B = sum of both dampings.
     """
 
     slopes: Float1D

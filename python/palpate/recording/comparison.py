@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detection of recordings that do not belong together: two objects in one file, repeated rows, other units or
-zeros.
+"""Detection of mixed recordings: two objects in one file, repeated rows, other units or zeros.
 
 Rows are compared by position cell and stroke.
 """
@@ -296,8 +295,7 @@ class _Strokes:
 def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
     """Returns findings on recordings of one object whose forces differ at the same positions.
 
-    A recording of one stroke is compared with the same stroke of the others. Hysteresis may separate press
-    and release.
+    A recording of one stroke is compared with the same stroke of the others, because of hysteresis.
 
     Parameters
     ----------

@@ -33,8 +33,7 @@ MIN_POSITIONS = 3
 FALLING = -0.3
 """Correlation of force and position below which the force falls over the whole file.
 
-A mirrored axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction stay between -0.3
-and 0.2.
+A mirrored axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction -0.3 to 0.2.
 """
 
 Range = tuple[int | None, int | None]
@@ -73,8 +72,7 @@ class Source:
 class Motion:
     """All rows of a measured motion; a recording contains some of them.
 
-    Velocity and play depend on the rows before and after a row. They are computed from all rows, held-out
-    rows included.
+    Velocity and play depend on the rows before and after a row. They are computed from all rows.
     """
 
     position: Float1D

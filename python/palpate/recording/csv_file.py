@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reader of CSV files. The dialect is recognised once, then pandas reads the rows; messages name the line of
-a row.
+"""CSV files. The dialect is recognised once, then pandas reads the rows; messages name their lines.
 
 Rows are counted, and ends of rows are found, without splitting rows into cells.
 """
@@ -92,8 +91,7 @@ class FileBytes(io.RawIOBase):
 class CsvFile(LongTable):
     """A CSV recording. Opening reads the header; :meth:`read` reads the rows.
 
-    A name that ends in ``.part`` is a recording that was not completed. Its last line is ignored if it has no
-    line feed.
+    A name that ends in ``.part`` is an incomplete recording. A last line without line feed is ignored.
     """
 
     def __init__(self, path: Path) -> None:

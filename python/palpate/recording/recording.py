@@ -232,8 +232,7 @@ class Recording:
     def split(self, every: int = 5) -> tuple[Recording, Recording]:
         """Holds out every `every`-th row; returns (train, test).
 
-        `test` has the rows i with i mod every = every - 1. Both parts keep the motion of all rows to compute
-        velocity and play.
+        `test` has the rows i with i mod every = every - 1. Both parts keep the motion of all rows.
 
         Raises
         ------

@@ -127,8 +127,7 @@ class Stroke:
 def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
     """Compares the forces of two models over the common part of their domains.
 
-    The just noticeable difference is 7 % of the local force of the first model, but at least 1 % of its
-    largest force.
+    The JND is 7 % of the local force of the first model, but at least 1 % of its largest force.
 
     Parameters
     ----------
