@@ -40,7 +40,7 @@ _PREDICTIONS = (1, 2, 4, 8, 16)
 """Samples tried for a prediction. Few give less delay and force error; many need less damping [-]"""
 
 _LATE_TICK = 1.25
-"""Time between two samples for which a chosen prediction must be certified, if any prediction is
+"""Time between two samples for which a chosen prediction must be certified, unless none is
 [longest time between samples of the device]
 """
 
