@@ -6,7 +6,7 @@
     print(palpate.verify(model, "fresh.csv").nrmse)
     model.save("press.json")
 
-Names are loaded when they are first used, so that the command line starts fast.
+Names are loaded at their first use, so that the command line starts fast.
 """
 
 from importlib import import_module
@@ -94,7 +94,7 @@ def _has_scikit_learn() -> bool:
 
 
 if not _has_scikit_learn():
-    # `from palpate import *`, help() and inspect.getmembers() leave it out; naming it states what to install.
+    # Not part of `from palpate import *` and help(), because using it may report a missing package.
     __all__.remove("WaveletNetworkRegressor")
 
 

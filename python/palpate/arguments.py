@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of arguments: each refuses a wrong type in one sentence that names the argument."""
+"""Checks of arguments. Each refuses a wrong type in one sentence that names the argument."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ._typing import Float1D
 from .errors import InputError
 
 LONGEST = 60
-"""Characters of a value that a message shows."""
+"""Largest length of a value in a message [characters]."""
 
 
 def shown(value: object) -> str:
-    """The value as a message shows it: one line, cut where it is long."""
+    """Returns the value as one line for a message; long values are cut."""
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     text = " ".join(repr(value).split())
@@ -27,7 +27,7 @@ def shown(value: object) -> str:
 
 
 def path_of(name: str, value: object) -> Path:
-    """The path that an argument names.
+    """Returns an argument as a path.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def instance_of(name: str, value: object, kind: type | tuple[type, ...], cure: s
     Raises
     ------
     InputError
-        `cure` says how to get one.
+        The value has another type; `cure` states how to get the right one.
     """
     if not isinstance(value, kind):
         kinds = " or ".join(each.__name__ for each in (kind if isinstance(kind, tuple) else (kind,)))
@@ -55,7 +55,7 @@ def instance_of(name: str, value: object, kind: type | tuple[type, ...], cure: s
 
 
 def real_of(name: str, value: object) -> float:
-    """The real number that an argument is; NaN and infinity are left to the range check of the caller.
+    """Returns an argument as a real number. The caller checks its range, NaN and infinity.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def real_of(name: str, value: object) -> float:
 
 
 def number_of(name: str, value: object) -> float:
-    """The finite number that an argument is.
+    """Returns an argument as a finite number.
 
     Raises
     ------
@@ -85,12 +85,12 @@ def number_of(name: str, value: object) -> float:
 
 
 def vector_of(name: str, values: object) -> Float1D:
-    """The finite numbers (n,) of an array, a list, a column of a frame; a copy.
+    """Returns a copy of the finite numbers (n,) of an array, a list or a column of a frame.
 
     Raises
     ------
     InputError
-        They are not one-dimensional, not real numbers, masked, or not finite.
+        The values are not one-dimensional, not real numbers, masked, or not finite.
     """
     if np.ma.is_masked(values):
         raise InputError(f"{name} is a masked array; leave the masked rows out of all arrays")
@@ -110,7 +110,7 @@ def vector_of(name: str, values: object) -> Float1D:
 
 
 def named_arguments(kind: Any) -> None:
-    """Makes the constructor of a compiled class name an argument of a wrong type, as InputError."""
+    """Makes the constructor of a compiled class name an argument of a wrong type in an InputError."""
     construct = kind.__init__
     known = re.findall(r"(\w+): ", (construct.__doc__ or "").partition("*, ")[2])
 

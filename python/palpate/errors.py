@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exception for bad input, and text from a file inside its sentence: escaped, cut where it is long."""
+"""Exception for bad input, and text from files in its message: escaped, and cut if long."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import unicodedata
 from collections.abc import Iterable
 
 LONGEST_TEXT = 60
-"""Characters of a name or a cell in a message."""
+"""Largest length of a name or a cell in a message [characters]."""
 
 MOST_NAMES = 20
-"""Names that a message lists."""
+"""Largest number of names in a message."""
 
 _UNSEEN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
-"""Categories of characters that a terminal acts on or that break a line."""
+"""Categories of characters that control a terminal or break a line."""
 
 
 class InputError(ValueError):
-    """Bad input: one sentence that names the file, line or field, the value, and what would be right."""
+    """Bad input: one sentence that names the file, line or field, the value, and the cure."""
 
 
 def visible(text: str) -> str:
-    """The text with its control and format characters escaped, so that no terminal acts on them."""
+    """Returns the text with its control and format characters escaped to protect the terminal."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(
@@ -33,13 +33,13 @@ def visible(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
-    """The visible text, with its end left out where it is long."""
+    """Returns the visible text; the end of a long text is cut."""
     shown = visible(text)
     return shown if len(shown) <= longest else f"{shown[:longest]}..."
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names joined by commas, without those beyond a limit."""
+    """Returns names joined by commas, up to a limit."""
     every = list(names)
     shown = ", ".join(map(shortened, every[:MOST_NAMES]))
     return shown if len(every) <= MOST_NAMES else f"{shown} and {len(every) - MOST_NAMES} more"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdict on a result (good, usable, no), and the force difference that a hand notices."""
+"""Verdict on a result (good, usable, no), and the just noticeable difference of forces."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Verdict:
     """Judges a result by its findings; the most serious one sets the level.
 
     ``str(verdict)`` is ``"good"``, ``"usable: ..."`` or ``"no: ..."``. Semicolons join the sentences, and the
-    most serious comes first. Every verb prints it first, and ends with exit code 1 where the level is "no".
+    most serious comes first. Every verb prints it first, and ends with exit code 1 if the level is "no".
     """
 
     findings: tuple[Finding, ...] = ()
@@ -47,12 +47,12 @@ class Verdict:
 
     @property
     def level(self) -> Level:
-        """The level of the most serious finding; "good" without findings."""
+        """Level of the most serious finding; "good" without findings."""
         return max((finding.level for finding in self.findings), key=LEVELS.index, default="good")
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """The sentences of the findings, the most serious first, without repetitions."""
+        """Sentences of the findings, the most serious first, without repetitions."""
         ordered = sorted(self.findings, key=lambda finding: -LEVELS.index(finding.level))
         return tuple(dict.fromkeys(finding.sentence for finding in ordered))
 
@@ -60,16 +60,16 @@ class Verdict:
         return f"{self.level}: {'; '.join(self.reasons)}" if self.findings else self.level
 
     def __add__(self, other: Verdict) -> Verdict:
-        """The verdict on both results together."""
+        """Returns the verdict on both results together."""
         return Verdict(tuple(dict.fromkeys(self.findings + other.findings)))
 
     def record(self) -> list[dict[str, str]]:
-        """The findings as they stand in a model file."""
+        """Returns the findings for a model file."""
         return [{"level": finding.level, "sentence": finding.sentence} for finding in self.findings]
 
     @classmethod
     def from_record(cls, record: Iterable[Mapping[str, Any]]) -> Verdict:
-        """The verdict of a model file; what is not a finding is left out."""
+        """Returns the verdict of a model file; invalid entries are ignored."""
         return cls(
             tuple(
                 Finding(item["level"], str(item.get("sentence", "")))
@@ -82,21 +82,22 @@ class Verdict:
 GOOD = Verdict()
 
 FORCE_JND = 0.07
-"""Share of a force by which another must differ to be felt as different (Jones 1989: about 7 %)."""
+"""Just noticeable difference of force as a share of the force (Jones 1989: about 7 %)."""
 
 FORCE_FLOOR = 0.01
-"""Least force difference that is felt, as a share of the largest |force| of the recording.
+"""Least just noticeable difference, as a share of the largest |force| of the recording.
 
-A share of a force near zero would ask for more than any sensor or finger resolves. The floor goes with the
-recording because recordings reach from nanonewtons to kilograms, scaled before they are felt.
+Near zero force, a share of the local force would be less than a sensor or finger resolves. The floor is
+relative to the recording, because recordings range from nanonewtons to kilograms and are scaled before they
+are felt.
 """
 
 
 def usable(sentence: str) -> Finding:
-    """A reservation that leaves the result usable."""
+    """Returns a finding that leaves the result usable."""
     return Finding("usable", sentence)
 
 
 def no(sentence: str) -> Finding:
-    """A finding that makes the result unfit for use."""
+    """Returns a finding that makes the result unfit for use."""
     return Finding("no", sentence)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control as the tests run it."""
+"""Runs of palpate-control for the tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
 needs_program = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
 
-# The machine of a test may be busy: only the test of the rate minds.
+# The test machine may be busy: only the test of the rate checks it.
 PATIENT = ["--lowest-rate-share", "0"]
 
 
@@ -35,12 +35,12 @@ def started(*words: Any) -> subprocess.Popen[str]:
 
 
 def every_row(recording: Path) -> pd.DataFrame:
-    """Also the rows that a reader of recordings leaves out."""
+    """Returns all rows, also those that a reader of recordings ignores."""
     return pd.read_csv(recording, comment="#")
 
 
 def wait_for_rows(part: Path, process: subprocess.Popen[str]) -> float:
-    """Wait until the recording has rows; the time at which they were seen."""
+    """Waits until the recording has rows; returns the time of their detection."""
     while process.poll() is None:
         if part.exists() and sum(not line.startswith(b"#") for line in part.read_bytes().splitlines()) > 15:
             return time.monotonic()

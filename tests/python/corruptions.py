@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings with a known law, and what goes wrong with recordings: one seed gives one corrupted case.
+"""Corrupted recordings of a known law: one seed gives one case.
 
 python tests/python/corruptions.py [--first 0] [--count 300] [--kind KIND] [--each]
 
-PALPATE_DATA names the folder of measured recordings; without it the cases are of synthetic ones.
+PALPATE_DATA names the folder of measured recordings; without it the recordings are synthetic.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 SEED = 20261122
 
 WORSE = 1.2
-"""Ratio of the true and the reported NRMSE above which a warning is due."""
+"""Ratio of the true to the reported NRMSE above which a warning is required."""
 
 DATA = measured_data() or Path("without measured data")
 
@@ -81,7 +81,7 @@ class Rows:
 
 @dataclass
 class Case:
-    """One corrupted case: what is identified, and the clean recordings that it is judged on."""
+    """One corrupted case: its recordings, and the clean recordings for its judgement."""
 
     seed: int
     base: str
@@ -120,7 +120,7 @@ def _p2(random: Generator) -> Rows:
 
 
 def _loop(random: Generator) -> Rows:
-    """Press and release at even positions, as a tester moves."""
+    """Returns press and release at even positions, like a test machine."""
     x = np.linspace(0.0, 4e-3, 800)
     x, d = np.r_[x, x[::-1]], np.repeat([1, -1], 800).astype(np.int8)
     h = 0.05 + 0.1 * np.exp(-(((1e3 * x - 1.5) / 0.5) ** 2))
@@ -129,7 +129,7 @@ def _loop(random: Generator) -> Rows:
 
 
 def _sweeps(random: Generator) -> Rows:
-    """Several strokes with time: a spring with friction that the play operator follows."""
+    """Returns several strokes with time: a spring with friction that the play operator follows."""
     t = 4e-3 * np.arange(3000)
     x = 0.01 * (1.0 - np.cos(2 * np.pi * 0.5 * t)) / 2 * (1.0 + 0.05 * np.sin(0.7 * t))
     d = np.where(np.gradient(x) >= 0, 1, -1)
@@ -148,7 +148,7 @@ SYNTHETIC: dict[str, Callable[[Generator], Rows]] = {
 
 @cache
 def _measured(name: str) -> Rows:
-    # position has to grow into the object, here towards the magnet
+    # position must grow into the object, here towards the magnet
     negate = ("position",) if name.startswith("magnet") else ()
     found = palpate.read_recording(DATA / name, negate=negate)
     time, direction = found.time, found.direction
@@ -162,12 +162,12 @@ def _measured(name: str) -> Rows:
 
 
 def base_names() -> list[str]:
-    """Clean recordings by name; measured ones where they are."""
+    """Returns the names of clean recordings; measured ones if they exist."""
     return [*SYNTHETIC, *(name for name in MEASURED if (DATA / name).is_file())]
 
 
 def base(name: str, random: Generator) -> Rows:
-    """A clean recording; a synthetic one has its own noise and motion for every generator."""
+    """Returns a clean recording; a synthetic one has separate noise and motion for every generator."""
     return SYNTHETIC[name](random) if name in SYNTHETIC else _measured(name)
 
 
@@ -177,7 +177,7 @@ Corruption = Callable[[Generator, Rows, Case], list[Rows]]
 
 
 def _restarted(rows: Rows, after: float) -> Rows:
-    """The same rows with time that begins later."""
+    """Returns the same rows with a time that begins later."""
     return rows if rows.t is None else replace(rows, t=rows.t - rows.t[0] + after)
 
 
@@ -239,11 +239,11 @@ def _reversed(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 
 
 UNIT_RATIOS = (1e3, 1e6, 9.80665, 25.4, 10.0, 4.4482, 101.97, 57.29578)
-"""Of units that files mix up: milli, micro, kgf, inch, cm, lbf, gf and degree."""
+"""Ratios of units that files mix up: milli, micro, kgf, inch, cm, lbf, gf and degree."""
 
 
 def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    """One recording of two in another unit; or a single one by a factor that no object of its kind has."""
+    """Changes the unit of one recording of two; or scales a single one by an impossible factor."""
     ratio = float(random.choice(UNIT_RATIOS)) ** float(random.choice([-1, 1]))
     role = str(random.choice(["position", "force"]))
     if case.base in SYNTHETIC and random.random() < 0.6:
@@ -252,7 +252,7 @@ def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
         case.strength.append(f"second recording: {role} times {ratio:.4g}")
         wrong = replace(other, x=ratio * other.x) if role == "position" else replace(other, f=ratio * other.f)
         return [rows, wrong]
-    # A factor of 1000 on the force of a key gives the numbers of a press: another object, and no error.
+    # A factor of 1000 on the force of a key gives the force of a press: another object, not an error.
     role, ratio = "position", float(random.choice([1e-3, 1e3] if rows.units["position"] == "m" else [1e3]))
     case.strength.append(f"{role} times {ratio:g}")
     return [replace(rows, x=ratio * rows.x)]
@@ -355,7 +355,7 @@ PAIR_SHARE = 0.25
 
 
 def case_of(seed: int, kind: str | None = None) -> Case:
-    """The case of a seed: kinds take turns, a quarter of the cases has a second one."""
+    """Returns the case of a seed. Kinds alternate, and a quarter of the cases has a second one."""
     random = np.random.default_rng([SEED, seed])
     names = list(KINDS)
     first = kind or names[seed % len(names)]
@@ -376,7 +376,7 @@ def case_of(seed: int, kind: str | None = None) -> Case:
 
 @dataclass
 class Outcome:
-    """What identification says of a case, and what is true."""
+    """Result of the identification of a case, and the truth."""
 
     case: Case
     reported: float = float("nan")
@@ -390,28 +390,28 @@ class Outcome:
 
     @property
     def honest(self) -> bool:
-        """The reported error is not far below the true one."""
+        """True if the reported error is not far below the true one."""
         return bool(self.reported >= self.true / WORSE)
 
     @property
     def warned(self) -> bool:
-        """The result was refused, or its verdict is not good."""
+        """True if the result was refused, or its verdict is not good."""
         return bool(self.refused) or self.level not in ("", "good")
 
     @property
     def names_cause(self) -> bool:
-        """The refusal or a reason names a cause of the kind of corruption."""
+        """True if the refusal or a reason names a cause of the kind of corruption."""
         text = " ".join((self.refused, *self.reasons))
         return any(re.search(CAUSES[kind], text, re.IGNORECASE) for kind in self.case.kinds)
 
     @property
     def silent(self) -> bool:
-        """A wrong result without a warning that names a plausible cause."""
+        """True for a wrong result without a warning that names a plausible cause."""
         return bool(self.crashed) or not (self.honest or (self.warned and self.names_cause))
 
 
 def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
-    """NRMSE of a model on clean rows inside its domain."""
+    """Returns the NRMSE of a model on clean rows inside its domain."""
     errors, forces = [], []
     for rows in clean:
         check = palpate.verify(model, rows.recording())
@@ -427,7 +427,7 @@ def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
 
 
 def outcome_of(case: Case) -> Outcome:
-    """Identify the corrupted recordings, and judge the model on the clean ones."""
+    """Identifies the corrupted recordings, and judges the model on the clean ones."""
     found = Outcome(case)
     start = time.perf_counter()
     try:
@@ -453,7 +453,7 @@ def outcome_of(case: Case) -> Outcome:
 
 
 def told(found: Outcome) -> str:
-    """One case in one line."""
+    """Returns one case in one line."""
     if found.refused:
         return f"{found.case}: refused: {found.refused}"
     if found.crashed:
@@ -464,7 +464,7 @@ def told(found: Outcome) -> str:
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Counts by kind: a case of two kinds counts for its first."""
+    """Returns counts by kind; a case of two kinds counts for its first."""
     lines = [f"{'kind':16}{'cases':>7}{'honest':>8}{'warned':>8}{'cause named':>13}{'silent':>8}"]
     for kind in (*KINDS, "all"):
         group = [each for each in outcomes if kind in ("all", each.case.kinds[0])]
@@ -477,7 +477,7 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 
 def clean_outcome(name: str) -> Outcome:
-    """A base recording as it is."""
+    """Returns the outcome of a base recording without corruption."""
     rows = base(name, np.random.default_rng([SEED, base_names().index(name)]))
     return outcome_of(Case(-1, name, (), ["clean"], [rows], [rows]))
 

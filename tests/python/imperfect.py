@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force laws with known truth, and recordings of them that are imperfect in one way."""
+"""Force laws with known truth, and recordings of them with one imperfection."""
 
 from collections.abc import Callable
 
@@ -21,22 +21,22 @@ def line(x: Array) -> Array:
 
 
 def wall(x: Array) -> Array:
-    """A soft spring that ends at a wall at 0.4."""
+    """Returns the force of a soft spring that ends at a wall at 0.4."""
     return 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
 
 
 def sweep(n: int) -> Array:
-    """Positions of one stroke."""
+    """Returns positions of one stroke."""
     return np.linspace(0.0, TRAVEL, n)
 
 
 def strokes(n: int, cycles: float = 7.0) -> Array:
-    """Positions of some strokes into the object and out of it."""
+    """Returns positions of some strokes into the object and out of it."""
     return TRAVEL * (0.5 - 0.5 * np.cos(2.0 * np.pi * cycles * np.arange(n) / n))
 
 
 def noise(n: int, seed: int = 7, correlation: float = 0.0) -> Array:
-    """Normal noise of standard deviation NOISE; neighbours have that correlation."""
+    """Returns normal noise of standard deviation NOISE; adjacent values have that correlation."""
     white = np.random.default_rng(seed).normal(0.0, NOISE * np.sqrt(1.0 - correlation**2), n + 500)
     return np.asarray(lfilter([1.0], [1.0, -correlation], white)[500:])
 
@@ -46,6 +46,6 @@ def recorded(x: Array, y: Array, time: Array | None = None) -> palpate.Recording
 
 
 def true_nrmse(model: palpate.Model, law: Law, travel: float = TRAVEL) -> float:
-    """NRMSE against the law without noise, over the travel."""
+    """Returns the NRMSE against the law without noise, over the travel."""
     x = np.linspace(0.0, travel, 2001)
     return float(np.sqrt(np.mean((model.force(x) - law(x)) ** 2)) / np.std(law(x)))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small server that speaks the documented messages of the Haply Inverse Service, with a hand on the handle.
+"""Small server of the documented messages of the Haply Inverse Service, with a hand on the handle.
 
-One state for each message received; a message is one millisecond of the plant, so that nothing depends on how
-fast the machine is. Unknown keys are ignored without a word, as the service does.
+It sends one state for each received message. A message is one millisecond of the plant, so that the speed of
+the machine has no effect. Unknown keys are silently ignored, as in the service.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STEP_S = 1e-3
 
 @dataclass
 class Service:
-    """What the service sees, and what it was asked to do; `after` is the number of the message of a fault."""
+    """State and commands of the service; `after` is the number of the message of a fault."""
 
     devices: int = 1
     calibrated: bool = True
@@ -106,7 +106,7 @@ class Service:
 
 @contextmanager
 def serving(service: Service) -> Iterator[Service]:
-    """The service at a free port of this machine."""
+    """Runs the service at a free port of this machine."""
     with serve(service.answer, "127.0.0.1", 0, compression=None) as server:
         service.port = server.socket.getsockname()[1]
         thread = Thread(target=server.serve_forever, daemon=True)

@@ -7,7 +7,7 @@ from palpate import Model
 
 
 def model_by_hand(**changes: Any) -> Model:
-    """f = 5 x + one wavelet over 0 to 0.5 rad, at most 3 N*m; with changes."""
+    """Returns f = 5 x + one wavelet over 0 to 0.5 rad, at most 3 N*m; with changes."""
     arguments: dict[str, Any] = {
         "units": {"position": "rad", "force": "N*m"},
         "alpha": [[20.0]],
@@ -21,7 +21,7 @@ def model_by_hand(**changes: Any) -> Model:
 
 
 def keyswitch_by_hand(**changes: Any) -> Model:
-    """A tactile switch of 4 mm travel whose press lies 0.1 N above its release."""
+    """Returns a tactile switch of 4 mm travel whose press is 0.1 N above its release."""
     return model_by_hand(
         **{
             "units": {"position": "m", "force": "N"},

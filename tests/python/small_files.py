@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small recordings to read, and the sentence with which one is refused."""
+"""Small recordings to read, and the sentence of a refusal."""
 
 import shlex
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def timed(n: int = 12) -> list[str]:
 
 
 def refusal(path: Path, **options: object) -> str:
-    """The one sentence with which a file is refused, without its folder."""
+    """Returns the only sentence of a refusal, without the folder of the file."""
     with pytest.raises(InputError) as refused:
         read_recording(path, **options)  # type: ignore[arg-type]
     sentence = str(refused.value)
@@ -32,7 +32,7 @@ def refusal(path: Path, **options: object) -> str:
 
 
 def options_in(sentence: str, given: dict[str, object] | None = None) -> dict[str, object]:
-    """The options of reading after applying the cure of a refusal literally."""
+    """Returns the options of reading after applying the cure of a refusal literally."""
     options = dict(given or {})
     if "add: " not in sentence:
         assert "--invalid drop" in sentence, sentence

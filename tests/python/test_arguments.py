@@ -60,14 +60,14 @@ WRONG: dict[str, Any] = {
 }
 
 NUMBERS = {"int", "nan", "empty_list", "empty_array", "two_dimensional", "frame"}
-"""Wrong values that are an array of numbers after all."""
+"""Wrong values that are nevertheless arrays of numbers."""
 
 REFUSED_AS_TYPE = {"object", "function", "none", "dict"}
-"""Wrong values that scikit-learn asks its estimators to refuse by a TypeError."""
+"""Wrong values for which scikit-learn requires a TypeError."""
 
 
 def rebuilt(**changes: Any) -> Model:
-    """The model made again by hand, with some arguments changed."""
+    """Returns a manual copy of the model with some arguments changed."""
     names = ("kind", "inputs", "units", "alpha", "beta", "weight", "linear", "bias", "lower", "upper")
     same = {name: getattr(MODEL, name) for name in (*names, "fit", "data")}
     return Model(**{**same, **changes})
@@ -75,7 +75,7 @@ def rebuilt(**changes: Any) -> Model:
 
 Call = Callable[[Any], object]
 
-# Where an argument may be what stands among the wrong values.
+# Arguments for which some of the wrong values are right.
 TAKES: dict[str, tuple[Call, str, set[str]]] = {
     # name: (call, argument that the message names, values that are right there)
     "identify": (identify, "recording|frame", set()),
@@ -210,7 +210,7 @@ def test_an_option_of_a_wrong_type_is_refused_by_its_name(field: str, wrong: str
 
 
 def test_every_public_callable_is_in_the_table() -> None:
-    """Verification and InputError are results, which nobody makes by hand."""
+    """Verification and InputError are results, which users do not construct."""
     elsewhere = {"Verification", "InputError", "Recording", "IdentifyOptions", "SearchOptions"}
     called = {name.split()[0].split(".")[0] for name in TAKES}
     public = {name for name in palpate.__all__ if callable(getattr(palpate, name))}

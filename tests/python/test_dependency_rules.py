@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The arrows of ARCHITECTURE.md, and the licence line on every source file."""
+"""Dependency rules of ARCHITECTURE.md, and the licence line on every source file."""
 
 import ast
 import re
@@ -11,17 +11,17 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python" / "palpate"
 HEADERS = ROOT / "cpp" / "include" / "palpate"
 
-# What every folder may import: the error type, the checks of arguments, the verdict, the names of array
-# shapes and the compiled core.
+# Modules that every folder may import: the error type, the checks of arguments, the verdict, the names of
+# array shapes and the compiled core.
 COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 
-# A room may import the rooms before it.
+# A module may import the modules before it.
 ROOMS = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
-# Leaves may import any room but cli; only cli imports them.
+# These modules may import any module except cli; only cli imports them.
 LEAVES = {"plotting", "baselines"}
 
-# Folder of the headers -> what it may include, besides itself, status.hpp and fields.
+# Folder of the headers -> the folders that it may include, besides itself, status.hpp and fields.
 INCLUDES = {
     "fields": set(),
     "model": set(),
@@ -47,7 +47,7 @@ INCLUDES = {
     "simulation": {"run", "io", "guard", "stability", "rendering", "solver", "dynamics", "model", "device"},
 }
 
-# Headers that need a library beside the standard one; only each other include them, palpate.hpp neither.
+# Headers that need a library besides the standard one. Only these include each other; palpate.hpp does not.
 LEAF_HEADERS = {
     "device/detail/usb_connection.hpp",
     "device/detail/usb_text.hpp",
@@ -63,15 +63,15 @@ LEAF_HEADERS = {
     "simulation/open_device.hpp",
 }
 
-# What of the operating system a folder may use, beside the standard library: the clock, the scheduler, memory
-# and latency in realtime; files and sockets in io.
+# System headers that a folder may use besides the standard library: the clock, the scheduler, memory and
+# latency in realtime; files and sockets in io.
 SYSTEM_HEADERS = {
     "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
     | {"linux/futex.h", "sys/syscall.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/file.h", "sys/socket.h", "sys/stat.h", "unistd.h"},
 }
 
-# What prints, locks or opens files has no place where a force is computed.
+# Headers that print, lock or open files are not allowed in the computation of a force.
 NOT_IN_REAL_TIME = {
     "iostream",
     "fstream",
@@ -86,14 +86,14 @@ MAY_TALK = {"io", "realtime"}
 
 
 def room_of(path: Path) -> str:
-    """First part of a place in the package: `recording` for recording/rows.py, `errors` for errors.py."""
+    """Returns the module of a path: `recording` for recording/rows.py, `errors` for errors.py."""
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
 def imported_rooms(path: Path) -> set[str]:
-    """Rooms and root modules of the package that a file imports, imports within functions included.
+    """Returns the modules of the package that a file imports, imports within functions included.
 
-    The package itself, whose names are found anywhere, is ".".
+    The package itself, which exports names of all modules, is ".".
     """
     place = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
     found = set()

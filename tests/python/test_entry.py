@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python entry: files, frames and arrays given to identify and verify; help; models that compare."""
+"""Python entry: files, frames and arrays for identify and verify; help; comparison of models."""
 
 import inspect
 import pickle

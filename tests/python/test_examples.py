@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples run, and tell the same story in both languages."""
+"""The examples run and give the same results in both languages."""
 
 import os
 import shutil
@@ -24,7 +24,7 @@ def told_in_cpp(story: str, folder: Path) -> str:
     source, program = ROOT / "examples" / f"{story}.cpp", folder / story
     flags = ["-std=c++20", "-Wall", "-Wextra", "-Werror", "-I", str(ROOT / "cpp" / "include")]
     subprocess.run([compiler, *flags, str(source), "-o", str(program)], check=True)
-    # What is identified is identified by the verb.
+    # Identification uses the verb.
     verbs = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     return subprocess.run(
         [str(program)], capture_output=True, text=True, check=True, cwd=ROOT, env=verbs

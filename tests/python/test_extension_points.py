@@ -54,7 +54,7 @@ def test_an_unknown_structure_is_refused_with_all_names() -> None:
 
 
 def words_in(node: ast.AST) -> set[str]:
-    """The words of a collection that is written out."""
+    """Returns the words of a literal collection."""
     parts = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
     return {part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str)}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Imports of the package: none inside a function but for optional or slow packages, and no cycle."""
+"""Imports of the package: only optional or slow packages inside functions, and no cycle."""
 
 import ast
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "python" / "palpate"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-# Packages that not everybody has, or whose import takes longer than most verbs; plotting imports matplotlib.
+# Packages that are optional, or whose import takes longer than most verbs; plotting imports matplotlib.
 LATE = {"matplotlib", "palpate.plotting", "sklearn", "joblib", "distributed", "pyarrow", "openpyxl", "mcap"}
 LATE |= {"scipy.io", "usb"}
 
@@ -20,7 +20,7 @@ def module_of(path: Path) -> str:
 
 
 def targets_of(path: Path, node: ast.Import | ast.ImportFrom) -> list[str]:
-    """Modules, or names in modules, that an import loads."""
+    """Yields modules, or names in modules, that an import loads."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     folder = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
@@ -49,7 +49,7 @@ def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
 
 
 def imported_modules(path: Path, known: set[str]) -> set[str]:
-    """Modules of the package that a file imports when it is loaded; those for type checking are left out."""
+    """Returns the modules of the package that a file imports when it is loaded, except for type checking."""
     waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     found = set()
     while waiting:

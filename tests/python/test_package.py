@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package as it is installed: version, types, entry points."""
+"""Installed package: version, types, entry points."""
 
 import importlib.metadata
 import importlib.resources

@@ -31,7 +31,7 @@ def shell_commands() -> list[list[str]]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An empty folder for all commands of the README, which use the files of each other."""
+    """Returns an empty folder for all commands of the README, which use the files of each other."""
     return tmp_path_factory.mktemp("readme")
 
 
@@ -44,7 +44,7 @@ PROGRAMS = {
     "palpate": Path(sysconfig.get_path("scripts")) / "palpate",
     "build/control/palpate-control": PROGRAM,
 }
-"""Paths of the programs that the README names."""
+"""Paths of the programs in the README."""
 
 
 @needs_program

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands that run as if the emulated USB device were plugged in."""
+"""Commands that run with the emulated USB device."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation
 def emulated(
     *command: Any, device: Sequence[str] = (), timeout: float = 120.0
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command under the emulator; `device` are options of tests/usb/run_emulated.py."""
+    """Runs a command under the emulator; `device` are options of tests/usb/run_emulated.py."""
     words = [sys.executable, RUNNER, *device, "--", *command]
     return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=timeout)
 
 
 @dataclass
 class Frame:
-    """What really happened in one millisecond of the device."""
+    """True state of the device in one millisecond."""
 
     started: int
     """Frames since the first command."""

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What palpate is compared with: the methods of the paper's related work, and those of common practice.
+"""Baselines: the methods of the paper's related work, and those of common practice.
 
 All have the same interface: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force, ``n_parameters_``
-counts every fitted real number. X (n, 1 to 3) holds position and, where they are known, velocity and
-acceleration.
+counts every fitted real number. X (n, 1 to 3) holds position and, if known, velocity and acceleration.
 """
 
 from .comparison import PASSIVE, Compared, baselines, comparable, compare

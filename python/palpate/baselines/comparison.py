@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All baselines on one recording: fitted to the rows that a model was identified on, judged on the others."""
+"""Comparison of all baselines on one recording: fitted to the model's rows, judged on held-out rows."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ from .methods import (
 
 @dataclass(frozen=True)
 class Compared:
-    """One baseline on held-out rows."""
+    """Result of one baseline on held-out rows."""
 
     name: str
     nrmse: float
-    """RMSE over the standard deviation of the force on the held-out rows; NaN where it was refused"""
+    """RMSE over the standard deviation of the force on the held-out rows; NaN if the fit was refused"""
     n_parameters: int
     seconds: float
-    """Fit and choice of the setting"""
+    """Duration of fit and choice of the setting [s]"""
     refused: str | None = None
-    """Why it could not be fitted"""
+    """Reason why it could not be fitted"""
 
 
 PASSIVE = "smoothing spline, two strokes, h >= 0"
-"""The same two splines, but press is never below release: what a passive model is fairly compared with."""
+"""The same two splines, but press is never below release: a fair comparison for a passive model."""
 
 LEAST_STROKE = 0.1
-"""Share of the travel that a stroke covers; what covers less is none."""
+"""Least share of the travel of a stroke."""
 
 
 def baselines(strokes: bool) -> dict[str, Estimator]:
-    """Every baseline under its name; with strokes, one for press and one for release."""
+    """Returns every baseline by name; with strokes, separate ones for press and release."""
     single: dict[str, Estimator] = {
         "linear zones (Haptic Camera)": LinearZones(),
         "tissue parameters": TissueParameters(),
@@ -63,20 +63,20 @@ def baselines(strokes: bool) -> dict[str, Estimator]:
 
 
 def comparable(recording: Recording) -> NDArray[np.bool_]:
-    """Rows (n,) of a recording that baselines are fitted to and judged on."""
+    """Returns the rows (n,) of a recording to which baselines are fitted and on which they are judged."""
     return _columns(recording, _has_strokes(recording))[1]
 
 
 def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
-    """Fit each baseline to all rows but every `every`-th, and judge it on those.
+    """Fits each baseline to all rows except every `every`-th, and judges it on those.
 
-    Where the recordings tell strokes each baseline is fitted to press and release apart, which is two models
-    where an identified one is one; rows without a direction are left out.
+    If the recordings distinguish strokes, each baseline is fitted to press and release separately. These are
+    two models, but the identified one is a single model. Rows without a direction are left out.
     """
     strokes = all(map(_has_strokes, recordings))
     tables = [_columns(part, strokes) for part in recordings]
     width = min(X.shape[1] for X, _ in tables)
-    # the stroke stands last, velocity and acceleration where every recording has them
+    # the stroke is last; velocity and acceleration only if every recording has them
     X = np.concatenate([table[:, [*range(width - strokes), *([-1] * strokes)]] for table, _ in tables])
     y = np.concatenate([part.force for part in recordings])
     used = np.concatenate([rows for _, rows in tables])
@@ -103,7 +103,7 @@ def _compared(
 
 
 def _has_strokes(recording: Recording) -> bool:
-    """Whether both strokes cover some of the travel."""
+    """Returns True if both strokes cover some of the travel."""
     if recording.direction is None:
         return False
     strokes = [recording.position[recording.direction == side] for side in (1, -1)]
@@ -112,7 +112,7 @@ def _has_strokes(recording: Recording) -> bool:
 
 
 def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:
-    """Position, velocity and acceleration where time gives them, the stroke last; which rows are usable."""
+    """Returns position, velocity and acceleration if known, the stroke last; and the usable rows."""
     columns, rows = [recording.position], np.ones(len(recording), dtype=np.bool_)
     if recording.time is not None:
         try:

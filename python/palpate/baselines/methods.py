@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rival methods: curves over position, models of mechanics, and one copy of a method for each stroke."""
+"""Baseline methods: curves over position, models of mechanics, and one copy of a method for each stroke."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from scipy.optimize import least_squares
 from .._typing import Float1D, Float2D
 
 HELD_OUT = 5
-"""Of the rows to fit, every fifth chooses a setting that is not given."""
+"""Every fifth of the fitted rows is used to choose missing settings."""
 
 SIZES = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
 
 SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
 
 MOST_FITTED_ROWS = 20_000
-"""Rows that are fitted; of more, evenly spread ones."""
+"""Largest number of fitted rows; longer data is thinned evenly."""
 
 EXPONENTS = (0.5, 6.0)
 """Range of the exponent."""
@@ -32,10 +32,10 @@ EXPONENTS = (0.5, 6.0)
 THRESHOLDS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
 
 PLACES = 256
-"""Places at which a zone may be divided: quantiles of its positions."""
+"""Number of places at which a zone may be divided: quantiles of its positions."""
 
 LEAST_ZONE_ROWS = 8
-"""Rows in a zone for each of its parameters."""
+"""Least number of rows in a zone for each of its parameters."""
 
 RIDGE = 1e-10
 
@@ -43,25 +43,25 @@ C = TypeVar("C")
 
 
 class Estimator(Protocol):
-    """fit and predict as in scikit-learn."""
+    """Interface with fit and predict as in scikit-learn."""
 
     n_parameters_: int
-    """Every fitted real number, known after fit"""
+    """Number of fitted real numbers, known after fit"""
 
     def fit(self, X: Float2D, y: Float1D) -> Estimator:
-        """Learn from X (n, d) and y (n,)."""
+        """Fits to X (n, d) and y (n,)."""
 
     def predict(self, X: Float2D) -> Float1D:
-        """(n,) at the rows of X (n, d)."""
+        """Returns the force (n,) at the rows of X (n, d)."""
 
 
 def best_of(
     candidates: Iterable[C], fitted: Callable[[C, Float2D, Float1D], Estimator], X: Float2D, y: Float1D
 ) -> C:
-    """The simplest candidate that is within one standard error of the best on every fifth row, held out.
+    """Returns the simplest candidate within one standard error of the best, on held-out rows.
 
-    Candidates stand in order, the simplest first; one that cannot be fitted is out. This is what a competent
-    user does before comparing: no method is shown with a setting that suits it badly.
+    Every fifth row is held out. Candidates are sorted, the simplest first; one that cannot be fitted is
+    skipped. So no method is compared with an unsuitable setting.
     """
     kept = np.arange(len(y)) % HELD_OUT != HELD_OUT - 1
     if kept.all():
@@ -82,7 +82,7 @@ def best_of(
 
 
 def merged(x: Float1D, y: Float1D) -> tuple[Float1D, Float1D, Float1D]:
-    """Distinct positions in rising order, the mean of y at each, and how many rows it stands for."""
+    """Returns distinct rising positions, the mean of y at each, and the number of its rows."""
     distinct, place, count = np.unique(x, return_inverse=True, return_counts=True)
     return distinct, np.bincount(place, y) / count, count.astype(np.float64)
 
@@ -96,16 +96,16 @@ class PerStroke:
     Parameters
     ----------
     estimator
-        What is fitted to each stroke; it is copied.
+        Estimator that is copied and fitted to each stroke.
     passive : bool
-        Where release would lie above press, by which a loop gains energy, both are their mean.
+        Replaces both by their mean if release is above press, because that loop would generate energy.
     """
 
     estimator: Estimator
     passive: bool = False
 
     def fit(self, X: Float2D, y: Float1D) -> PerStroke:
-        """Fit one copy to the press rows of X (n, d) and one to the release rows."""
+        """Fits one copy to the press rows of X (n, d) and one to the release rows."""
         press = X[:, -1] > 0
         self.press_ = deepcopy(self.estimator).fit(X[press, :-1], y[press])
         self.release_ = deepcopy(self.estimator).fit(X[~press, :-1], y[~press])
@@ -113,7 +113,7 @@ class PerStroke:
         return self
 
     def predict(self, X: Float2D) -> Float1D:
-        """Force (n,) at the rows of X."""
+        """Returns the force (n,) at the rows of X."""
         press = X[:, -1] > 0
         if self.passive:
             above, below = (each.predict(X[:, :-1]) for each in (self.press_, self.release_))
@@ -127,23 +127,23 @@ class PerStroke:
 
 @dataclass
 class LookupTable:
-    """Forces at evenly spaced positions, straight lines between them; least squares for the forces.
+    """Forces at evenly spaced positions with straight lines between them, fitted by least squares.
 
-    f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) / (x_(i+1) - x_i). Outside its ends the table holds them.
+    f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) / (x_(i+1) - x_i). Outside, the table keeps its end values.
 
     Parameters
     ----------
     size : int, optional
-        Entries; without it the number that predicts held-out rows best.
+        Number of entries; by default the one that predicts held-out rows best.
     """
 
     size: int | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> LookupTable:
-        """Fit to the first column of X (n, d), the position, and y (n,)."""
+        """Fits to the first column of X (n, d), the position, and y (n,)."""
         size = self.size or best_of(SIZES, lambda entries, A, b: LookupTable(entries).fit(A, b), X, y)
         x, mean, count = merged(X[:, 0], y)
-        # entries that no row lies between would be free: leave out those
+        # Entries without rows between them are not determined: leave them out.
         entries = np.linspace(x[0], x[-1], size)
         cell = np.clip(np.searchsorted(entries, x, side="right") - 1, 0, size - 2)
         held = np.isin(np.arange(size - 1), cell)
@@ -162,52 +162,51 @@ class LookupTable:
         return self
 
     def predict(self, X: Float2D) -> Float1D:
-        """Force (n,) at the rows of X."""
+        """Returns the force (n,) at the rows of X."""
         return np.asarray(np.interp(X[:, 0], self.positions_, self.forces_))
 
 
 @dataclass
 class SmoothingSpline:
-    """The cubic spline with the fewest knots whose squared error stays below a multiple of the noise.
+    """Cubic spline with the fewest knots whose squared error is below a multiple of the noise.
 
-    FITPACK's algorithm (Dierckx 1975): knots are added where the error is largest until
-    sum_k (y_k - f(x_k))^2 <= smoothing * n * sigma^2. The noise sigma^2 is how each row differs from the mean
-    of its neighbours along x, taken by the median, so that jumps do not count. Outside its ends the spline
-    holds its last value.
+    FITPACK's algorithm (Dierckx 1975) adds knots at the largest error until sum_k (y_k - f(x_k))^2 <=
+    smoothing * n * sigma^2. The noise sigma^2 is estimated from the difference of each row from the mean of
+    its neighbours along x. The median excludes jumps. Outside, the spline keeps its end values.
 
     Parameters
     ----------
     smoothing : float, optional
-        Multiple of the noise that the spline may leave; without it the one that predicts held-out rows best.
+        Largest residual as a multiple of the noise; by default the one that predicts held-out rows best.
     """
 
     smoothing: float | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> SmoothingSpline:
-        """Fit to the first column of X (n, d), the position, and y (n,)."""
+        """Fits to the first column of X (n, d), the position, and y (n,)."""
         multiple = self.smoothing or best_of(
             SMOOTHINGS, lambda smoothing, A, b: SmoothingSpline(smoothing).fit(A, b), X, y
         )
         x, mean, count = merged(X[:, 0], y)
         if len(x) < 5:
             raise ValueError(f"a cubic spline needs 5 positions; there are {len(x)}")
-        # of what the spline may leave, the scatter of rows that share a position is not its to remove
+        # The spline cannot remove the scatter of rows with equal position.
         scatter = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
         allowed = max(multiple * len(y) * _noise(X[:, 0], y) - scatter, 0.0)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # FITPACK warns where it stops at the most knots it may have
+            warnings.simplefilter("ignore")  # FITPACK warns if it stops at its largest number of knots
             self.spline_ = UnivariateSpline(x, mean, w=np.sqrt(count), s=allowed, k=3, ext=3)
         interior = len(self.spline_.get_knots()) - 2
         self.n_parameters_ = len(self.spline_.get_coeffs()) + interior
         return self
 
     def predict(self, X: Float2D) -> Float1D:
-        """Force (n,) at the rows of X."""
+        """Returns the force (n,) at the rows of X."""
         return np.asarray(self.spline_(X[:, 0]))
 
 
 def _noise(x: Float1D, y: Float1D) -> float:
-    """Variance of the noise of y from neighbours along x."""
+    """Returns the variance of the noise of y from neighbours along x."""
     along = y[np.argsort(x, kind="stable")]
     apart = (along[1:-1] - 0.5 * (along[:-2] + along[2:])) ** 2 / 1.5
     # 0.455 is the median of a squared standard normal; forces of coarse resolution have a median of 0
@@ -218,12 +217,12 @@ def _noise(x: Float1D, y: Float1D) -> float:
 class HuntCrossley:
     """F = k d^p (1 + lambda v) + F_0 with the depth d = max(x - x_0, 0) (Hunt and Crossley 1975).
 
-    k, k lambda and F_0 are linear once x_0 and p are given, so only those two are searched for, from several
-    starts. Velocity takes part where X holds it.
+    k, k lambda and F_0 are linear for given x_0 and p, so only these two are searched, from several starts.
+    Velocity is used if X contains it.
     """
 
     def fit(self, X: Float2D, y: Float1D) -> HuntCrossley:
-        """Fit to X (n, 1 to 3), position and velocity, and y (n,)."""
+        """Fits to X (n, 1 to 3), position and velocity, and y (n,)."""
         X = X[:, :2]
         step = -(-len(y) // MOST_FITTED_ROWS)
         rows, force = X[::step], y[::step]
@@ -250,12 +249,12 @@ class HuntCrossley:
         return self
 
     def predict(self, X: Float2D) -> Float1D:
-        """Force (n,) at the rows of X."""
+        """Returns the force (n,) at the rows of X."""
         unknown = np.array([self.contact_, self.exponent_])
         return np.asarray(self._columns(X[:, :2], unknown) @ self.parameters_)
 
     def _linear(self, X: Float2D, y: Float1D, unknown: Float1D) -> tuple[Float1D, Float1D]:
-        """F_0, k and k lambda for given contact and exponent, and the residuals they leave."""
+        """Returns F_0, k and k lambda for given contact and exponent, and the residuals."""
         columns = self._columns(X, unknown)
         norm = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
         found = np.linalg.lstsq(columns / norm, y, rcond=None)[0] / norm
@@ -269,10 +268,10 @@ class HuntCrossley:
 
 @dataclass
 class TissueParameters:
-    """F = m a + B v + k_1 x + k_2 x^2 + ... + k_p x^p + F_0, all parameters from one linear least squares.
+    """F = m a + B v + k_1 x + k_2 x^2 + ... + k_p x^p + F_0, fitted by one linear least squares.
 
-    After Scilingo, De Rossi, Bicchi and Iacconi (1997), who identified tissue grasped by instrumented forceps
-    in this way. Velocity and acceleration take part where X holds them.
+    After Scilingo, De Rossi, Bicchi and Iacconi (1997), who identified tissue in instrumented forceps in this
+    way. Velocity and acceleration are used if X contains them.
 
     Parameters
     ----------
@@ -283,14 +282,14 @@ class TissueParameters:
     order: int = 3
 
     def fit(self, X: Float2D, y: Float1D) -> TissueParameters:
-        """Fit to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        """Fits to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
         self.scale_ = np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
         self.parameters_ = np.linalg.lstsq(self._columns(X), y, rcond=None)[0]
         self.n_parameters_ = len(self.parameters_)
         return self
 
     def predict(self, X: Float2D) -> Float1D:
-        """Force (n,) at the rows of X."""
+        """Returns the force (n,) at the rows of X."""
         return np.asarray(self._columns(X) @ self.parameters_)
 
     def _columns(self, X: Float2D) -> Float2D:
@@ -301,22 +300,22 @@ class TissueParameters:
 
 @dataclass
 class LinearZones:
-    """The travel divided into zones, F = m a + B v + k (x - x_0) in each, by least squares.
+    """Zones of the travel with F = m a + B v + k (x - x_0) in each, fitted by least squares.
 
-    After MacLean (1996): the number of zones is set by a threshold on what a linear zone may leave. A zone
-    whose RMS error is larger is divided where that helps most. Forces jump between zones.
+    After MacLean (1996): a threshold on the error of a linear zone sets the number of zones. A zone with a
+    larger RMS error is divided at the place that reduces it most. Forces jump between zones.
 
     Parameters
     ----------
     threshold : float, optional
-        RMS error that a zone may leave, as a share of the force's range; without it the one that predicts
+        Largest RMS error of a zone, as a share of the force's range; by default the one that predicts
         held-out rows best.
     """
 
     threshold: float | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> LinearZones:
-        """Fit to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        """Fits to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
         threshold = self.threshold or best_of(
             THRESHOLDS, lambda share, A, b: LinearZones(share).fit(A, b), X, y
         )
@@ -339,7 +338,7 @@ class LinearZones:
         return self
 
     def predict(self, X: Float2D) -> Float1D:
-        """Force (n,) at the rows of X."""
+        """Returns the force (n,) at the rows of X."""
         design = np.concatenate([np.ones((len(X), 1)), (X - self.centre_) / self.scale_], axis=1)
         zone = np.searchsorted(self.edges_, X[:, 0], side="right")
         return np.asarray(np.einsum("nk,nk->n", design, self.parameters_[zone]))
@@ -350,7 +349,7 @@ def _solved(design: Float2D, y: Float1D) -> Float1D:
 
 
 def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | None:
-    """The row before which to divide a zone, or None where it is good enough or cannot be divided."""
+    """Returns the row before which to divide a zone, or None if it is good enough or cannot be divided."""
     least = LEAST_ZONE_ROWS * design.shape[1]
     rest = y - design @ _solved(design, y)
     if len(y) < 2 * least or float(np.sqrt(np.mean(rest**2))) <= allowed:
@@ -371,7 +370,7 @@ def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | 
 
 
 def _explained(gram: Float2D, product: Float2D) -> Float1D:
-    """Sum of squares that least squares explains, for each of several (k, k) systems."""
+    """Returns the sum of squares that least squares explains, for each of several (k, k) systems."""
     ridge = RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[1])
     return np.asarray(
         np.einsum("nk,nk->n", product, np.linalg.solve(gram + ridge, product[:, :, None])[:, :, 0])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: `palpate VERB ...`, one file per verb."""
+"""Command line: `palpate VERB ...`, one file per verb."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate demo: the whole way on a simulated sample."""
+"""palpate demo: all steps on a simulated sample."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from .printing import (
 from .verb import PATH, json_option, require_writable, verb
 
 IDENTIFY_SEED, FRESH_SEED = 1, 2
-"""The two recordings of the sample: one to identify, one that the model has not seen."""
+"""Seeds of two recordings of the sample: one to identify, one to verify."""
 
 RENDERED_S = 4.0
 """Simulated time of each rendering [s]."""
@@ -137,7 +137,7 @@ def demo(output: Path, as_json: bool) -> None:
 
 
 def _require_folder(folder: Path) -> None:
-    """Refuse, before the work, a folder that could not be made or written after it."""
+    """Refuses, before the work, a folder that cannot be created or written."""
     if folder.is_dir():
         require_writable(folder / "model.json")
     elif folder.exists():
@@ -147,7 +147,7 @@ def _require_folder(folder: Path) -> None:
 
 
 def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
-    """Force error of each structure, or why it was refused."""
+    """Prints the force error of each structure, or the reason of its refusal."""
     print_line(f"force error of each structure, RMS in {unit}")
     print_table(
         ("structure", "tick mean", "below 50 Hz", "end of tick", "sampled"),

@@ -87,7 +87,7 @@ def devices(
 
 
 def _verdict(found: Sequence[Found]) -> Verdict:
-    """Good if every device can be used, no if none of the plugged-in devices can."""
+    """Returns good if every device can be used, no if none of the connected devices can."""
     problems = [f"{one.serial or one.place}: {one.problem}" for one in found if one.info is None]
     if not found:
         return Verdict((usable("no haptic USB device is plugged in; --device simulated needs none"),))

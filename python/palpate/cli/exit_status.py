@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exit status of every verb, and the one sentence that goes with a failure."""
+"""Exit status of every verb, and the message of a failure."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ INTERRUPTED = 130
 
 
 _GRACE_S = 0.05
-"""Seconds that Python gets to raise KeyboardInterrupt by itself."""
+"""Time in which Python can raise KeyboardInterrupt [s]."""
 
 
 class WorkError(Exception):
-    """The input was right, and the work still did not come to a result: one sentence."""
+    """Failure of work on valid input: one sentence."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """An exit code, and the sentence that goes with it: empty where nobody needs or is there to be told."""
+    """Exit code and its message; empty without a reader or need for one."""
 
     code: int
     sentence: str = ""
     help: str = ""
 
     def tell(self, *, as_json: bool) -> None:
-        """Print the sentence: as one object on standard output with --json, else on standard error.
+        """Prints the sentence: as one object on standard output with --json, else on standard error.
 
-        A stream that cannot be written leaves the exit code alone.
+        A stream that cannot be written does not change the exit code.
         """
         if as_json and self.sentence:
             with suppress(OutputError, BrokenPipeError):
@@ -59,7 +59,7 @@ class Ending:
 
 @contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """A request to terminate ends what runs here as Ctrl-C does."""
+    """Treats a termination signal like Ctrl-C within the block."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -69,11 +69,11 @@ def terminated_as_interrupted() -> Iterator[None]:
 
 @contextmanager
 def interrupted_at_once() -> Iterator[None]:
-    """End the process soon after Ctrl-C, also while a library computes.
+    """Ends the process soon after Ctrl-C, also while a library computes.
 
-    Python raises KeyboardInterrupt between two of its own instructions, but one matrix or one file can take
-    seconds. If it was not raised soon, a thread ends the process. Results must be written inside `finishing`,
-    where Ctrl-C is ignored.
+    Python raises KeyboardInterrupt between two of its instructions, but one matrix or one file can take
+    seconds. If it is not raised soon, a thread ends the process. Results must be written inside `finishing`,
+    which ignores Ctrl-C.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -109,7 +109,7 @@ def interrupted_at_once() -> Iterator[None]:
 
 
 def ending_of(error: BaseException) -> Ending:
-    """The ending that belongs to an exception which left a verb."""
+    """Returns the ending for an exception from a verb."""
     if isinstance(error, click.exceptions.Exit):
         return Ending(error.exit_code)
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
@@ -147,7 +147,7 @@ def _one_line(text: str) -> str:
 
 
 def end_with(verdict: Verdict) -> None:
-    """End the verb with the exit code of its verdict.
+    """Ends the verb with the exit code of its verdict.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def end_with(verdict: Verdict) -> None:
 
 @contextmanager
 def finishing() -> Iterator[None]:
-    """While results are written and printed Ctrl-C is ignored: it comes before all of them, or too late."""
+    """Ignores Ctrl-C while results are written and printed, so that no result is partial."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure files, drawn without a screen on axes of a printed column, and the figures that verbs make."""
+"""Figure files in the width of a printed column, drawn without a screen, and the figures of the verbs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _COLUMN_INCHES = 3.5
 _DOTS_PER_INCH = 200
 
 _TITLE_COLUMNS = 60
-"""Characters of a title that fit the width of a figure."""
+"""Number of characters of a title that fit the width of a figure."""
 
 _STYLE: Any = {
     "font.size": 8.0,
@@ -45,7 +45,7 @@ _LIGHTER = 0.01
 """Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
 
 _MOST_NAMES = 2
-"""Source files that a title names."""
+"""Largest number of source files in a title."""
 
 _DRIVEN = {
     "motion-driven": "recorded motion drives the device",
@@ -57,10 +57,10 @@ _DRIVEN = {
 def figure_file(
     path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1, title: str = ""
 ) -> Iterator[list[Axes]]:
-    """Give axes one below the other, of the given shares of the height; the file is complete or not there.
+    """Yields axes one below the other, with the given shares of the height, and writes the file atomically.
 
-    Several axes share their position axis; in several columns, row by row, each has its own. The title stands
-    above them, wrapped to the width of the figure.
+    Several axes share their position axis. In several columns, filled row by row, each has a separate one.
+    The title is above them, wrapped to the width of the figure.
     """
     import matplotlib
 
@@ -86,10 +86,10 @@ def figure_file(
 
 
 def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
-    """Both ways to close the loop.
+    """Closes the loop in both ways.
 
-    The recorded motion drives the device. The recorded force drives the object: with the mass and damping
-    that the paper's explicit environment adds to it, and with the little that the implicit one needs.
+    The recorded motion drives the device. The recorded force drives the object: once with the mass and
+    damping of the paper's explicit environment, once with the small values that the implicit one needs.
     """
     paper = force_driven(model, recording)
     light = Scheme(
@@ -102,7 +102,7 @@ def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
 
 
 def print_closed_loops(loops: Sequence[ClosedLoop]) -> None:
-    """How far each closed loop is from the recording: in force when driven by motion, else in position."""
+    """Prints the error of each closed loop: of the force if driven by motion, else of the position."""
     print_table(
         ("closed loop", "NRMSE"),
         [(f"{loop.view}, {describe(loop.scheme)}", number(loop.nrmse)) for loop in loops],
@@ -114,7 +114,7 @@ def _is_simulated(recording: Recording) -> bool:
 
 
 def source_name(files: Iterable[str]) -> str:
-    """The names of source files without their folders, for the title of a figure."""
+    """Returns the names of source files without their folders, for the title of a figure."""
     names = [Path(file).name for file in files]
     if len(names) > _MOST_NAMES:
         return f"{names[0]} and {len(names) - 1} more"
@@ -122,7 +122,7 @@ def source_name(files: Iterable[str]) -> str:
 
 
 def _error_text(reference: NDArray[np.float64], other: NDArray[np.float64]) -> str:
-    """The NRMSE of the forces that a figure compares."""
+    """Returns the NRMSE of the forces that a figure compares."""
     spread = float(np.std(reference))
     error = float(np.sqrt(np.mean((other - reference) ** 2)))
     return f"NRMSE {number(error / spread) if spread else 'not defined'} on {len(reference)} rows"
@@ -134,9 +134,9 @@ def picture_verification(
     verified: Sequence[tuple[Recording, Verification]],
     identified_on: Sequence[Recording] = (),
 ) -> None:
-    """Measured and modelled force over position, residuals beneath; several recordings in one figure.
+    """Draws measured and modelled force over position, residuals below; several recordings in one figure.
 
-    With the recordings that the model was identified on, its 95 % band is drawn too, where it is known.
+    With the recordings that identified the model, it also draws the 95 % band if it is known.
     """
     from ..plotting import draw_measured_and_modelled
 
@@ -172,7 +172,7 @@ def picture_verification(
 def _standard_error(
     model: Model, identified_on: Sequence[Recording], drawn: Recording
 ) -> NDArray[np.float64] | None:
-    """Of the model's force at the rows that are drawn; None where it is not known."""
+    """Returns the standard error of the model's force at the drawn rows; None if unknown."""
     if not identified_on or (model.hysteretic and drawn.direction is None):
         return None
     try:
@@ -184,7 +184,7 @@ def _standard_error(
 
 
 def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
-    """Rendered force beside the model's own at the measured position, differences beneath."""
+    """Draws the rendered force and the model's force at the measured position, differences below."""
     from ..plotting import draw_measured_and_modelled
 
     modelled = force_at(plan, rendered.position, rendered.sample_period)
@@ -198,7 +198,7 @@ def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
 
 
 def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[ClosedLoop]) -> None:
-    """Recorded and rendered force over position, one panel for each closed loop of a recording."""
+    """Draws recorded and rendered force over position, one panel for each closed loop of a recording."""
     from ..plotting import draw_real_against_rendered
 
     height, rows = 0.5 + 2.2 * len(loops), (1.0,) * len(loops)
@@ -221,7 +221,7 @@ def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[Close
 
 
 def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, *, of: str) -> None:
-    """The force error of each structure that was rendered; `of` says what was rendered."""
+    """Draws the force error of each rendered structure; `of` describes the rendering."""
     from ..plotting import draw_structures
 
     shown = [(row.name, row.error) for row in rows if row.error is not None]
@@ -236,7 +236,7 @@ def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, 
 
 
 def picture_path(path: Path, model: Model) -> None:
-    """How a model was found: error of every network that was considered, its criterion beneath."""
+    """Draws the error of every considered network, the criterion below."""
     from ..plotting import draw_path
 
     if not model.path:

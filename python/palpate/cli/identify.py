@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate identify: recordings in, a model out."""
+"""palpate identify: identifies a model from recordings."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ from .verb import (
 )
 
 _READ_BY_PARTS = ("position", "force", "time", "direction", "units", "negate", "invalid")
-"""Reading options that make sense without all rows at once."""
+"""Reading options that do not need all rows at once."""
 
 
 def _text(value: Any) -> str:
-    """A default as it is written after NAME=."""
+    """Returns a default in the form after NAME=."""
     if isinstance(value, tuple):
         return ",".join(f"{number:g}" for number in value)
     return str(value).lower() if isinstance(value, bool) else str(value)
@@ -75,11 +75,11 @@ HELP = {
 }
 
 _METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE"}
-"""What the numbers of an option are."""
+"""Meaning of the numbers of an option."""
 
 
 def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> SearchOptions:
-    """Settings of the search, each as NAME=VALUE."""
+    """Returns settings of the search, each given as NAME=VALUE."""
     for value in values:
         if "=" not in value:
             raise click.BadParameter(f"{value!r} must be NAME=VALUE", ctx, param)
@@ -264,14 +264,14 @@ def _require_unused(**others: Any) -> None:
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
-    """RMSE over the standard deviation of the force, the rows of all recordings taken together."""
+    """Returns the RMSE over the standard deviation of the force, for the rows of all recordings together."""
     residual = np.concatenate([verification.residual for _, verification in verified])
     force = np.concatenate([recording.force[verification.rows] for recording, verification in verified])
     return float(np.sqrt(np.mean(residual**2)) / np.std(force))
 
 
 def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -> list[Compared]:
-    """The baselines, fitted to what is not held out."""
+    """Fits the baselines to the rows that are not held out."""
     if hold_out_every is None:
         raise click.UsageError("--baselines compares on held-out rows and needs --hold-out-every K")
     talk("fitting the baselines ...")
@@ -279,7 +279,7 @@ def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) 
 
 
 def _print_beside(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
-    """The model first, then the baselines."""
+    """Prints the model first, then the baselines."""
     rows = [("wavelet network", number(nrmse), str(n_parameters), f"{seconds:.2f}")]
     rows += [
         (each.name, "refused", "", "")

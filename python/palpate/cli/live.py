@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts that the verbs with a live device share: its options, the live line, the verdict of the session."""
+"""Parts for verbs with a live device: options, live line, verdict of the session."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ device_options = options(
         help="The simulated device has a force transducer.",
     ),
 )
-"""The measured device, and the object on the simulated one."""
+"""Options for the measured device and the object on the simulated one."""
 
 
 @contextmanager
 def live_line(rate_hz: float, units: tuple[str, str]) -> Iterator[LiveLine]:
-    """Yields a `LiveLine` while a device runs. A termination signal ends it as Ctrl-C does.
+    """Yields a `LiveLine` while a device runs. A termination signal acts like Ctrl-C.
 
     A refusal of the device is raised as InputError.
     """
@@ -75,7 +75,7 @@ class LiveLine:
         self._lower, self._upper = math.inf, -math.inf
 
     def show(self, rows: int, position: float, force: float, lost: int) -> None:
-        """Shows the present values."""
+        """Shows the current values."""
         self._lower, self._upper = min(self._lower, position), max(self._upper, position)
         self._line.show(
             f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The entry point: find the verb, run it, turn every ending into an exit code and at most one sentence."""
+"""Entry point: finds the verb, runs it, converts every ending to an exit code and at most one sentence."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _VERBS = {
     "show": "Print a model for a person.",
     "demo": "Identify, verify and render a simulated sample.",
 }
-"""Every verb with its line in the help; its file is imported only when it is used."""
+"""Every verb with its line in the help. Its file is imported only when it is used."""
 
 
 class _LazyVerbs(Verbs):
-    """A group whose commands live in the module of their name."""
+    """Group of commands, each in the module of its name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_VERBS)
@@ -73,7 +73,7 @@ def palpate() -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit code.
+    """Runs the command line and returns its exit code.
 
     0 done; 1 the work failed; 2 bad usage or bad input; 130 Ctrl-C, and the output does not exist. A failure
     is one sentence on standard error, or with --json {"error": "..."} on standard output.
@@ -91,5 +91,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = ending.code
     drop_what_cannot_be_written()
     if code == INTERRUPTED and arguments is None:
-        os._exit(code)  # taking down the libraries takes longer than a person waits
+        os._exit(code)  # unloading the libraries would take noticeably long
     return code

@@ -31,7 +31,7 @@ from .verb import PATH, json_option, plot_option, require_writable, verb
 
 
 class Samples(click.ParamType[int | str]):
-    """A number of samples, auto or off; the function that takes it checks the range."""
+    """A number of samples, auto or off. The called function checks the range."""
 
     name = "M|auto|off"
 
@@ -45,7 +45,7 @@ class Samples(click.ParamType[int | str]):
 
 
 class _PlanVerb(Verb):
-    """The verb, or the list of example profiles, which needs neither model nor device."""
+    """Verb or list of example profiles, which needs neither model nor device."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if "--examples" in args:
@@ -68,7 +68,7 @@ accepted. Nothing is written then.
 
 
 def _list_examples(*, as_json: bool) -> None:
-    """Print every example profile with its file and its sources."""
+    """Prints every example profile with its file and its sources."""
     examples = example_profiles()
     if as_json:
         print_json(
@@ -125,7 +125,7 @@ def plan(
     """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
-    require_writable(output, plot, inputs=(profile_path,))  # the model's own file may be written anew
+    require_writable(output, plot, inputs=(profile_path,))  # the model file may be replaced
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
@@ -173,7 +173,7 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
 
 
 def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
-    """Print the verdict, the plan, the refused structures, and every inequality."""
+    """Prints the verdict, the plan, the refused structures, and every inequality."""
     print_verdict(plan.verdict)
     file = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
     if plan.verdict.level == "no":
@@ -194,7 +194,7 @@ def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: 
 
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:
-    """Draw the root locus of the explicit structure."""
+    """Draws the root locus of the explicit structure."""
     from ..plotting import draw_root_locus
 
     title = f"model of {source_name(plan.model.data.files)}, explicit, on {profile.id}"

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The only place that writes text to standard output (results) and standard error (talk, progress).
+"""Output of text: results on standard output, notes and progress on standard error.
 
-Control characters are escaped here, so that no column name, file name or model can control a terminal. Lines
-are wrapped between words on a terminal only: files and programs get one line for each item. Paragraphs are
-wrapped everywhere.
+No other module writes to these streams. Control characters are escaped here, so that no column name, file
+name or model can control a terminal. On a terminal, lines are wrapped between words; files and programs get
+one line for each item. Paragraphs are always wrapped.
 """
 
 from __future__ import annotations
@@ -25,31 +25,30 @@ import click
 from ..verdict import Verdict
 
 WIDEST = 80
-"""Text wider than this is hard to read on any screen."""
+"""Largest readable width of text [columns]."""
 
 _NARROWEST_VALUE = 24
-"""Columns beside a name below which its value continues under the name instead."""
+"""Width after a name below which its value continues on the next line [columns]."""
 
 _EVERY_S = 10.0
-"""Seconds between two lines where standard error is no terminal."""
+"""Time between two lines if standard error is not a terminal [s]."""
 
 _REFRESH_S = 0.1
-"""Seconds between two states of the line on a terminal."""
+"""Time between two states of the line on a terminal [s]."""
 
 _NARROWEST_HELP = 30
-"""Columns that help takes at least."""
+"""Least width of help [columns]."""
 
 
 class OutputError(Exception):
-    """Standard output could not be written: one sentence."""
+    """Failure to write standard output: one sentence."""
 
 
 def prepare_streams() -> None:
-    """Make the three standard streams safe to use, whatever the caller did with them.
+    """Makes the three standard streams safe to use in any state.
 
-    A closed descriptor is taken, so that no file which is opened later gets its number. Writing to a closed
-    standard output fails like writing to a full disk does. A character that the encoding does not have is
-    written as its escape.
+    A closed descriptor is occupied, so that no file that is opened later gets its number. Writing to a closed
+    standard output then fails like writing to a full disk. A character outside the encoding is escaped.
     """
     for number in (0, 1, 2):
         try:
@@ -67,14 +66,14 @@ def prepare_streams() -> None:
 
 
 def visible(text: str) -> str:
-    """The text with every character that does not print as itself written as its escape."""
+    """Returns the text with non-printing characters escaped."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def terminal_width(*, err: bool = False) -> int | None:
-    """Columns to use on the terminal behind a stream, at most 80; None if the stream is not a terminal."""
+    """Returns the columns to use on the terminal of a stream, at most 80; None if it is not a terminal."""
     stream = sys.stderr if err else sys.stdout
     try:
         on_terminal = stream.isatty()
@@ -84,16 +83,16 @@ def terminal_width(*, err: bool = False) -> int | None:
 
 
 def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere: int | None = None) -> None:
-    """Print one item: a line, wrapped on a terminal with a hanging indent beyond its own.
+    """Prints one item: a line, wrapped on a terminal with an additional hanging indent.
 
-    `elsewhere` is the width where there is no terminal; None leaves the line as it is.
+    `elsewhere` is the width without a terminal; None does not wrap.
 
     Raises
     ------
     OutputError
         Standard output cannot be written. A standard error that cannot be written is ignored.
     BrokenPipeError
-        The reader of standard output has left.
+        The reader of standard output has ended.
     """
     shown = visible(text)
     width = terminal_width(err=err) or elsewhere
@@ -111,7 +110,7 @@ def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere
 
 
 def print_value(name: str, value: str, name_width: int) -> None:
-    """Print a name, padded, and its value; a long value continues below itself on a terminal."""
+    """Prints a padded name and its value; on a terminal a long value continues below itself."""
     width = terminal_width()
     hanging = name_width + 2
     if width is not None and width - hanging < _NARROWEST_VALUE:
@@ -120,7 +119,7 @@ def print_value(name: str, value: str, name_width: int) -> None:
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
-    """Write text as it is: for text that is known to hold no control character from outside."""
+    """Writes text unchanged. The text must not contain control characters from outside."""
     if err:
         with suppress(OSError):
             click.echo(text, err=True, nl=nl)
@@ -134,13 +133,13 @@ def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
 
 
 def end_line_on_terminal() -> None:
-    """Leave a line that is being overwritten on standard error."""
+    """Ends the current line on standard error."""
     if terminal_width(err=True) is not None:
         echo("", err=True)
 
 
 def drop_what_cannot_be_written() -> None:
-    """Leave the interpreter nothing to flush at exit: a full disk or a closed pipe was reported before."""
+    """Discards buffered output that cannot be written: a full disk or a closed pipe was already reported."""
     for stream, number in ((sys.stdout, 1), (sys.stderr, 2)):
         try:
             stream.flush()
@@ -149,12 +148,12 @@ def drop_what_cannot_be_written() -> None:
 
 
 def talk(sentence: str) -> None:
-    """Print a sentence for a person, on standard error."""
+    """Prints a sentence for the user on standard error."""
     print_line(sentence, err=True)
 
 
 def print_json(result: Mapping[str, Any]) -> None:
-    """Print one object on standard output, in ASCII; a number that is not finite becomes null."""
+    """Prints one object on standard output, in ASCII. NaN and infinity become null."""
     echo(json.dumps(_finite(result), allow_nan=False))
 
 
@@ -169,28 +168,28 @@ def _finite(value: Any) -> Any:
 
 
 def number(value: float) -> str:
-    """Four significant digits: what a person compares."""
+    """Returns a value with four significant digits."""
     return f"{value:.4g}"
 
 
 def print_numbers(rows: Mapping[str, str]) -> None:
-    """Print one line for each number: its name, aligned, and its value."""
+    """Prints one line for each number: aligned name and value."""
     width = max(map(len, rows))
     for name, value in rows.items():
         print_value(name, value, width)
 
 
 def print_verdict(verdict: Verdict) -> None:
-    """Print the verdict on standard output, before any number: its level, then a line for each reason."""
+    """Prints the verdict on standard output, before any number: its level, then a line for each reason."""
     print_line(f"verdict: {verdict.level}")
     for reason in verdict.reasons:
         print_paragraph(reason, indent="  ")
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table whose first column is text and whose others are numbers, aligned right.
+    """Prints a table whose first column is text and whose others are numbers, aligned right.
 
-    On a terminal that is too narrow the numbers stand on a line of their own, below the text.
+    On a terminal that is too narrow the numbers are on a separate line below the text.
     """
     lines = [[visible(cell) for cell in line] for line in (header, *rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(header))]
@@ -208,40 +207,40 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def print_paragraph(text: str, *, indent: str = "") -> None:
-    """Print text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
+    """Prints text wrapped to 80 columns or a narrower terminal, with a hanging indent of two columns."""
     print_line(indent + text, elsewhere=WIDEST)
 
 
 class OverwrittenLine:
-    """One line on a terminal that each new text replaces. Nothing is printed where there is no terminal."""
+    """Line on a terminal that each new text replaces. Without a terminal it prints nothing."""
 
     def __init__(self) -> None:
         self.on_terminal = sys.stderr.isatty()
         self._used = False
 
     def show(self, text: str) -> None:
-        """Replace the line, cut to the width of the terminal."""
+        """Replaces the line, cut to the width of the terminal."""
         if self.on_terminal:
             width = shutil.get_terminal_size().columns - 1
             echo(f"\r{visible(text):<{width}.{width}}", err=True, nl=False)
             self._used = True
 
     def clear(self) -> None:
-        """Remove the line."""
+        """Removes the line."""
         if self._used:
             self.show("")
             echo("\r", err=True, nl=False)
             self._used = False
 
     def end(self) -> None:
-        """Leave the line as it is and begin the next one."""
+        """Keeps the line and begins the next one."""
         if self._used:
             echo("", err=True)
             self._used = False
 
 
 class Progress:
-    """Prints how far some work is, with the seconds since it began."""
+    """Prints the state of some work and the seconds since it began."""
 
     def __init__(self, work: str) -> None:
         self._work = work
@@ -249,7 +248,7 @@ class Progress:
         self._start = self._shown = time.monotonic()
 
     def __call__(self, state: str) -> None:
-        """Report a state; it is printed if the last one was long enough ago."""
+        """Prints a state if the previous one is old enough."""
         now = time.monotonic()
         if now - self._shown >= (_REFRESH_S if self._line.on_terminal else _EVERY_S):
             self._shown = now
@@ -260,13 +259,13 @@ class Progress:
                 talk(text)
 
     def clear(self) -> None:
-        """Remove the line from a terminal."""
+        """Removes the line from a terminal."""
         self._line.clear()
 
 
 @contextmanager
 def progress(work: str) -> Iterator[Progress]:
-    """Give a `Progress` whose line is removed at the end, also when the work fails."""
+    """Yields a `Progress` whose line is removed at the end, also after an error."""
     shown = Progress(work)
     try:
         yield shown
@@ -275,7 +274,7 @@ def progress(work: str) -> Iterator[Progress]:
 
 
 class _Formatter(click.HelpFormatter):
-    """Click's formatter, except that it follows a terminal below 50 columns too."""
+    """Formatter of click that also follows a terminal below 50 columns."""
 
     def __init__(
         self, indent_increment: int = 2, width: int | None = None, max_width: int | None = None
@@ -292,12 +291,12 @@ class _Context(click.Context):
 
 
 class Verb(click.Command):
-    """A command with our help."""
+    """Command with the help format of palpate."""
 
     context_class = _Context
 
 
 class Verbs(click.Group):
-    """A group of commands with our help."""
+    """Group of commands with the help format of palpate."""
 
     context_class = _Context

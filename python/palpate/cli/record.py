@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate record: a real object becomes a recording."""
+"""palpate record: records a real object."""
 
 from __future__ import annotations
 

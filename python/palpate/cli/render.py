@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate render: a model rendered live, by the loop of palpate-control."""
+"""palpate render: renders a model live with the loop of palpate-control."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate show: a model for a person, by itself or beside another."""
+"""palpate show: prints a model, or compares it with another one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .verb import PATH, json_option, plot_option, require_writable, verb
 
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
           "slope_bounds", "data")  # fmt: skip
-"""Fields of the model file that --json repeats as they are."""
+"""Fields of the model file that --json prints unchanged."""
 
 
 @verb("palpate show press.json")
@@ -64,7 +64,7 @@ def show(model_file: Path, beside: Path | None, plot: Path | None, as_json: bool
 
 
 def _record(model: Model, file: Path) -> dict[str, Any]:
-    """What `show` prints, under the names of the model file."""
+    """Returns the printed values under the names of the model file."""
     content = model.to_dict()
     fit = {name: value for name, value in content["fit"].items() if name != "path"}
     return {
@@ -77,7 +77,7 @@ def _record(model: Model, file: Path) -> dict[str, Any]:
 
 
 def _plan_record(model: Model) -> dict[str, Any] | None:
-    """Structure, device and verdict of the plan in a model file."""
+    """Returns structure, device and verdict of the plan in a model file."""
     if model.plan is None:
         return None
     plan = Plan.of(model)
@@ -91,7 +91,7 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
 def _compare(
     model: Model, model_file: Path, other: Model, other_file: Path, *, plot: Path | None, as_json: bool
 ) -> None:
-    """Print how far two models are from each other, with a verdict on both and on their difference."""
+    """Prints the difference of two models, with a verdict on both and on their difference."""
     strokes = compare(model, other)
     verdict = model.verdict + other.verdict + _noticed(strokes)
     with finishing():
@@ -116,7 +116,7 @@ def _compare(
 
 
 def _noticed(strokes: tuple[Stroke, ...]) -> Verdict:
-    """A finding if a hand notices the difference between two models."""
+    """Returns a finding if a hand notices the difference between two models."""
     worst = max(stroke.worst for stroke in strokes)
     if worst <= 1.0:
         return GOOD

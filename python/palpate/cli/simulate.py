@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate simulate: a model rendered on a simulated device."""
+"""palpate simulate: renders a model on a simulated device."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def simulate(
 
 
 def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
-    """What was asked for; else the plan that stands in the model; else the default, which is told."""
+    """Returns the requested plan, else the plan in the model, else the default, which it reports."""
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:
             return Plan.of(model)

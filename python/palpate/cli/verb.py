@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts that verbs share: the command, its options, how a recording is read, checks of its outputs."""
+"""Parts that verbs share: the command, its options, reading of recordings, checks of outputs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
 
 _FIGURES = (".png", ".pdf", ".svg")
-"""Endings of figure files."""
+"""Suffixes of figure files."""
 
 _READ = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows", "zero",
          "force_late_s", "invalid")  # fmt: skip
@@ -35,7 +35,7 @@ _SCHEME = Scheme()
 def verb(
     example: str, *, cls: type[click.Command] = Verb, ends_at_once: bool = True, **settings: Any
 ) -> Callable[[Callable[..., Any]], click.Command]:
-    """Make a function a verb: a command whose help ends with an example.
+    """Converts a function to a verb: a command whose help ends with an example.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def verb(
     cls : type
         Class of the command.
     ends_at_once : bool
-        Ctrl-C ends the process also while a library computes; False where a device must be closed first.
+        Ctrl-C ends the process also while a library computes; False if a device must be closed first.
     settings
         Further arguments of `click.command`.
     """
@@ -57,7 +57,7 @@ def verb(
 
 
 def options(*each: Callable[[Any], Any]) -> Callable[[F], F]:
-    """Gives several options to a verb; its help lists them in this order."""
+    """Adds several options to a verb. Its help lists them in this order."""
 
     def decorate(command: F) -> F:
         for option in reversed(each):
@@ -70,7 +70,7 @@ def options(*each: Callable[[Any], Any]) -> Callable[[F], F]:
 def _names_and_units(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, str] | None:
-    """NAME=UNIT, as often as it was given."""
+    """Parses NAME=UNIT, which may be repeated."""
     units = {}
     for value in values:
         column, equals, unit = value.rpartition("=")
@@ -83,7 +83,7 @@ def _names_and_units(
 def _row_range(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[int | None, int | None] | None:
-    """START:STOP, either of which may be missing."""
+    """Parses START:STOP; both numbers are optional."""
     if value is None:
         return None
     start, colon, stop = value.partition(":")
@@ -98,12 +98,12 @@ def _row_range(
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """How the recordings of one run are read."""
+    """Options for reading the recordings of one run."""
 
     options: dict[str, Any] = field(default_factory=dict)
 
     def read(self, path: Path, inputs: Sequence[str] = ()) -> Recording:
-        """Read a recording with further inputs, and say first what was read and which columns were chosen."""
+        """Reads a recording with further inputs; first prints the file and the chosen columns."""
         recording = read_recording(path, inputs=inputs, **self.options)
         chosen, *others = recording.notes
         talk(f"read {path}: {len(recording)} rows; {chosen}")
@@ -158,7 +158,7 @@ _READING = options(
 
 
 def reading_options(command: F) -> F:
-    """Gives a verb the options of `read_recording`, as one argument `reading`."""
+    """Adds the options of `read_recording` to a verb as one argument `reading`."""
 
     @wraps(command)
     def invoke(*args: Any, **given: Any) -> Any:
@@ -215,27 +215,27 @@ scheme_options = options(
         help="Samples used to predict the position half a sample ahead, direct only; 0 = none.",
     ),
 )
-"""How a model is rendered: the fields of `Scheme`. What is not given is None and follows the model."""
+"""Options for the fields of `Scheme`. A missing one is None and follows the model."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
 def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
-    """Refuses, before the work, a name whose ending is no figure format."""
+    """Refuses, before the work, a name whose suffix is not a figure format."""
     if value is not None and value.suffix.lower() not in _FIGURES:
         raise InputError(f"{value} is no figure file; its name must end in {', '.join(_FIGURES)}")
     return value
 
 
 def plot_option(shows: str, name: str = "--plot") -> Callable[[F], F]:
-    """--plot PNG: draws a figure."""
+    """Returns the option --plot PNG, which draws a figure."""
     return click.option(
         name, type=PATH, metavar="PNG", default=None, callback=_figure_name, help=f"Draw {shows}."
     )
 
 
 def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) -> None:
-    """Refuses, before the work, results that could not be written at its end. None stands for no file.
+    """Refuses, before the work, results that could not be written at its end. None means no file.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate verify: a model beside a recording."""
+"""palpate verify: compares a model with a recording."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds devices, sets them up, checks them, and records an object on one."""
+"""USB devices: search, setup, check, and recording of an object."""
 
 from .check import Check, check_device, judge, with_pushes
 from .measuring import measure, record

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks a device: measurements, observations, and the verdict on rendering force with it."""
+"""Check of a device: measurements, observations, and the verdict on rendering force with it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .observations import Observation, compare, observe_at_rest
 from .pushes import Mechanics, Push, push_response
 
 LISTENING_SHARE = 0.7
-"""Share of the check in which the device makes no force; the rest is for the pushes [-]"""
+"""Share of the check without force; the rest is for the pushes [-]"""
 
 PUSH_SHARE = 0.005
 """Force of a push [share of the largest force of the device]"""
@@ -34,9 +34,9 @@ _SHORTEST_S = 2.0
 _DELAY_MARGIN = 0.05
 """Added to the measured delay, because the clocks of host and device drift [periods]"""
 _SEEN_STEPS = 5.0
-"""Least displacement from which a sign is read [encoder steps]"""
+"""Least displacement for a reliable sign [encoder steps]"""
 _SURE = 3.0
-"""Least displacement from which a sign is read [standard errors]"""
+"""Least displacement for a reliable sign [standard errors]"""
 _SIGN = "sign of the force"
 _SIMULATED_FRICTION = 0.002
 """Coulomb friction of the simulated device [share of its largest force]"""
@@ -50,9 +50,9 @@ class Check:
     observations: tuple[Observation, ...]
     numbers: Mapping[str, float | None]
     base: CoreProfile
-    """What the device states of itself, without its mechanics."""
+    """Properties that the device states, without its mechanics."""
     coulomb_friction: float | None = None
-    """Friction that was stated by the user [N or N*m]"""
+    """Friction that the user states [N or N*m]"""
 
     @property
     def suitable(self) -> bool:
@@ -61,16 +61,16 @@ class Check:
 
     @property
     def may_push(self) -> bool:
-        """True if a small force is allowed. A machine that is only late allows it."""
+        """True if a small force is allowed. A host that is only late allows it."""
         return not any(each.right is False and each.forbids_force for each in self.observations)
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on the device: no if an observation is wrong, usable if a property was not seen."""
+        """Verdict on the device: no if an observation is wrong, usable if a property was not observed."""
         return Verdict(tuple(each.finding for each in self.observations if each.finding))
 
     def profile(self) -> DeviceProfile:
-        """Returns the device as it was measured.
+        """Returns the measured device.
 
         Friction is a lower bound, as a certificate requires; encoder, force step and force limit are those
         that the device states.
@@ -78,7 +78,7 @@ class Check:
         Raises
         ------
         InputError
-            Its mechanics were not measured, or a sign is wrong.
+            The mechanics were not measured, or a sign is wrong.
         """
         if not self.may_push:
             raise InputError("there is no profile of a device that must not make force")
@@ -105,7 +105,7 @@ class Check:
         )
 
     def profile_notes(self) -> tuple[str, ...]:
-        """The origin of each number of the profile."""
+        """Origin of each number of the profile."""
         stated = self.coulomb_friction is not None
         friction = "stated, not measured" if stated else "measured, less its uncertainty: a lower bound"
         delay = "measured" if self.numbers["delay_s"] is not None else "not measured; assumed to be 0"
@@ -134,12 +134,12 @@ def check_device(
 ) -> Check:
     """Measures a device for some seconds and judges it.
 
-    First the device is disabled, and its rate, lost samples and encoder are measured. While the user moves
-    the handle against an object, the signs of its velocity and transducer are compared with its positions.
-    A reversed motor cannot be detected while the drive is disabled. With `push`, and only where the other
-    signs and the encoder are right, it is therefore enabled and pushes the free handle a little to either
-    side. Half a percent of its force shows the sign of the force, the delay, inertia and damping. Where a
-    sign is wrong there is no profile, and so nothing is certified for the device.
+    First the device is disabled, and its rate, lost samples and encoder are measured. The user moves the
+    handle against an object, and the signs of velocity and transducer are compared with the positions. A
+    reversed motor cannot be detected while the drive is disabled. With `push`, and only if the other signs
+    and the encoder are right, the drive is therefore enabled and pushes the free handle to both sides. Half a
+    percent of its force shows the sign of the force, the delay, inertia and damping. A wrong sign prevents a
+    profile, so nothing is certified for the device.
 
     Parameters
     ----------
@@ -156,9 +156,9 @@ def check_device(
     profile : DeviceProfile, optional
         The expected device.
     model : Model, optional
-        A model with a certificate: does it hold on this device?
+        Model with a certificate, which is checked for this device.
     coulomb_friction : float, optional
-        Friction of the device, where it is known and cannot be measured [N or N*m]; a lower bound.
+        Friction of the device if it is known and cannot be measured [N or N*m]; a lower bound.
     wait_s : float, optional
         Longest wait for a packet of a USB device [s].
     progress : callable, optional
@@ -167,7 +167,7 @@ def check_device(
     Raises
     ------
     InputError
-        The device cannot be used, or there is nothing to compare with: with the reason.
+        The device cannot be used, or there is nothing to compare with. The message gives the reason.
     """
     if duration_s < _SHORTEST_S:
         raise InputError(f"duration_s is {duration_s:g}, must be at least {_SHORTEST_S:g} to see anything")
@@ -181,7 +181,7 @@ def check_device(
         "wait_s": wait_s,
         "progress": progress,
         "keep": True,
-        "lowest_rate_share": 0.0,  # a low rate is an observation, and no reason to stop
+        "lowest_rate_share": 0.0,  # a low rate is an observation and does not stop the check
         "friction_share": _SIMULATED_FRICTION,
     }
     listened = measure(device, duration_s=duration_s * (LISTENING_SHARE if push else 1.0), **common)
@@ -204,12 +204,12 @@ def _with(check: Check, *added: Observation) -> Check:
 
 
 def judge(listened: Mapping[str, Any]) -> Check:
-    """Judges a device from measurements at no force.
+    """Judges a device from measurements without force.
 
     Parameters
     ----------
     listened : mapping
-        A summary of :func:`measure`, with its ticks under ``kept`` and the stated device under ``profile``.
+        A summary of :func:`measure`, with ticks in ``kept`` and the stated device in ``profile``.
     """
     base = listened["profile"]
     ticks = listened["kept"]
@@ -281,7 +281,7 @@ def _mechanics(mechanics: Mechanics, check: Check) -> list[Observation]:
 
 
 def _sign(push: Push, step: float) -> Observation:
-    """Judges if pushes moved the handle in the right direction."""
+    """Returns the observation that pushes moved the handle in the right or wrong direction."""
     text = f"a push moved the handle by {push.moved:.3g}, {push.unsure:.1g} unsure"
     if abs(push.moved) < max(_SEEN_STEPS * step, _SURE * push.unsure) or push.moved == 0.0:
         return Observation(_SIGN, f"not seen: {text}", None, "let go of the handle")
@@ -301,7 +301,7 @@ def _sign(push: Push, step: float) -> Observation:
 
 
 def _expected(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:
-    """The devices to compare with, by the name of the observation."""
+    """Returns the devices to compare with, by the name of the observation."""
     devices: dict[str, CoreProfile] = {} if profile is None else {"profile": profile}
     if model is not None:
         if model.certificate is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures on a device with the loop of the core: for `record` and `check-device`."""
+"""Measurements on a device with the loop of the core, for `record` and `check-device`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     object : Model, optional
         The object mounted on the simulated device.
     **settings
-        As :func:`palpate._core.run.measure` takes them.
+        Arguments of :func:`palpate._core.run.measure`.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     Raises
     ------
     InputError
-        Refused before any motion; the message states the device, the reason and the cure.
+        The measurement was refused before any motion; the message states the device, the reason and the cure.
     """
     if object is not None:
         if device != "simulated":
@@ -73,14 +73,14 @@ def record(
 ) -> dict[str, Any]:
     """Records position and force of a real object.
 
-    Without `probe` the user moves the handle. With it the device moves the handle slowly to and fro, and
-    turns round where the object holds `force_limit`. The force is that of the device's transducer. Without a
+    Without `probe` the user moves the handle. With `probe` the device moves the handle slowly to and fro, and
+    reverses if the force reaches `force_limit`. The force is that of the device's transducer. Without a
     transducer it is the force of the motor, which includes the friction of the device and needs the probe.
 
     Parameters
     ----------
     path : str or Path
-        The recording; it grows as path.part, which is locked while it grows.
+        The recording. Until it is complete it is path.part, which is locked.
     force : bool
         True: an existing recording is replaced. False: it is refused.
     device : str
@@ -88,7 +88,7 @@ def record(
     object : Model, optional
         The object mounted on the simulated device.
     probe : bool
-        True: the device moves the handle by itself.
+        True: the device moves the handle.
     duration_s, rate_hz : float
         Duration (inf: until Ctrl-C) [s] and sampling rate [Hz].
     transducer : bool
@@ -111,10 +111,10 @@ def record(
     Raises
     ------
     InputError
-        Refused before any motion.
+        The recording was refused before any motion.
     """
     if not probe:
-        lowest_rate_share = 0.0  # no force is made: a low rate is reported, and no reason to stop
+        lowest_rate_share = 0.0  # a low rate is reported but does not stop a recording without force
     if lowest_rate_share is not None:
         sweep["lowest_rate_share"] = lowest_rate_share
     return measure(

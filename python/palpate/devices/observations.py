@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges measurements of a device: its stream, encoder and signs at no force, and an expected profile."""
+"""Observations of a device: stream, encoder and signs without force, and an expected profile."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from ..verdict import Finding, no, usable
 _RATE_TOLERANCE = 0.01
 _CLOCK_TOLERANCE = 0.005
 _LATEST_PERIOD = 2.0
-"""p99.9 of the period, over the period asked for."""
+"""Largest p99.9 of the period over the requested period."""
 _LOST_SHARE = 1e-3
 _QUIET_STEPS = 2.0
-"""RMS of the encoder at rest, in its steps."""
+"""Largest RMS of the encoder at rest [encoder steps]."""
 _REST_S = 0.1
 """Length of a piece in which a handle may be at rest [s]."""
 _MOVED_STEPS = 50.0
-"""A handle that moved by less, in encoder steps, tells nothing of signs."""
+"""Least motion of the handle that gives reliable signs [encoder steps]."""
 _VELOCITY_SAMPLES = 50
-"""Over which a way is compared with a velocity."""
+"""Number of samples over which a displacement is compared with a velocity."""
 _VELOCITY_TOLERANCE = 0.25
 _CLEAR = 0.3
-"""Correlation of force and position from which on a sign is clear."""
+"""Least correlation of force and position for a clear sign."""
 
 _STEP_TOLERANCE = 0.01
 _DAMPING_TOLERANCE = 0.1
-"""Measured damping and friction may be below those counted on by this share: noise is in them."""
+"""Share by which measured damping and friction may be below the expected ones, because of noise."""
 
 _CABLE = "try another cable, another port, or no hub"
 
 
 @dataclass(frozen=True)
 class Observation:
-    """One property of a device that was examined."""
+    """One examined property of a device."""
 
     name: str
     text: str
@@ -48,11 +48,11 @@ class Observation:
     """True: right; False: wrong; None: not judged"""
     advice: str = ""
     forbids_force: bool = False
-    """True if no force may follow where this is wrong"""
+    """True if a wrong property forbids any force"""
 
     @property
     def finding(self) -> Finding | None:
-        """The finding for a verdict; None if the observation is right or needs no advice."""
+        """Finding for a verdict; None if the observation is right or needs no advice."""
         if self.right or (self.right is None and not self.advice):
             return None
         return (usable if self.right is None else no)(
@@ -61,7 +61,7 @@ class Observation:
 
 
 def observe_at_rest(listened: Mapping[str, Any]) -> list[Observation]:
-    """Judges a summary of `measure` with its ticks, taken at no force."""
+    """Judges a summary of `measure` with its ticks, measured without force."""
     ticks, wanted = listened["kept"], listened["wanted_rate_hz"]
     step = listened["profile"].encoder_step
     observations = [
@@ -115,7 +115,7 @@ def _period(period: Mapping[str, float], wanted: float) -> Observation:
 
 
 def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
-    """The device's own clock between samples that follow each other."""
+    """Judges the device's clock between consecutive samples."""
     steps = np.diff(ticks["device_time"])[np.diff(ticks["sequence"].astype(np.int64)) == 1]
     if not steps.size:
         return Observation("clock of the device", "no two samples in a row", False, _CABLE)
@@ -139,7 +139,7 @@ def _losses(listened: Mapping[str, Any]) -> Observation:
 
 
 def _encoder(position: Float1D, step: float, rate_hz: float) -> Observation:
-    """Noise in the stillest piece of the recording; a parabola is taken out, since hands drift."""
+    """Judges the noise in the quietest piece. A parabola is subtracted, because hands drift."""
     length = max(10, round(_REST_S * rate_hz))
     pieces = position[: len(position) // length * length].reshape(-1, length)
     if not len(pieces):
@@ -158,7 +158,7 @@ def _encoder(position: Float1D, step: float, rate_hz: float) -> Observation:
 
 
 def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
-    """The velocity beside the way that it should explain: damping of a wrong sign would give energy."""
+    """Compares the velocity with the displacement: damping of a wrong sign would give energy."""
     name = "sign of the velocity"
     position, time, velocity = (np.asarray(ticks[key]) for key in ("position", "device_time", "velocity"))
     if np.ptp(position) < _MOVED_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
@@ -177,7 +177,7 @@ def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
 
 
 def _transducer(position: Float1D, measured: Float1D, step: float) -> Observation:
-    """An object that is pressed pushes back: its force grows with position, where it changes at all."""
+    """Judges the sign of the transducer: the force of a pressed object grows with position."""
     name = "sign of the transducer"
     if np.ptp(position) < _MOVED_STEPS * step or np.ptp(measured) == 0.0:
         return Observation(name, "not seen", None, "move the handle against an object while this runs")
@@ -202,7 +202,7 @@ def compare(expected: DeviceProfile, measured: Mapping[str, float | None], *, na
         The profile, or the device of a certificate.
     measured : mapping
         ``period_s``, ``jitter_s``, ``delay_s``, ``encoder_step``, ``force_limit``,
-        ``viscous_damping``, ``coulomb_friction``; None where it was not measured.
+        ``viscous_damping``, ``coulomb_friction``; None if it was not measured.
     name : str
         Name of the observation.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads sign, delay, inertia, damping and Coulomb friction from the motion of a pushed handle."""
+"""Sign, delay, inertia, damping and Coulomb friction from the motion of a pushed handle."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class Mechanics:
     friction: float
     """f_c, Coulomb [N or N*m]"""
     friction_unsure: float
-    """Standard error of `friction`; 0 where it was known before [N or N*m]"""
+    """Standard error of `friction`; 0 if it was given [N or N*m]"""
 
     @property
     def friction_at_least(self) -> float:
-        """Lower bound of the friction for a certificate: less by the uncertainty of the fit."""
+        """Lower bound of the friction for a certificate, reduced by the uncertainty of the fit."""
         if self.friction_unsure == 0.0:
             return self.friction
         return max(0.0, (1.0 - _RESERVE) * self.friction - _SURE * self.friction_unsure)
@@ -78,15 +78,15 @@ class Push:
     mechanics: Mechanics | None
     """Inertia, damping and friction; None if they cannot be fitted"""
     unseen: str = ""
-    """The reason why they cannot be fitted"""
+    """Reason why they cannot be fitted"""
 
 
 def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction: float | None = None) -> Push:
-    """Reads sign, delay and mechanics from the ticks of alternating pushes.
+    """Computes sign, delay and mechanics from the ticks of alternating pushes.
 
-    A force F > 0 pushes towards smaller positions. A displacement is counted from the motion that the handle
-    would have made without the push, because a hand may hold it. Everything but the delay is in the device's
-    own time, so a late host does not matter.
+    A force F > 0 pushes towards smaller positions. A displacement is the difference to the motion without the
+    push, because a hand may hold the handle. All results except the delay use the device's clock, so a late
+    host has no effect.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     encoder_step : float
         [m or rad]
     friction : float, optional
-        Coulomb friction of the device, where it is known [N or N*m].
+        Coulomb friction of the device, if known [N or N*m].
     """
     fresh = np.concatenate(([True], np.diff(ticks["sequence"].astype(np.int64)) > 0))
     sent, applied, position, time = (
@@ -104,7 +104,7 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     ways: list[float] = []
     sizes: list[float] = []
     obedience = 0.0
-    # A reading reports the force that acted until it was taken: a push begins one reading earlier.
+    # A reading reports the force that acted until then: a push begins one reading earlier.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     for begin in begins[begins > 2]:  # the motion before the first push is unknown
@@ -128,14 +128,14 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
 
 
 def _distance(time: Float1D, position: Float1D, begin: int, held: int) -> float:
-    """Displacement of a push from the motion before it, a parabola because hands are slow."""
+    """Returns the displacement of a push from the previous motion, a parabola because hands are slow."""
     before, end = slice(max(0, begin - 2 * held), begin + 1), min(begin + held, len(position) - 1)
     hand = np.polynomial.Polynomial.fit(time[before], position[before], 2)
     return float(position[end] - hand(time[end]))
 
 
 def _delay(ticks: Mapping[str, Any]) -> int | None:
-    """Samples from a command to the first reading whose force is it, less the one that each command takes."""
+    """Returns the samples from a command to the first reading with its force, minus the usual one."""
     sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
     begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
     delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]
@@ -204,7 +204,7 @@ def _mechanics(
 
 
 def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2D, Float2D, Float2D]:
-    """Force (p, n), displacement (p, n + 1) and duration (p, n) of each push and an equal time after it."""
+    """Returns force (p, n), displacement (p, n + 1), duration (p, n) of each push and an equal time after."""
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     ends = np.flatnonzero(~pushing[1:] & pushing[:-1])
@@ -216,7 +216,7 @@ def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2
 
 
 def _start(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, float]:
-    """Logarithms of J and b, from the impulse, displacement and duration of a push."""
+    """Returns the logarithms of J and b from the impulse, displacement and duration of a push."""
     impulse = float(np.median(np.abs((applied * seconds).sum(axis=1))))
     way = float(np.median(np.abs(moved).max(axis=1)))
     duration = float(np.median(seconds.sum(axis=1)))
@@ -224,7 +224,7 @@ def _start(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, f
 
 
 def _way(applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float) -> Float2D:
-    """Displacement (p, n + 1) of a handle at rest under forces (p, n) held for durations, in closed form."""
+    """Returns the displacement (p, n + 1) of a handle at rest under held forces (p, n), in closed form."""
     way = np.zeros((len(applied), applied.shape[1] + 1))
     velocity = np.zeros(len(applied))
     decay = inertia / damping

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists USB devices over pyusb, reads their identity, sets them up, and installs their udev rule.
+"""USB devices over pyusb: search, identity, setup, and udev rule.
 
-The stream of samples needs both directions at once, which pyusb cannot do: the core reads it.
+The core reads the stream of samples, because pyusb cannot transfer in both directions at once.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _TIMEOUT_MS = 500
 
 
 class DeviceError(Exception):
-    """A device that cannot be used: one sentence that names it, the reason and the likely cure."""
+    """Failure of a device: one sentence with its name, the reason and the likely cure."""
 
 
 def device_error(device: str, doing: str, error: Any) -> DeviceError:
-    """The sentence for an error of pyusb while `doing` something with `device`."""
+    """Returns the sentence for an error of pyusb while `doing` something with `device`."""
     cause = core.usb_cause(getattr(error, "backend_error_code", None) or 0)
     said = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return DeviceError(f"{device}, {doing}: {cause or f'{said}; plug it in again'}")
@@ -45,17 +45,17 @@ def _pyusb() -> ModuleType:
 
 
 class UsbSetup:
-    """Sets up one USB device. It is a context manager, which releases the device at the end.
+    """Sets up one USB device. As a context manager it releases the device at the end.
 
     Parameters
     ----------
     handle : usb.core.Device
-        As pyusb found it.
+        Handle from pyusb.
 
     Raises
     ------
     DeviceError
-        From every method: names the device, the action, the reason and the likely cure.
+        Raised by every method; names the device, the action, the reason and the likely cure.
     """
 
     def __init__(self, handle: Any) -> None:
@@ -90,11 +90,11 @@ class UsbSetup:
         return info
 
     def zero(self) -> None:
-        """Makes the present position 0."""
+        """Sets the current position to 0."""
         self._request(UsbRequest.Zero, "zeroing its encoder")
 
     def set_watchdog(self, milliseconds: int) -> None:
-        """Sets the time for which the device makes force without a command, 2 to 1000 ms."""
+        """Sets the time for which the device holds its force without a command, 2 to 1000 ms."""
         if not core.shortest_watchdog_ms <= milliseconds <= core.longest_watchdog_ms:
             raise InputError(f"watchdog is {milliseconds} ms, must be 2 to 1000")
         self._request(UsbRequest.Watchdog, "setting its watchdog", value=milliseconds)
@@ -108,7 +108,7 @@ class UsbSetup:
         self._request(UsbRequest.Enable, "disabling its force", value=0)
 
     def clear(self) -> None:
-        """Clears faults; after an emergency stop this comes before `enable`."""
+        """Clears faults; required before `enable` after an emergency stop."""
         self._request(UsbRequest.Clear, "clearing its faults")
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ class UsbSetup:
         return bytes(answer) if size else b""
 
     def _string(self, index: int) -> str:
-        """A string descriptor without control characters; empty if the device has none."""
+        """Returns a string descriptor without control characters; empty if the device has none."""
         import usb.util
 
         try:
@@ -145,7 +145,7 @@ class UsbSetup:
 
 @dataclass(frozen=True)
 class Found:
-    """A device on the bus: its identity, or the reason why it cannot be read."""
+    """Device on the bus: its identity, or the reason why it cannot be read."""
 
     place: str
     product: str
@@ -175,7 +175,7 @@ def _candidates() -> Iterator[UsbSetup]:
 
 
 def find_devices() -> list[Found]:
-    """Finds every haptic USB device, the unusable ones with their reason.
+    """Finds every haptic USB device, unusable ones with the reason.
 
     Raises
     ------
@@ -205,7 +205,7 @@ def open_usb(serial: str = "") -> UsbSetup:
     Raises
     ------
     DeviceError
-        There is no device, there are several, or it cannot be used: with the reason.
+        There is no device, there are several, or it cannot be used. The message gives the reason.
     """
     usable: list[UsbSetup] = []
     problems: list[str] = []
@@ -252,7 +252,7 @@ def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
     Raises
     ------
     DeviceError
-        Without root, or if the system refuses; the message states the cure.
+        The user is not root, or the system refuses. The message states the cure.
     """
     target = folder / RULE
     if not folder.is_dir():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models on disk and in memory: JSON with a published schema, numbers to the last bit."""
+"""Models in memory and on disk: JSON with a published schema, numbers exact to the last bit."""
 
 from .model import Model, load_model
 from .model_file import Fit, PathStep

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model: an identified environment, with everything that says where it came from."""
+"""Model: an identified environment with its origin."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..verdict import Verdict
 from .model_file import Fit, PathStep, describe, write_json
 
 _HELD_OUT = "held_out_every"
-"""Note under which a file says that every k-th row of the data was not used."""
+"""Key in the notes of a file: every k-th row of the data was not used."""
 
 _NUMBERS = ("bias", "bias_hysteresis", "period", "play_radius")
 """Arguments that are one number."""
@@ -44,8 +44,8 @@ class Model(ForceModel):
     kind : {"position", "hysteresis", "position_velocity", "general"}
         "hysteresis": f(x, s) = g(x) + s h(x).
     inputs : sequence of str
-        One name for each dimension of the network, such as ("position",); the direction of a hysteresis model
-        is none of them.
+        One name for each dimension of the network, such as ("position",); without the direction of a
+        hysteresis model.
     units : mapping
         {"position": "rad" | "m" | "count" | "", "force": "N*m" | "N" | "A" | ""}.
     alpha, beta : (N, d) array_like
@@ -56,28 +56,28 @@ class Model(ForceModel):
     weight_hysteresis, linear_hysteresis, bias_hysteresis : optional
         (N,), (d,) and a number: h, on the wavelets of g; all three or none.
     lower, upper : (d,) array_like
-        Domain: the box that the data covered.
+        Domain: the box that the data covers.
     below, above : {"linear", "free"}
         Continuation outside the domain.
     period : float, optional
         Period of a model that repeats.
     play_radius : float, optional
-        Play radius of the hysteresis [m or rad], where it is known.
+        Play radius of the hysteresis [m or rad], if known.
     fit : Fit
-        How the identification ended.
+        Result of the identification.
     data : Source
-        What it was identified on.
+        Data of the identification.
     mass, damping : float, optional
-        Mass and viscous damping that were fitted beside the force.
+        Mass and viscous damping that were fitted with the force.
     slope_bounds : (min, max), optional
-        Of df/dx over the domain; measured when not given (d = 1).
+        Bounds of df/dx over the domain; computed by default (d = 1).
     plan, certificate : mapping, optional
-        How the model is to be rendered, and what was proved of that. A certificate is computed again, and
-        refused where it says anything else.
+        Plan of the rendering and its certificate. The certificate is computed again, and refused if it
+        differs.
     notes : mapping, optional
-        Anything else worth keeping in the file.
+        Further information to keep in the file.
     created_by : str, optional
-        Who wrote the file; this palpate when not given.
+        Program that wrote the file; by default this palpate.
 
     Raises
     ------
@@ -166,15 +166,15 @@ class Model(ForceModel):
         upper: npt.ArrayLike,
         **arguments: Any,
     ) -> Model:
-        """A model of given numbers that was not identified.
+        """Returns a model from given numbers, without identification.
 
         Parameters
         ----------
         alpha, beta, weight, lower, upper : array_like
             As for Model.
         **arguments
-            Any other argument of Model. Defaults: no linear part, no bias, SI units that are not stated, and
-            the kind and input names that follow from the shapes.
+            Any other argument of Model. Defaults: no linear part, no bias, unstated SI units, and the kind
+            and input names that follow from the shapes.
 
         Raises
         ------
@@ -196,27 +196,27 @@ class Model(ForceModel):
 
     @property
     def n_parameters(self) -> int:
-        """Every fitted real number, dilations and translations included."""
+        """Number of fitted real numbers, dilations and translations included."""
         return self.fit.n_parameters
 
     @property
     def stop_reason(self) -> str:
-        """Why identification stopped adding wavelets."""
+        """Reason why identification stopped adding wavelets."""
         return self.fit.stop_reason
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict of the identification: "good", or "usable" or "no" with the reasons.
+        """Verdict of the identification: "good", or "usable" or "no" with the reasons.
 
         ``model.verdict.level`` is the word, ``model.verdict.reasons`` are sentences with value, likely cause
-        and cure, ``str(model.verdict)`` is both. A model that states none is "good".
+        and cure, ``str(model.verdict)`` is both. A model without findings is "good".
         """
         record = self.notes.get("verdict", ())
         return Verdict.from_record(record if isinstance(record, list) else ())
 
     @property
     def path(self) -> Sequence[PathStep]:
-        """What identification considered: number of wavelets against error and criterion."""
+        """Networks that identification considered: number of wavelets, error and criterion."""
         return self.fit.path
 
     @property
@@ -226,17 +226,17 @@ class Model(ForceModel):
 
     @property
     def planned(self) -> Model:
-        """The model that the plan renders: this one, or the one with the network of the plan."""
+        """Model that the plan renders: this one, or the one with the network of the plan."""
         network = None if self.plan is None else self.plan["network"]
         return self if network is None else self.with_network(**network)
 
     def with_network(self, **network: Any) -> Model:
-        """This model with other numbers in its network, without plan, certificate and slope bounds.
+        """Returns this model with other network numbers, without plan, certificate and slope bounds.
 
         Parameters
         ----------
         **network
-            alpha, beta, weight, ..., as they stand in a model file; what is not given stays.
+            alpha, beta, weight, ..., as in a model file; missing ones do not change.
         """
         content = self.to_dict()
         content["network"].update(network)
@@ -247,7 +247,7 @@ class Model(ForceModel):
         return Model.from_dict(content)
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of a model file."""
+        """Returns the content of a model file."""
         notes = dict(self.notes)
         if self.data.held_out_every:
             notes[_HELD_OUT] = self.data.held_out_every
@@ -291,7 +291,7 @@ class Model(ForceModel):
 
     @classmethod
     def from_dict(cls, content: Any) -> Model:
-        """A model from the content of a model file.
+        """Returns a model from the content of a model file.
 
         Raises
         ------
@@ -322,12 +322,12 @@ class Model(ForceModel):
         )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the model file; it appears under its name only when it is complete.
+        """Writes the model file. It gets its name only when it is complete.
 
         Raises
         ------
         InputError
-            The folder does not exist or cannot be written, or a field holds what a model file cannot.
+            The folder does not exist or cannot be written, or a model file cannot store a field.
         """
         target = path_of("path", path)
         content = self.to_dict()
@@ -338,7 +338,7 @@ class Model(ForceModel):
         return Model.from_dict, (self.to_dict(),)
 
     def __eq__(self, other: object) -> bool:
-        """True if both would give the same model file."""
+        """Returns True if both would give the same model file."""
         return self._text() == other._text() if isinstance(other, Model) else NotImplemented
 
     def __hash__(self) -> int:
@@ -355,7 +355,7 @@ class Model(ForceModel):
 
 
 def _require_numbers(name: str, value: object) -> None:
-    """Refuse an argument of a network that is not made of real numbers."""
+    """Refuses a network argument that is not made of real numbers."""
     if value is None and name in _OPTIONAL:
         return
     try:
@@ -371,20 +371,20 @@ def _require_numbers(name: str, value: object) -> None:
 
 
 def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model:
-    """Read a model file.
+    """Reads a model file.
 
     Parameters
     ----------
     path : str or path
         The file.
     with_plan : bool
-        False leaves plan and certificate out, and unread: to plan a model again that was changed.
+        False ignores plan and certificate, for example to plan a changed model again.
 
     Raises
     ------
     InputError
-        The file is not there or not JSON, or a field is missing, unknown or wrong: one sentence with the
-        file's name, the field's path and the value.
+        The file does not exist or is not JSON, or a field is missing, unknown or wrong. The message gives the
+        file, the path of the field and the value.
     """
     file = path_of("path", path)
     require_file(file)

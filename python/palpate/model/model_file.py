@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A model as text: the parts of its file beside the network, and its description for a person.
+"""Text of a model: the parts of its file except the network, and a readable description.
 
 The core reads and checks model files; `model.schema.json` describes them.
 """
@@ -17,7 +17,7 @@ from ..errors import visible
 from ..recording.files import replacing
 
 _OPENED = ("network", "fit", "plan", "certificate")
-"""Objects whose fields get a line each, as those of the file do."""
+"""Objects with one line for each field in the file."""
 
 
 class PathStep(TypedDict):
@@ -26,26 +26,26 @@ class PathStep(TypedDict):
     n_wavelets: int
     rmse: float
     criterion: float | None
-    """Value of the stopping rule, the smaller the better; None where the rule gives none"""
+    """Value of the stopping rule, smaller is better; None if the rule has no value"""
     model_class: str
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How an identification ended."""
+    """Result of an identification."""
 
     model_class: str
-    """The simplest model class that was accepted: constant, linear, position, hysteresis, ..."""
+    """Simplest accepted model class: constant, linear, position, hysteresis, ..."""
     stop_reason: str
     nrmse: float
-    """RMSE over the population standard deviation of the force, on the rows it was identified on"""
+    """RMSE over the population standard deviation of the force, on the rows of the identification"""
     n_wavelets: int
     n_parameters: int
-    """Every fitted real number, dilations and translations included"""
+    """Number of fitted real numbers, dilations and translations included"""
     path: Sequence[PathStep] = ()
 
     def record(self) -> dict[str, Any]:
-        """The fit in a model file, with numbers of NumPy as those of Python."""
+        """Returns the fit for a model file, with NumPy numbers converted to Python."""
         return {
             "model_class": self.model_class,
             "stop_reason": self.stop_reason,
@@ -65,7 +65,7 @@ class Fit:
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
-    """The certificate in a model file. Its scheme stands in the plan."""
+    """Returns the certificate for a model file. Its scheme is stored in the plan."""
     record = certificate.to_dict()
     del record["scheme"]
     return {
@@ -78,7 +78,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> Path:
-    """Writes `content` so that a person can read it; the file appears when it is complete."""
+    """Writes readable JSON; the file appears when it is complete."""
     with replacing(path) as temporary:
         temporary.write_text(f"{_lines(content, '')}\n", encoding="utf-8")
     return path
@@ -99,7 +99,7 @@ if TYPE_CHECKING:
 
 
 def describe(model: Model) -> str:
-    """Verdict, terms, domain, units and history of a model."""
+    """Returns verdict, terms, domain, units and history of a model as text."""
     position, force = (model.units[role] or "SI" for role in ("position", "force"))
     fit, data = model.fit, model.data
     lines = [
@@ -132,7 +132,7 @@ def describe(model: Model) -> str:
 
 
 def _terms(model: Model, force: str) -> list[str]:
-    """The force as a formula, and its wavelets as a table."""
+    """Returns the force as a formula, and its wavelets as a table."""
     names = ["x"] if model.dimension == 1 else [f"x{k + 1}" for k in range(model.dimension)]
     linear = " ".join(f"{c:+.6g} {name}" for c, name in zip(model.linear, names, strict=True))
     network = "sum_i w_i psi(alpha_i (x - beta_i)) " if model.n_wavelets else ""

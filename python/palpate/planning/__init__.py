@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans how a model is rendered on a device, and simulates the plan.
+"""Planning and simulation: how a model is rendered on a device.
 
-Model and device -> candidate structures, the simplest first (`candidates`, with `limited_network` where the
+Model and device -> candidate structures, the simplest first (`candidates`, with `limited_network` if the
 device is too weak) -> certificate -> `Plan` with its force error, or the reasons of the refusal with the
 device property that would help. `search` runs these steps. `simulation` renders a plan in virtual time.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Candidate structures for a model on a device, the simplest first: each is certified or refused."""
+"""Candidate structures for a model on a device, the simplest first. Each is certified or refused."""
 
 from __future__ import annotations
 
@@ -31,25 +31,26 @@ from .limited_network import (
 from .plan import static_force_error, with_network
 
 _COUPLING_DAMPING = 0.2
-"""Coupling damping of a structure with mass where nothing else sets it [share of the device's damping]"""
+"""Default coupling damping of a structure with mass [share of the device's damping]"""
 
 _WIDER_PLAY = 1.02
 """Play radius that is tried if the computed one is just refused [share of the computed one]"""
 
 _PREDICTIONS = (1, 2, 4, 8, 16)
-"""Samples tried for a prediction. Few react faster, with less force error; many need less damping [-]"""
+"""Samples tried for a prediction. Few give less delay and force error; many need less damping [-]"""
 
 _LATE_TICK = 1.25
-"""Time between two samples for which a chosen prediction must hold, unless none is certified that long
-[longest time between samples of the device]"""
+"""Time between two samples for which a chosen prediction must be certified, unless none is
+[longest time between samples of the device]
+"""
 
 _LEAST_HYSTERESIS = 1.0 / 64.0
-"""Smallest share of h that is still worth rendering [-]"""
+"""Smallest share of h that is rendered [-]"""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A network, the scheme that renders it, and what is proved of both on a device."""
+    """Network, its scheme, and the certificate of both on a device."""
 
     rendered: ForceModel
     certificate: Certificate
@@ -61,14 +62,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Refusal:
-    """The reason why a structure does not apply."""
+    """Reason why a structure does not apply."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class Task:
-    """A model, a device, and the caller's requirements in the model's units."""
+    """Model, device, and the caller's requirements in the model's units."""
 
     model: ForceModel
     device: DeviceProfile
@@ -80,7 +81,7 @@ class Task:
     """Object damping"""
     play_radius: float | None = None
     predict: int | None = None
-    """Samples of the prediction; 0: none; None: chosen"""
+    """Samples of the prediction. 0: none; None: chosen by the plan"""
     may_limit: bool = True
     """True if a limited network may be rendered in place of the identified one"""
 
@@ -105,12 +106,12 @@ class Task:
         return self.play_radius or default_play_radius(self.model, self.device.encoder_step)
 
     def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
-        """A scheme for the model, or for a network in its place, with its certificate."""
+        """Returns a scheme for the model, or for a network in its place, with its certificate."""
         rendered = rendered or self.model
         return Candidate(rendered, certify(rendered, scheme, self.device))
 
     def direct_scheme(self, rendered: ForceModel) -> Scheme:
-        """The direct structure; it has the narrowest play that is certified for a network."""
+        """Returns the direct structure with the narrowest play radius that is certified for a network."""
         radius = self.play_radius or 0.0
         if self.chooses_play:
             radius = min(play_radius_for(rendered, self.device), self.longest_play)
@@ -128,11 +129,11 @@ class Task:
         return Refusal(f"the object has {' and '.join(parts)}, which it would leave out")
 
     def not_direct(self) -> Refusal | None:
-        """Refuses direct rendering for an object with mass, or where a coupling is required."""
+        """Refuses direct rendering for an object with mass, or if a coupling is required."""
         return self.not_static() or (Refusal("a coupling was asked for") if self.coupling else None)
 
     def only_direct(self) -> Refusal | None:
-        """Refuses a prediction, which only the direct structure of the identified model has."""
+        """Refuses a prediction: only the direct structure of the identified model supports it."""
         if not self.predict:
             return None
         return Refusal(
@@ -144,12 +145,12 @@ _NOT_LIMITED = Refusal("the model is to be rendered as it was identified")
 
 
 def _direct(task: Task) -> Candidate | Refusal:
-    """The model as it was identified."""
+    """Renders the identified model without changes."""
     if refusal := task.not_direct():
         return refusal
     found = task.certified(task.direct_scheme(task.model))
     if found.certificate.refused and task.chooses_play:
-        # Bounds of the sum g' + h / r can be wider than the sum of the bounds, from which r was chosen.
+        # Bounds of the sum g' + h / r can be wider than the sum of the bounds, which gave r.
         wider = min(_WIDER_PLAY * found.scheme.play_radius, task.longest_play)
         again = task.certified(_direct_with(wider, found.scheme.predict))
         found = found if again.certificate.refused else again
@@ -157,7 +158,7 @@ def _direct(task: Task) -> Candidate | Refusal:
 
 
 def _direct_limited(task: Task) -> Candidate | Refusal:
-    """The nearest force that the device can render."""
+    """Renders the nearest force that the device can render."""
     if refusal := task.not_direct():
         return refusal
     if not task.may_limit:
@@ -178,7 +179,7 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
 
 
 def _massless(task: Task) -> Candidate | Refusal:
-    """The model behind a coupling whose spring has been taken out of it, slopes limited as that requires."""
+    """Renders the model minus the coupling's spring behind the coupling, with limited slopes."""
     if refusal := task.not_static():
         return refusal
     if not task.coupling:
@@ -216,7 +217,7 @@ def _massless(task: Task) -> Candidate | Refusal:
 
 
 def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
-    """The model with its mass behind a coupling."""
+    """Renders the model with its mass behind a coupling."""
     if not task.dynamic:
         return Refusal("the object has no mass or damping of its own")
     if not task.mass:
@@ -242,7 +243,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
 
 
 def _explicit(task: Task) -> Candidate | Refusal:
-    """The paper's structure: stable at best."""
+    """Renders with the structure of the paper, which is stable at best."""
     if refusal := task.only_direct():
         return refusal
     scheme = explicit_scheme(
@@ -261,7 +262,7 @@ Propose = Callable[[Task], Candidate | Refusal]
 
 
 def _of_position(propose: Propose) -> Propose:
-    """The candidate structure, refused for a force of velocity."""
+    """Returns the candidate structure with a refusal of forces that depend on velocity."""
 
     def guarded(task: Task) -> Candidate | Refusal:
         if not task.model.of_velocity:
@@ -307,10 +308,10 @@ def _direct_with(play_radius: float, predict: int) -> Scheme:
 
 
 def _predicted(found: Candidate, task: Task) -> Candidate:
-    """The same with the fewest samples of prediction that are certified; without where none are.
+    """Adds a prediction with the fewest certified samples; returns `found` if none is certified.
 
-    A prediction spends damping, and with it the time that a tick may be late: it must leave `_LATE_TICK`, or
-    the time without it. Where nothing is certified without a prediction, any that is certified is taken.
+    A prediction needs damping, which shortens the allowed delay of a tick. That time must remain
+    `_LATE_TICK`, or the time without prediction. If only predictions are certified, any is allowed.
     """
     if task.predict is not None or task.model.of_velocity:
         return found
@@ -331,7 +332,7 @@ def _no_slope(device: DeviceProfile) -> Refusal:
 
 
 def _within(model: ForceModel, low: float, high: float, device: DeviceProfile) -> ForceModel | None:
-    """The model itself where its slopes lie within limits, else the nearest that does; balanced."""
+    """Returns the model if its slopes are within limits, else the nearest one that is, balanced; or None."""
     limited = model if _fits(model, low, high) else limit_slopes(model, low, high)
     return None if limited is None else _balanced(limited, device)
 
@@ -342,13 +343,13 @@ def _fits(model: ForceModel, low: float, high: float) -> bool:
 
 
 def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
-    """The model, shifted if it repeats: limited by the device, its mean force must be 0."""
+    """Shifts a periodic model so that its mean force, limited by the device, is 0."""
     shift = balancing_shift(model, device.force_limit)
     return with_network(model, bias=model.bias + shift) if shift else model
 
 
 def _hysteresis_limited(model: ForceModel, task: Task) -> ForceModel:
-    """Limits the slopes or reduces h, whichever has the smaller force error; both where neither is enough."""
+    """Limits the slopes or reduces h, by the smaller force error; does both if neither suffices."""
 
     def holds(candidate: ForceModel) -> bool:
         return not certify(candidate, task.direct_scheme(candidate), task.device).refused

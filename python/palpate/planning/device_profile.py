@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DeviceProfile: what is known of a haptic device, and its TOML file."""
+"""DeviceProfile: properties of a haptic device, and its TOML file."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ else:
     import tomli as tomllib
 
 EXAMPLES = Path(__file__).parent / "profiles"
-"""Profiles of published devices, each with its sources in the comment at its top."""
+"""Profiles of published devices; a comment at the top of each gives its sources."""
 
 
 def example_profiles() -> dict[str, tuple[Path, tuple[str, ...]]]:
-    """The example profiles: name -> file, and the paragraphs that say where its numbers are from."""
+    """Returns the example profiles: name -> file and paragraphs with the sources of its numbers."""
     examples = {}
     for file in sorted(EXAMPLES.glob("*.toml")):
         comment = []
@@ -39,35 +39,35 @@ def example_profiles() -> dict[str, tuple[Path, tuple[str, ...]]]:
 
 
 def profile_file(name: str) -> Path:
-    """The file of this name where there is one, else the example of this name."""
+    """Returns the file of this name if it exists, else the example of this name."""
     file, example = Path(name), EXAMPLES / f"{name}.toml"
     return example if not file.exists() and example.exists() else file
 
 
 class DeviceProfile(_core.device.DeviceProfile):
-    """What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
+    """Properties of a haptic device of one degree of freedom; SI units, rotary or linear.
 
-    ``b`` and ``f_c`` are what the mechanism itself brakes with: a certificate spends them. Where one of them
-    is not known, a lower bound is right; where delay, steps or jitter are not known, an upper one.
+    ``b`` and ``f_c`` are damping and friction of the mechanism, on which a certificate relies. Use a lower
+    bound if one of them is not known, and an upper bound for unknown delay, steps or jitter.
 
-    The keyword arguments are the fields of the core's DeviceProfile, listed there with their units; every one
-    has a default, that of a simulated knob.
+    The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
+    defaults are those of a simulated knob.
 
     Raises
     ------
     ValueError
-        Naming the field, its value and what would be right.
+        Names the field, its value and the bound.
     """
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> DeviceProfile:
-        """Read a profile from a TOML file: every field that is not optional, and no others.
+        """Reads a profile from a TOML file. Every required field must be present, and no unknown field.
 
         Raises
         ------
         InputError
-            The file is not there or not TOML, or a field is missing, unknown or impossible: one sentence with
-            the file's name, the field and its value.
+            The file does not exist or is not TOML, or a field is missing, unknown or impossible. The message
+            names the file, the field and its value.
         """
         file = path_of("path", path)
         require_file(file)
@@ -79,7 +79,7 @@ class DeviceProfile(_core.device.DeviceProfile):
             raise InputError(f"{file} is not TOML: it is not text") from None
         except RecursionError:
             raise InputError(f"{file}: it is nested too deeply; a profile has no tables") from None
-        except ValueError as error:  # an integer with more digits than Python converts, a date that is none
+        except ValueError as error:  # an integer with more digits than Python converts, or an invalid date
             reason = str(error)
             if "integer string conversion" in reason:
                 reason = f"a number has more than {sys.get_int_max_str_digits()} digits; write 17 or fewer"
@@ -90,14 +90,14 @@ class DeviceProfile(_core.device.DeviceProfile):
             raise InputError(f"{file}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, notes: Sequence[str] = ()) -> Path:
-        """Write the profile as a TOML file; it appears under its name only when it is complete.
+        """Writes the profile as a TOML file. The file gets its name only when it is complete.
 
         Parameters
         ----------
         path : str or path
             The file.
         notes : sequence of str
-            Where its numbers are from: comments at the top of the file.
+            Sources of the numbers: comments at the top of the file.
         """
         file = path_of("path", path)
         comment = "".join(f"# {note}\n" for note in notes)
@@ -107,12 +107,12 @@ class DeviceProfile(_core.device.DeviceProfile):
 
 
 def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) -> _core.device.DeviceProfile:
-    """A device by object, by the name of an example profile, or by the path of its TOML file.
+    """Returns a device from an object, the name of an example profile, or the path of a TOML file.
 
     Raises
     ------
     InputError
-        It is none of these; the message names the argument, or file and field.
+        The value is not a device; the message names the argument, or file and field.
     """
     if isinstance(device, _core.device.DeviceProfile):
         return device

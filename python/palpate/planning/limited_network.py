@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The network nearest to a model that a device can render: slopes limited, the rest left as identified.
+"""Search for the nearest network that a device can render: slopes limited, otherwise as identified.
 
-The nearest force with slopes between two limits is an isotonic regression; it differs from the model on whole
-stretches around what is too steep, and has kinks at their ends. Smoothing by a narrow positive kernel rounds
-the kinks and keeps the limits. The change alone is then given to further wavelets, chosen one by one
-(orthogonal least squares, values and slopes), and the limits are imposed in a last least squares over all
-wavelets, so that elsewhere the model stays what it was and the limits are certified.
+The nearest force with slopes between two limits is an isotonic regression. It differs from the model on
+intervals around slopes that are too steep, and has kinks at their ends. Smoothing by a narrow positive kernel
+rounds the kinks and keeps the limits. Further wavelets represent only the change; they are chosen one by one
+(orthogonal least squares, values and slopes). A last least squares over all wavelets imposes the limits. So
+the limits are certified, and elsewhere the model does not change.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ from ..identification.network.separable import Block, SeparableProblem
 from .plan import SAMPLES, strokes, with_network
 
 LONGEST_PLAY = 0.1
-"""Largest play radius [share of the travel]: a wider one is felt as play, not as hysteresis."""
+"""Largest play radius [share of the travel]; a wider one feels like play, not like hysteresis."""
 
 _WANTED = 1.02
-"""Slope for which a device is used [share of that of the model]: a network is fitted just below its limits"""
+"""Slope for which a device is used [share of that of the model]; a network is fitted just below its limits"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 """Standard deviation of the kernel [share of the travel]; True if the force must be restoring at both ends,
-<= 0 at the lower and >= 0 at the upper one: otherwise it begins, or continues, too steeply."""
+<= 0 at the lower and >= 0 at the upper one: otherwise it begins, or continues, too steeply.
+"""
 
 _RESERVE = 0.985
 """Share of a limit for the nearest force; the rest is for the error of the network [-]"""
@@ -46,10 +47,10 @@ _CERTIFIED = 0.997
 """Share of a limit that is imposed; the rest is for bounds wider than the true range [-]"""
 
 _CLOSE = 2e-5
-"""RMS error at which no further wavelets are taken [share of the force's range]"""
+"""RMS error at which no further wavelets are added [share of the force's range]"""
 
 _CLOSE_SLOPE = 0.01
-"""Error of the slope at which no further wavelets are taken [share of the smaller limit]"""
+"""Error of the slope at which no further wavelets are added [share of the smaller limit]"""
 
 _MOST = 64
 """Largest number of further wavelets [-]"""
@@ -59,21 +60,21 @@ _NEW = 1e-5
 
 _SCALE_RATIO = 1.6
 _SCALE_STEP = 0.75
-"""Frame of the candidates: ratio of neighbouring dilations, translation step over width [-]"""
+"""Frame of the candidates: ratio of adjacent dilations, translation step over width [-]"""
 
 _WIDE = 1e9
-"""A play radius of this many travels adds no slope while it sticks [-]"""
+"""Play radius that adds no slope in the stick phase [travels]"""
 
 
 @lru_cache(maxsize=8)
 def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBounds:
-    """Proved bounds while sliding, continuations included: those of a play that adds no slope."""
+    """Returns proved bounds while sliding, continuations included: those of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
     return force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
 
 
 def sliding_slopes(model: ForceModel) -> tuple[float, float]:
-    """The smallest and largest slope of these bounds."""
+    """Returns the smallest and largest slope of these bounds."""
     bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
@@ -81,9 +82,9 @@ def sliding_slopes(model: ForceModel) -> tuple[float, float]:
 def renderable_slopes(
     device: DeviceProfile, stick: float = 0.0, model: ForceModel | None = None
 ) -> tuple[float, float]:
-    """(lowest, highest) slope for which direct rendering is certified, divided according to the model.
+    """Returns the (lowest, highest) slope for which direct rendering is certified, divided as in the model.
 
-    With hysteresis these are slopes while sliding, and a stick adds `stick` = h/r.
+    With hysteresis these are slopes while sliding; a stick adds `stick` = h/r.
     """
     low, high = (-math.inf, math.inf) if model is None else sliding_slopes(model)
     return stability.renderable_slopes(
@@ -92,19 +93,19 @@ def renderable_slopes(
 
 
 def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
-    """Narrowest certified play radius for direct rendering, at least 4 encoder steps.
+    """Returns the narrowest certified play radius for direct rendering, at least 4 encoder steps.
 
-    Infinite if none is certified up to `LONGEST_PLAY`.
+    It is infinite if none is certified up to `LONGEST_PLAY`.
     """
     longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
     narrowest = fewest_encoder_steps_in_play * device.encoder_step
     radius = stability.narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
-    # Bounds are computed once more for the certificate, and rounded.
+    # The certificate computes the bounds again, with rounding errors.
     return radius if radius == narrowest else 1.000001 * radius
 
 
 def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | None:
-    """The model with every slope proved to lie within limits; None where no such network was found.
+    """Returns a network whose slopes are proved to be within limits, or None if none was found.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | Non
 
 
 def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
-    """The model with h multiplied by a share: the two strokes differ by less."""
+    """Returns the model with h multiplied by a share, which reduces the difference of the strokes."""
     names = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
     return with_network(model, **{name: share * getattr(model, name) for name in names})
 
@@ -133,7 +134,7 @@ def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
 def _limited_once(
     model: ForceModel, low: float, high: float, sigma: float, restoring: bool
 ) -> ForceModel | None:
-    """The model with the change fitted; None if its continuations are steeper than the limit."""
+    """Returns the model with the fitted change, or None if its continuations are steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
     changes = _changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
@@ -154,7 +155,7 @@ def _limited_once(
 def _changes_needed(
     x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: ForceModel, restoring: bool
 ) -> Float2D:
-    """Changes (k, n) of strokes that limit their slopes, kinks rounded; zero elsewhere."""
+    """Returns changes (k, n) of strokes that limit their slopes with rounded kinks; zero elsewhere."""
     n, step = len(x), x[1] - x[0]
     margin = int(np.ceil(6.0 * sigma / step))
     before = after = 0
@@ -162,7 +163,7 @@ def _changes_needed(
         before = after = n - 1
         wide = [np.concatenate([f[:-1] - f[-1] + f[0], f, f[1:] + f[-1] - f[0]]) for f in strokes]
     else:
-        # Where contact is lost there is no force to begin with, and none may be needed to stay within limits.
+        # At a free end the force starts at zero, and the change there must not require a force.
         before, after = (n if side == "free" else 0 for side in (model.below, model.above))
         wide = [np.pad(force, (before, after)) for force in strokes]
     grid = x[0] + step * (np.arange(len(wide[0])) - before)
@@ -185,11 +186,11 @@ def _changes_needed(
 
 
 def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
-    """Pressing (2, n) lowered where contact begins, if it would be too steep beyond the lower edge.
+    """Returns strokes (2, n) with less pressing force at the start of contact if it is too steep there.
 
-    Beyond it h dies out along with g, over g / g', and the slope of pressing is g' (1 + h / g). Where it
-    rises as steeply as it may, that is too much if it begins above `high` / slope times where releasing
-    ends, the slope being that of releasing over the `near` samples that the rounding of kinks reaches.
+    Beyond the edge h decreases with g over g / g', and the slope of pressing is g' (1 + h / g). At the limit
+    this is too steep if pressing begins above `high` / slope times the end of releasing. The slope is that of
+    releasing over the `near` samples that the rounding of kinks reaches.
     """
     press, release = strokes
     first = release[edge]
@@ -201,7 +202,7 @@ def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high:
 
 
 def _extended(force: Float1D, margin: int) -> Float1D:
-    """A force and its straight continuations."""
+    """Returns a force and its straight continuations."""
     steps = np.arange(1, margin + 1)
     before = force[0] - steps[::-1] * (force[1] - force[0])
     after = force[-1] + steps * (force[-1] - force[-2])
@@ -211,7 +212,7 @@ def _extended(force: Float1D, margin: int) -> Float1D:
 def _fitted(
     model: ForceModel, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
 ) -> ForceModel:
-    """Least squares on the model's and further wavelets, with the slope limits and h >= 0 imposed."""
+    """Fits the model's and further wavelets by least squares, with the slope limits and h >= 0 imposed."""
     lower, travel = model.lower, model.upper - model.lower
     box = ((x - lower) / travel)[:, None]
     ones = np.ones_like(x)
@@ -246,7 +247,7 @@ def _fitted(
 
 
 def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:
-    """Dilations and translations (k,) of wavelets from the finest width to the travel, near a change."""
+    """Returns dilations and translations (k,) of wavelets near a change, from finest width to travel."""
     travel = x[-1] - x[0]
     at = x[changed][::4] if changed.any() else x[:1]
     alpha, beta = [], []
@@ -268,9 +269,9 @@ def _chosen(
     sigma: float,
     close: float,
 ) -> Sequence[int]:
-    """Candidates chosen one by one for changes (outputs, n), beside a line and the model's wavelets.
+    """Chooses candidates one by one for changes (outputs, n), in addition to a line and the model's wavelets.
 
-    Slopes are fitted beside the values; sigma times a slope weighs as much as a value.
+    Values and slopes are fitted together; sigma times a slope has the weight of a value.
     """
 
     def both(values: Float2D, slopes: Float2D) -> Float2D:

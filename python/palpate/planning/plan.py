@@ -30,10 +30,10 @@ _CERTIFICATE = {
 }
 
 ACCEPTED_FORCE_ERROR = 0.1
-"""Force error that is accepted by default [share of the range of the identified force]"""
+"""Default limit of the force error [share of the range of the identified force]"""
 
 SAMPLES = 1001
-"""Positions over the domain [-]"""
+"""Number of positions over the domain [-]"""
 
 NETWORK = (
     "alpha",
@@ -45,7 +45,7 @@ NETWORK = (
     "linear_hysteresis",
     "bias_hysteresis",
 )
-"""Arguments of a force model that make its network"""
+"""Arguments of a force model that define its network"""
 
 _DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velocity")
 """The other arguments"""
@@ -53,29 +53,29 @@ _DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velo
 
 @dataclass(frozen=True)
 class Plan:
-    """A model, and the structure and numbers with which it is rendered.
+    """Model with the structure and numbers of its rendering.
 
     A plan made by hand has no certificate. :func:`palpate.plan` chooses a plan for a device and certifies it.
 
     Raises
     ------
     InputError
-        The scheme does not fit the model; the message names the field and what would be right.
+        The scheme does not fit the model; the message names the field and the cure.
     """
 
     model: Model
-    """The identified model, which the plan never changes. Force errors refer to it."""
+    """The identified model; the plan never changes it. Force errors refer to it."""
     scheme: Scheme
     certificate: Certificate | None = None
     """Certificate of the rendered model on a device; None if nothing was certified"""
     refused: tuple[str, ...] = ()
-    """Refused simpler structures, each with the inequality that failed and by how much"""
+    """Refused simpler structures, each with the failed inequality and its margin"""
     limited: Model | None = None
-    """The model rendered in place of `model` because the device is too weak; None: `model` itself"""
+    """Model rendered in place of `model` because the device is too weak; None: `model`"""
     accept_force_error: float = ACCEPTED_FORCE_ERROR
     """Largest force error that is accepted [share of the range of the identified force]"""
     needs: str = ""
-    """The device property that `model` itself needs; empty if it is rendered, or if none helps"""
+    """Device property that `model` needs; empty if `model` is rendered, or if none helps"""
 
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
@@ -95,7 +95,7 @@ class Plan:
 
     @property
     def solver(self) -> str | None:
-        """Solver of the load line at 1 kHz: table or newton; None if there is nothing to solve."""
+        """Solver of the load line at 1 kHz: table or newton; None without load line."""
         return solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
 
     @cached_property
@@ -105,15 +105,15 @@ class Plan:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on the plan: on its certificate, and on its force error.
+        """Verdict on the plan: on its certificate and its force error.
 
-        It is "no" where no structure holds on the device, and where the force error exceeds what is accepted.
+        It is "no" if no structure holds on the device, or if the force error exceeds the limit.
         """
         return Verdict((*self._certificate_findings(), *self._force_findings()))
 
     @classmethod
     def of(cls, model: Model) -> Plan:
-        """The plan in a model file, with its certificate.
+        """Returns the plan in a model file, with its certificate.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class Plan:
         )
 
     def stored(self) -> Model:
-        """The identified model with this plan and its certificate in it, ready to be saved.
+        """Returns the identified model with this plan and its certificate in it, ready to be saved.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class Plan:
         return Model.from_dict(content)
 
     def record(self) -> dict[str, Any]:
-        """The plan as it stands in a model file."""
+        """Returns the plan as stored in a model file."""
         scheme = self.scheme
         return {
             "structure": scheme.structure,
@@ -171,16 +171,16 @@ class Plan:
 
     @property
     def description(self) -> str:
-        """The structure and its changes to the identified network, in words."""
+        """Structure and its changes to the identified network, in words."""
         return ", ".join(
             [*_words(self.scheme), *([] if self.limited is None else ["with a limited network"])]
         )
 
     @property
     def felt_slopes(self) -> tuple[float, float]:
-        """The steepest felt slope and that of the model; a coupling makes it softer [force/position].
+        """Steepest felt slope and that of the model; a coupling makes it softer [force/position].
 
-        Where the coupling was taken out of the model, the bounds of the certificate are those of the rest.
+        If the coupling was subtracted from the model, the bounds of the certificate are for the remainder.
         """
         assert self.certificate is not None
         steepest = max(0.0, self.certificate.bounds.slope_max)
@@ -190,7 +190,7 @@ class Plan:
         return felt, felt if self.scheme.compensated else steepest
 
     def rows(self) -> dict[str, str]:
-        """The numbers of a certified plan for a person, each under its name."""
+        """Returns the numbers of a certified plan for display, by name."""
         assert self.certificate is not None
         scheme, error = self.scheme, self.force_error
         rows = {"structure": self.description}
@@ -219,7 +219,7 @@ class Plan:
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
-        """The same plan with its certificate on a device, which may be a refusal."""
+        """Returns the plan with its certificate on a device, which may be a refusal."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
@@ -228,8 +228,8 @@ class Plan:
         Raises
         ------
         InputError
-            The explicit structure's slope limit is not above the model's steepest slope, or the certificate
-            is for another device; the message names what differs.
+            The slope limit of the explicit structure is not above the steepest slope of the model, or the
+            certificate is for another device. The message names the difference.
         """
         self.scheme.validate(self.rendered, device.period_s)
         if self.certificate is not None:
@@ -278,7 +278,7 @@ class Plan:
 
 
 def describe(scheme: Scheme) -> str:
-    """A scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
+    """Returns a scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
     mass = [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"] if scheme.has_mass else []
     return ", ".join([*_words(scheme), *mass])
 
@@ -308,7 +308,7 @@ def _percent(share: float) -> str:
 class StaticForceError:
     """Felt minus identified force at rest, over the domain and both strokes.
 
-    A limited network and a soft coupling are counted; damping, delay and encoder steps are not.
+    It contains the effect of a limited network and a soft coupling, not of damping, delay or encoder.
     """
 
     largest: float
@@ -322,14 +322,14 @@ class StaticForceError:
 
 
 def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Scheme) -> StaticForceError:
-    """Force error at rest where `rendered` is rendered by a scheme in place of `identified`.
+    """Returns the force error at rest if a scheme renders `rendered` in place of `identified`.
 
     Parameters
     ----------
     identified, rendered : ForceModel
         Of one position, on the same domain; or the same model of position and velocity.
     scheme : Scheme
-        A coupling makes the rendered force softer: K_c f' / (K_c + f') is felt in place of f'.
+        A coupling makes the rendered force softer: the felt slope is K_c f' / (K_c + f').
     """
     exact = scheme.compensated or not scheme.has_coupling
     if exact and rendered is identified:
@@ -345,35 +345,35 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
 
 
 def with_network(model: ForceModel, **changes: Any) -> ForceModel:
-    """A force model with other arguments; what is not given stays."""
+    """Returns a force model with changed arguments."""
     return ForceModel(**{name: getattr(model, name) for name in (*NETWORK, *_DOMAIN)} | changes)
 
 
 def network_of(model: ForceModel) -> dict[str, Any]:
-    """The network of a model as it stands in a model file."""
+    """Returns the network of a model as stored in a model file."""
     return {name: np.asarray(getattr(model, name)).tolist() for name in NETWORK}
 
 
 def strokes(model: ForceModel, x: Float1D) -> Float2D:
-    """(1, n) the force, or (2, n) pressing and releasing."""
+    """Returns (1, n) the force, or (2, n) pressing and releasing."""
     sides = (1.0, -1.0) if model.hysteretic else (None,)
     return np.array([model.force(x, direction=side) for side in sides])
 
 
 def _share(error: float, size: float, force: Float2D) -> float:
-    """Error over the size of the force; over the largest |force| where the force is constant."""
+    """Returns the error over the size of the force, or over the largest |force| of a constant force."""
     size = size or float(np.abs(force).max())
     return 0.0 if error == 0.0 else error / size if size else math.inf
 
 
 def _behind_coupling(model: ForceModel, scheme: Scheme, x: Float1D) -> Float2D:
-    """Force (k, n) of each stroke at a handle that rests at x, from the load line of a massless object."""
+    """Returns the force (k, n) of each stroke at a handle at rest, from the load line without mass."""
     at_rest = Scheme(structure="massless", coupling_stiffness=scheme.coupling_stiffness, coupling_damping=0.0)
     return np.array([motion_driven(stroke, at_rest, x, 1.0)["force"] for stroke in _single_strokes(model)])
 
 
 def _single_strokes(model: ForceModel) -> list[ForceModel]:
-    """Models without hysteresis, one for each stroke: f, or g + h and g - h."""
+    """Returns models without hysteresis, one for each stroke: f, or g + h and g - h."""
     if not model.hysteretic:
         return [model]
     names = ("weight", "linear", "bias")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plan of a model on a device: the first certified candidate, and the device property that it needs."""
+"""Search for the plan of a model: the first certified candidate, and the device property that it needs."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def plan(
 ) -> Plan:
     """Chooses the simplest structure that is certified for a model on a device.
 
-    ``palpate plan --help`` lists the candidate structures in the order in which they are tried. Numbers that
-    are not given are chosen from the device.
+    ``palpate plan --help`` lists the candidate structures in the order in which they are tried. Missing
+    numbers are chosen from the device.
 
     Parameters
     ----------
@@ -48,27 +48,27 @@ def plan(
     device : DeviceProfile, str or path
         A profile in the model's unit, the name of an example profile, or the path of a TOML file.
     coupling : bool
-        True: render through a virtual coupling, also where none is needed.
+        Renders through a virtual coupling even if none is needed.
     coupling_stiffness, coupling_damping : float, optional
         K_c and B_c [force/position, force*s/position]; either requires a coupling.
     mass, damping : float, optional
         Mass and damping of the object [force*s^2/position, force*s/position]. Default: those of the model. 0
-        leaves them out.
+        removes them.
     play_radius : float, optional
         r of a model with hysteresis [position].
     predict : int, "auto" or "off"
-        Samples used to predict the position half a sample ahead, for direct rendering: a force that is held
-        for a sample is half a sample late on average. "auto" takes the fewest of 1, 2, 4, 8 and 16 that are
+        Samples used to predict the position half a sample ahead, for direct rendering. It compensates the
+        mean delay of a held force, half a sample. "auto" chooses the fewest of 1, 2, 4, 8 and 16 that are
         certified for a tick that is late by a quarter of a period; "off" is 0.
     accept_force_error : float
-        Largest difference of the felt from the identified force that is accepted, as a share of the range of
-        the identified force.
+        Largest accepted difference of the felt from the identified force, as a share of the range of the
+        identified force.
 
     Returns
     -------
     Plan
         Read its ``verdict`` first. It is "no" if the force error is larger than accepted, or if no structure
-        holds; the plan is then the last candidate. Its certificate states what was proved.
+        holds; the plan is then the last candidate. Its certificate lists the proved inequalities.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def plan(
 
 
 def _samples_of(predict: object) -> int | None:
-    """Samples of a prediction, None where they are to be chosen."""
+    """Returns the samples of a prediction, or None if the plan chooses them."""
     if predict in ("auto", "off"):
         return None if predict == "auto" else 0
     if isinstance(predict, int) and not isinstance(predict, bool) and 0 <= predict <= most_prediction_taps:
@@ -180,15 +180,15 @@ class _Property:
     """A property of a device that can be improved."""
 
     improved: Callable[[DeviceProfile, float], DeviceProfile]
-    """The device with this property better by a factor, rounded to three digits"""
+    """Returns the device with this property improved by a factor, rounded to three digits"""
     text: Callable[[DeviceProfile], str]
-    """The requirement that an improved device just meets, in words"""
+    """Requirement that an improved device just meets, in words"""
 
 
 def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
-    """The device property that a model needs, for instance "needs b >= 6.07 N*s/m (has 0.005)".
+    """Returns the device property that a model needs, for instance "needs b >= 6.07 N*s/m (has 0.005)".
 
-    Empty where no property helps.
+    The text is empty if no property helps.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 
 
 def _candidates(task: Task) -> tuple[str, ...]:
-    """The candidate structures that render the identified model as the caller requires."""
+    """Returns the candidate structures that render the identified model and meet the requirements."""
     if task.dynamic:
         return tuple(CANDIDATES)  # those without mass do not apply
     if task.coupling:
@@ -244,7 +244,7 @@ def _candidates(task: Task) -> tuple[str, ...]:
 def _properties(
     model: ForceModel, device: DeviceProfile
 ) -> tuple[_Property, _Property, _Property, _Property]:
-    """Damping, friction, rate and encoder."""
+    """Returns damping, friction, rate and encoder as properties."""
     force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
     steepest = max(sliding_bounds(model).steepest, 1e-9)
     # A property that is 0 cannot be doubled: begin far below the need of the model.
@@ -279,7 +279,7 @@ def _properties(
 
 
 def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits) -> DeviceProfile | None:
-    """The device with the least improvement of these properties that fits; None where no improvement does."""
+    """Returns the device with the least improvement of these properties that fits, or None."""
 
     def after(doublings: Sequence[float]) -> DeviceProfile:
         changed = device
@@ -307,7 +307,7 @@ def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
 
 
 def _rounded(towards: Callable[[float], int], value: float) -> float:
-    """Three digits, so that the printed number is enough."""
+    """Rounds to three digits in the safe direction: the printed number suffices."""
     if value == 0.0:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)

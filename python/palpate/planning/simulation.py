@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders a plan on a simulated device, and measures its force error."""
+"""Simulation of a plan on a simulated device, and its force error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MEAN_APPLIED = "mean_applied"
 """Stem of the column with the mean force over a tick, which a fractional delay divides."""
 
 _GRID = 1001
-"""Positions at which the force range is computed [-]"""
+"""Number of positions at which the force range is computed [-]"""
 _TOLERATED_ERROR = 0.02
 """Largest force error without a finding [share of the force range]"""
 
@@ -40,13 +40,13 @@ _COMPENSATED_DAMPING = 0.25
 """Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
 
 _PREDICT = 4
-"""Samples of the prediction that is compared [-]"""
+"""Samples of the prediction in a comparison [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
 
 
 def rig_for(model: Model) -> TestRig:
-    """Return the test rig for a model: default knob and hand, scaled to the model unless it is an angle."""
+    """Returns the test rig for a model: default knob and hand, scaled to the model unless it is an angle."""
     return _core.simulation.rig_for(model, is_angle=model.units["position"] == "rad")
 
 
@@ -57,7 +57,7 @@ def simulate(
     duration: float,
     progress: Callable[[int], None] | None = None,
 ) -> Recording:
-    """Renders a plan in closed loop, in virtual time: device, hand and controller are simulated.
+    """Renders a plan in closed loop and virtual time, with simulated device, hand and controller.
 
     The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
 
@@ -72,21 +72,20 @@ def simulate(
     duration : float
         Simulated time [s]; at most 3 600 000 periods of the device.
     progress : callable, optional
-        Called with the number of ticks about ten times a second.
+        Called about ten times a second with the number of ticks.
 
     Returns
     -------
     Recording
-        Position as the encoder reads it and force as the device applies it, with time, so that what was
-        rendered can be identified and verified like anything else. Further columns: the handle's true
-        position at the start, in the middle and at the end of each tick, the environment's position, the
-        commanded force, the mean force over the tick, the number of evaluations, the status as a word, and
-        whether the model was extrapolated (1) or not (0).
+        Encoder position, force of the device, and time. It can be identified and verified like any recording.
+        Further columns are the true handle position at the start, in the middle and at the end of each tick,
+        and the position of the environment. Others are the commanded force, the mean force over the tick, the
+        number of evaluations, the status as a word, and 1 if the model was extrapolated, else 0.
 
     Raises
     ------
     InputError
-        The structure is sure to diverge on this device, or a number is out of range.
+        The structure would diverge on this device, or a number is out of range.
     """
     instance_of("plan", plan, Plan, "make one with palpate.plan")
     instance_of("device", device, DeviceProfile, "make one with palpate.DeviceProfile")
@@ -131,23 +130,23 @@ class ForceError:
     """Rendered minus identified force at the handle's true position, RMS over all ticks [N*m or N]."""
 
     end: float
-    """At the end of the tick that holds the force. A force that is ahead of the motion is rewarded"""
+    """At the end of the tick that holds the force; favours a force that is ahead of the motion"""
     instant: float
-    """At the sampling instant: the part of structure and encoder"""
+    """At the sampling instant: contains only structure and encoder"""
     mean: float
     """Of the mean over each tick"""
     band: float
     """Of that mean below 50 Hz: the part that a hand can follow"""
     work: float
-    """Work of the error over the whole time [J]; below 0 the rendering gives energy"""
+    """Work of the error over the whole time [J]; negative if the rendering gives energy"""
 
 
 def force_error(plan: Plan, rendered: Recording) -> ForceError:
-    """Errors of a simulated rendering against the identified model, at the handle's true position.
+    """Returns the errors of a simulated rendering against the identified model, at the true handle position.
 
     With F the force of the device, x the true motion and T the period, the error of the mean over tick k is
-    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is its sequence after
-    a low-pass filter without phase.
+    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is its sequence after a
+    low-pass filter without phase.
 
     Parameters
     ----------
@@ -174,7 +173,7 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
 
 
 def force_range(plan: Plan) -> float:
-    """Largest less smallest force of the model over its domain [N*m or N], both strokes included."""
+    """Returns the range of the model's force over its domain, both strokes included [N*m or N]."""
     lower, upper = plan.model.domain
     if plan.model.of_velocity:
         axes = [np.linspace(low, high, _GRID) for low, high in zip(lower, upper, strict=True)]
@@ -237,7 +236,9 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
 
 
 def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Float1D:
-    """The identified force along a motion, without structure or coupling, play state and velocity included.
+    """Returns the identified force along a motion, without structure or coupling.
+
+    Play state and velocity are included.
 
     Parameters
     ----------
@@ -246,7 +247,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     position : (n,) array
         A motion, in order [rad or m].
     period_s : float, optional
-        Time from each position to the next [s]; only a force of velocity needs it.
+        Time between positions [s]; only a force that depends on velocity needs it.
 
     Returns
     -------
@@ -262,7 +263,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
 
 @dataclass(frozen=True)
 class Comparison:
-    """One structure of a comparison: its recording, or the reason why it was refused."""
+    """One structure of a comparison: its recording, or the reason of its refusal."""
 
     scheme: Scheme
     recording: Recording | None
@@ -278,10 +279,10 @@ class Comparison:
 def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Comparison, ...]:
     """Renders a model with each structure and measures its force error.
 
-    The order is that of their force errors: direct, with and without prediction; massless behind a coupling,
-    with the coupling's spring taken out of the model; massless; implicit with mass alone, then with the
-    damping that the explicit structure needs; explicit. A structure that the model or the device rules out is
-    refused with its reason.
+    The order is that of the usual force errors: direct, with and without prediction; massless
+    behind a coupling, with the coupling's spring subtracted from the model; massless. Implicit with mass
+    alone, implicit with the damping of the explicit structure, and explicit follow. A structure that does not
+    suit the model or the device is refused with its reason.
 
     Parameters
     ----------

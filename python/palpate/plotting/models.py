@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a model: beside a recording, beside another model, and the path of networks that led to it."""
+"""Figures of a model: with a recording, with another model, and the path of its identification."""
 
 from __future__ import annotations
 
@@ -28,23 +28,24 @@ def draw_measured_and_modelled(
     seen: str = "measured",
     standard_error: Float1D | None = None,
 ) -> None:
-    """Measured and modelled force over position, residuals beneath; press and release told apart.
+    """Draws measured and modelled force over position, residuals below; press and release are separate.
 
     Parameters
     ----------
     force_axes, residual_axes : matplotlib.axes.Axes
-        Where to draw; they should share their position axis.
+        Target axes, preferably with a common position axis.
     recording : Recording
-        What was measured.
+        The measured recording.
     modelled : (n,) array
         The model's force at each row of the recording [N*m or N].
     one_curve : bool
-        The model's force is one curve for each stroke, drawn over increasing position; False where it depends
-        on the motion before, and is drawn in the order of the recording.
+        True: the model's force is one curve for each stroke, drawn over increasing position. False: it
+        depends on the previous motion and is drawn in the order of the recording.
     seen : str
-        What the recording's force is called.
+        Name of the recorded force.
     standard_error : (n,) array, optional
-        Of the model's force at each row; drawn as a 95 % band about zero residual, in front of the dots.
+        Standard error of the model's force at each row, drawn as a 95 % band about zero residual, in front of
+        the dots.
     """
     residual = recording.force - modelled
     told_apart = strokes(recording.direction, len(recording))
@@ -93,7 +94,7 @@ def draw_measured_and_modelled(
 
 
 def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
-    """The edges of a band about zero: lines stay visible in front of dots, in black and white too."""
+    """Draws the edges of a band about zero. Lines are visible in front of dots, also in black and white."""
     order = np.argsort(position, kind="stable")
     at, width = thinned(position[order], half[order])
     for edge in (width, -width):
@@ -108,18 +109,18 @@ def draw_two_models(
     *,
     names: tuple[str, str],
 ) -> None:
-    """Two models' forces over position; beneath, second minus first within what is just noticeable.
+    """Draws the forces of two models over position; below, second minus first and the JND.
 
     Parameters
     ----------
     force_axes, difference_axes : matplotlib.axes.Axes
-        Where to draw; they should share their position axis.
+        Target axes, preferably with a common position axis.
     strokes : sequence of Stroke
         From :func:`palpate.verification.compare`.
     units : mapping
         Units of position and force.
     names : (str, str)
-        What the two models are called.
+        Names of the two models.
     """
     x = scale_for(units["position"], *(stroke.position for stroke in strokes))
     y = scale_for(units["force"], *(force for stroke in strokes for force in (stroke.first, stroke.second)))
@@ -167,16 +168,16 @@ _MARKERS = "os^Dv<>p"
 def draw_path(
     error_axes: Axes, criterion_axes: Axes, path: Sequence[Mapping[str, Any]], force_unit: str
 ) -> None:
-    """Error and criterion over the number of wavelets, one line for each model class.
+    """Draws error and criterion over the number of wavelets, one line for each model class.
 
     Parameters
     ----------
     error_axes, criterion_axes : matplotlib.axes.Axes
-        Where to draw; they should share their horizontal axis.
+        Target axes, preferably with a common horizontal axis.
     path : sequence of mapping
-        Networks in the order in which they were considered: model_class, n_wavelets, rmse, criterion.
+        Considered networks in order: model_class, n_wavelets, rmse, criterion.
     force_unit : str
-        Of rmse.
+        Unit of rmse.
     """
     y = scale_for(force_unit, [step["rmse"] for step in path])
     classes = dict.fromkeys(step["model_class"] for step in path)

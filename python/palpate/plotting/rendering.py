@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a rendering: beside its recording, force errors of the structures, root locus of one."""
+"""Figures of a rendering: with its recording, force errors of the structures, root locus."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .look import grid, plain_decades, scale_for, thinned
 _LINES = ("-", "--", ":", "-.")
 
 _SAMPLES = 801
-"""Dampings of a locus [-]"""
+"""Number of dampings of a locus [-]"""
 
 
 def draw_real_against_rendered(
@@ -32,27 +32,27 @@ def draw_real_against_rendered(
     title: str = "",
     real_name: str = "recorded",
 ) -> None:
-    """Recorded force over position, dotted, and rendered force over position, solid (paper figure 15).
+    """Draws recorded force (dotted) and rendered force (solid) over position (paper figure 15).
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where to draw.
+        Target axes.
     real : (position (n,), force (n,))
-        What was recorded.
+        The recording.
     rendered : (position (n,), force (n,))
-        What the closed loop made of the recorded motion (the rendered force over the recorded position) or
-        of the recorded force (the recorded force over the resulting position).
+        Result of the closed loop: rendered force over recorded position, or recorded force over resulting
+        position.
     units : mapping
         {"position": "rad", "force": "N*m"}.
     title : str
-        Which way the loop was closed.
+        Title, which states how the loop was closed.
     real_name : str
-        What the recorded curve is called.
+        Name of the recorded curve.
     """
     x = scale_for(units["position"], real[0], rendered[0])
     y = scale_for(units["force"], real[1], rendered[1])
-    # The dots are wider than the line in front of them: both are seen where the two agree.
+    # The dots are wider than the line in front of them: both are visible if the two agree.
     axes.plot(
         *thinned(real[0] * x.factor, real[1] * y.factor),
         color="0.6",
@@ -73,12 +73,12 @@ def draw_real_against_rendered(
 def draw_structures(
     axes: Axes, names: Sequence[str], mean: Sequence[float], end: Sequence[float], force_unit: str
 ) -> None:
-    """RMS force error of each structure, of the mean of a tick and at its end, on a log axis.
+    """Draws the RMS force error of each structure on a log axis: of the mean of a tick, and at its end.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where to draw.
+        Target axes.
     names : sequence of str
         The structures, best first; drawn from top to bottom.
     mean, end : sequence of float
@@ -118,7 +118,7 @@ def draw_structures(
 class RootLocus:
     """Poles of the linearised explicit structure (paper figure 14) at a held device, over its damping.
 
-    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, with K the slope and K_c together, B both dampings.
+    z^2 + (T^2 K/m - 2 + T B/m) z + 1 - T B/m = 0, K = slope + K_c, B = sum of both dampings.
     """
 
     slopes: Float1D
@@ -137,7 +137,7 @@ def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:
     Parameters
     ----------
     scheme : Scheme
-        Mass, coupling and the damping that is marked.
+        Mass, coupling and the marked damping.
     slopes : (k,) array
         Slopes of the object [force/position].
     period_s : float
@@ -170,9 +170,9 @@ def draw_root_locus(axes: Axes, plan: Plan, device: DeviceProfile) -> None:
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where to draw.
+        Target axes.
     plan : Plan
-        With another structure than explicit, the explicit one that suits the device is drawn.
+        If its structure is not explicit, the explicit one that suits the device is drawn.
     device : DeviceProfile
         The device of the plan.
     """

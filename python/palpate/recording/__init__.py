@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Obtain data: recordings of force over position, read, checked, converted to SI, and written."""
+"""Recordings of force over position: reading, checks, conversion to SI, and writing."""
 
 from .conversion import Source
 from .reading import read_recording

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Choice of the columns of a recording by five rules; a refusal names all problems and one cure."""
+"""Choice of the columns of a recording by five rules. A refusal names all problems and one cure."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Role:
     name: str
     si_units: tuple[str, ...]
     preferred_stems: tuple[str, ...]
-    """Stems that win, the first first, when several columns could take the role."""
+    """Stems that are preferred, in this order, if several columns could take the role."""
     example: str
-    """Unit that a cure states where none is known"""
+    """Unit that a cure states if the unit is not known."""
     words: tuple[str, ...]
-    """Parts of names by which a cure chooses among columns without a unit"""
+    """Parts of names by which a cure chooses among columns without a unit."""
 
 
 POSITION = Role(
@@ -54,7 +54,7 @@ TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"), "s", ("time",))
 ROLES = (POSITION, FORCE, TIME)
 
 DIRECTION_NAMES = ("direction", "segment")
-"""Columns that are taken for the direction of the stroke when none is named."""
+"""Columns that give the direction of the stroke if the caller names none."""
 
 
 _NO_CANDIDATES = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
@@ -64,14 +64,14 @@ _LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
 """Units that a cure states for columns without one, by a part of the name."""
 
 LONGEST_CURE = 1000
-"""Characters of the options in a message: longer names must be changed in the file."""
+"""Largest length of the options in a message [characters]. Longer names must be changed in the file."""
 
 _NUMBER_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column with the unit it is read in (None: text or plain numbers)."""
+    """Column and the unit it is read in. None: text or plain numbers."""
 
     name: str
     stem: str
@@ -80,7 +80,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Choice:
-    """The columns that were chosen, and why, in sentences."""
+    """Chosen columns, and the reasons in sentences."""
 
     position: Column
     force: Column
@@ -114,13 +114,13 @@ def choose_columns(
     text: Collection[str] = (),
     steady: Collection[str] = (),
 ) -> Choice:
-    """Choose the columns of a recording by their names alone.
+    """Chooses the columns of a recording by their names alone.
 
-    For position and force, in this order: (1) a named column wins; (2) where one stem stands in several
-    units, the SI unit wins over a converted one, and both win over counts; (3) exactly one candidate is
-    taken; (4) else the first stem of the role's list that is present; (5) else the file is refused, naming
-    all problems and one set of options that solves them. Time follows the same rules, but a file may have
-    none.
+    The rules for position and force apply in this order: (1) A named column wins. (2) If one stem occurs in
+    several units, the SI unit wins over a converted one, and both win over counts. (3) A single candidate is
+    chosen. (4) The first stem of the role's list that is present is chosen. (5) The file is refused. The
+    message names all problems and one set of options that solves them. Time follows the same rules, but is
+    optional.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def choose_columns(
     units : mapping of str to str, optional
         Units of columns, by column name or by the role ("position", "force", "time"); wins over the name.
     unstated : collection of str
-        Columns that the file itself declares to be in SI without saying which unit.
+        Columns that the file declares to be in SI without the unit.
     text : collection of str
         Columns that are known to hold text; a cure does not name them.
     steady : collection of str
@@ -163,7 +163,7 @@ def choose_columns(
 def _attempt(
     names: Sequence[str], wish: _Wish, unstated: Collection[str]
 ) -> tuple[Choice | None, dict[str, str]]:
-    """The choice, or the problems by the role or option that they concern."""
+    """Returns the choice, or the problems by role or option."""
     problems: dict[str, str] = {}
     options = [(f"--{role}", name) for role, name in (*wish.roles.items(), ("direction", wish.direction))]
     for option, name in (*options, *(("inputs", name) for name in wish.inputs)):
@@ -193,7 +193,7 @@ def _attempt(
 
 
 def _with_units(names: Sequence[str], wish: _Wish, problems: dict[str, str]) -> list[Column]:
-    """Give every column the unit of its name, or the one the caller states."""
+    """Gives every column the unit in its name, or the unit that the caller states."""
     stated: dict[str, Unit] = {}
     for key, symbol in wish.units.items():
         column = key if key in names else wish.roles.get(key)
@@ -214,7 +214,7 @@ def _with_units(names: Sequence[str], wish: _Wish, problems: dict[str, str]) -> 
     for name in names:
         stem, unit = split_name(name)
         if name.endswith("_in") and f"{stem}_out" in names:
-            stem, unit = name, None  # an input beside an output, not inches
+            stem, unit = name, None  # an input and its output, not inches
         columns.append(Column(name, stem, stated.get(name, unit)))
     return columns
 
@@ -255,7 +255,7 @@ def _choose(
 
 
 def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
-    """Candidates of each stem, those in SI alone where a stem stands in several units."""
+    """Returns the candidates of each stem; if a stem occurs in several units, only those in SI."""
     by_stem: dict[str, list[Column]] = {}
     for column in candidates:
         by_stem.setdefault(stem_key(column.stem), []).append(column)
@@ -263,7 +263,7 @@ def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
 
 
 def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
-    """Rule 2: among the columns of one stem keep those whose unit is nearest to SI."""
+    """Applies rule 2: keeps the columns of one stem whose unit is nearest to SI."""
 
     def distance_from_si(column: Column) -> int:
         assert column.unit is not None, "candidates have units"
@@ -298,7 +298,7 @@ def _cure(
     steady: Collection[str],
     problems: Mapping[str, str],
 ) -> str:
-    """The options to add, which are tried before they are named."""
+    """Returns the options to add. They are tried first."""
     none = "; a recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(wish.roles), dict(wish.units), wish.direction
     inputs = tuple(name for name in wish.inputs if name in names)
@@ -349,7 +349,7 @@ def _cure(
 
 
 def _silent_time(names: Sequence[str], wish: _Wish, text: Collection[str]) -> str | None:
-    """A column that is called time, but states no unit and is not used."""
+    """Returns a column that is named time but has no unit and is not used."""
     taken = {*wish.roles.values(), *wish.inputs, *text}
     times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in taken)
     return next(times, None)
@@ -360,7 +360,7 @@ def _time_options(name: str) -> list[str]:
 
 
 def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:
-    """The column that a cure names: one with a unit of the role, else the likeliest without a unit."""
+    """Returns the column that a cure names: one with a unit of the role, else the likeliest one."""
     fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
     if fitting:
         return _best(fitting, [])[0][0]

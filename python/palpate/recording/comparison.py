@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings that do not belong together: two objects in one file, repeated rows, other units or zeros.
+"""Detection of mixed recordings: two objects in one file, repeated rows, other units or zeros.
 
 Rows are compared by position cell and stroke.
 """
@@ -19,26 +19,26 @@ from .recording import Recording
 from .units import GRAVITY
 
 MOST_ROWS = 100_000
-"""Rows that the comparison of cells uses; more are thinned out evenly."""
+"""Most rows that the comparison of cells uses. Longer recordings are thinned evenly."""
 
 CELLS = 64
-"""Position cells at most."""
+"""Largest number of position cells."""
 
 ROWS_A_CELL = 8
-"""Rows that a cell of one stroke holds on average, at least."""
+"""Least mean number of rows in a cell of one stroke."""
 
 ROWS_TO_COMPARE = 3
 """Rows that a cell of one stroke needs to be compared with another."""
 
 PLAY_SHARE = 0.02
-"""Play radius over the travel: a motion back by less does not end a stroke."""
+"""Play radius over the travel. A smaller motion back does not end a stroke."""
 
 TAIL = 0.5
-"""Percentage of the rows at each end that may be spikes of the position."""
+"""Percentage of the rows at each end that may be position spikes."""
 
 
 def amount(value: float, unit: str) -> str:
-    """A value with its unit, for sentences; without one where the unit is not stated."""
+    """Returns a value with its unit for sentences; the value alone if the unit is not stated."""
     return f"{value:.4g} {unit}".rstrip()
 
 
@@ -57,7 +57,7 @@ class Travel:
 
     @staticmethod
     def of(position: Float1D) -> Travel:
-        """The range of all rows that lie within half a travel of the inner 99 % of the rows."""
+        """Returns the range of all rows within half a travel of the inner 99 % of the rows."""
         low, high = np.percentile(position, (TAIL, 100.0 - TAIL))
         margin = 0.5 * (high - low)
         inside = (position >= low - margin) & (position <= high + margin)
@@ -80,13 +80,13 @@ class CellRows:
     cells: int
     """Position cells"""
     loop: Float1D
-    """(m,) press minus release force, where both are known"""
+    """(m,) press minus release force, if both are known"""
     loop_error: Float1D
     """(m,) standard error of `loop`"""
 
 
 def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
-    """The rows by cell; None where too few rows move."""
+    """Returns the rows by cell, or None if too few rows move."""
     side = sides(recording, travel)
     row = np.flatnonzero(travel.inside & (side != 0))
     row = row[:: max(1, -(-len(row) // MOST_ROWS))]
@@ -119,7 +119,7 @@ def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
 
 
 def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:
-    """(n,) +1 in rows of a stroke into the object, -1 out of it, 0 where it is not known."""
+    """Returns (n,) +1 in rows of a stroke into the object, -1 out of it, 0 if unknown."""
     if recording.direction is not None and recording.direction.any():
         return recording.direction
     if not travel.length > 0.0:
@@ -134,28 +134,28 @@ BLOCKS = 32
 """Blocks of rows between which a file is split."""
 
 EXPLAINED = 0.4
-"""Share of the scatter about the mean curves that the split into two parts explains."""
+"""Least share of the scatter about the mean curves that a split into two parts must explain."""
 
 APART = 0.02
-"""Distance of the two parts, as a share of the force's spread."""
+"""Least distance of the two parts, as a share of the force's spread."""
 
 PATTERN = 16
-"""Rows by which a repetition of the beginning is found."""
+"""Number of rows by which a repetition of the beginning is found."""
 
 LEAST_COPY = 0.1
-"""Share of the rows that a copy holds."""
+"""Least share of the rows in a copy."""
 
 MOST_COPIES = 4
-"""Places that begin like the file and are compared to the end."""
+"""Most places that begin like the file and are compared to the end."""
 
 SAME_PLACE = 0.1
-"""Distance of the mean positions of two parts in a cell, in cells, up to which they are compared."""
+"""Largest distance of the mean positions of two parts in a cell at which they are compared [cells]."""
 
 CURVE_POINTS = 64
-"""Points of a curve at most."""
+"""Largest number of points of a curve."""
 
 POINT_ROWS = 4
-"""Rows that a point of a curve is the mean of, on average."""
+"""Mean number of rows that are averaged for a point of a curve."""
 
 UNIT_RATIOS = {
     10.0: "mm and cm",
@@ -170,33 +170,35 @@ UNIT_RATIOS = {
 """Ratios of units that files mix up."""
 
 SHARED = 0.3
-"""Share of the travel that two recordings need in common to be compared."""
+"""Least common share of the travel of two recordings that are compared."""
 
 DIFFERENT = 0.25
-"""RMS difference of two curves, as a share of the force's spread, above which they differ."""
+"""RMS difference of two curves above which they differ, as a share of the force's spread."""
 
 SAME = 0.1
-"""The same difference up to which a ratio explains it."""
+"""Largest RMS difference at which a ratio explains it, as a share of the force's spread."""
 
 ONE_WAY = 0.99
-"""Share of the moving rows that go one way in a recording of one stroke."""
+"""Least share of the moving rows with one direction in a recording of one stroke."""
 
 PRESS_ABOVE = 0.9
-"""Share of the shared positions at which the press lies above the release of the same object."""
+"""Least share of the shared positions at which the press is above the release of the same object."""
 
 SAME_RANGE = 2.0
-"""Ratio of their ranges of force up to which two strokes are of one object: the release begins where the
-press ends. 74 measured pairs have 0.9 to 1.2."""
+"""Largest ratio of the force ranges of two strokes of one object.
+
+The release begins where the press ends. 74 measured pairs have 0.9 to 1.2.
+"""
 
 MOST_RECORDINGS = 20
-"""Recordings among which the one is sought that agrees best with the others."""
+"""Largest number of recordings in the search for the one that agrees best with the others."""
 
 Curve = tuple[Float1D, Float1D]
 """Mean positions in rising order, and mean forces."""
 
 
 def merged_findings(recording: Recording, cells: CellRows | None) -> list[Finding]:
-    """Findings on a force that has two branches, one before and one after a row, and on repeated rows."""
+    """Returns findings on repeated rows and on a force with two branches, one before and one after a row."""
     if recording.input_names:
         return []
     if (again := _appended_to_itself(recording)) is not None:
@@ -251,7 +253,7 @@ def _two_parts(recording: Recording, cells: CellRows) -> list[Finding]:
 
 
 def _appended_to_itself(recording: Recording) -> int | None:
-    """First row of a copy of the beginning that goes on to the end of the file."""
+    """Returns the first row of a copy of the beginning that continues to the end of the file."""
     x, f = recording.position, recording.force
     n = len(x)
     least = int(LEAST_COPY * n)
@@ -273,13 +275,13 @@ class _Strokes:
     """Curves of one recording."""
 
     way: int
-    """+1: all rows go into the object, -1: out of it, 0: both, or not known"""
+    """+1: all rows go into the object, -1: out of it, 0: both or unknown"""
     curves: Mapping[int, Curve]
     """Of the rows of each direction, and of all rows (0)"""
 
     @staticmethod
     def of(recording: Recording, side: Float1D | None) -> _Strokes:
-        """The curves of a recording with the direction (n,) of its rows; None takes it from the recording."""
+        """Returns the curves of a recording; `side` (n,) is the direction of its rows, None: as recorded."""
         travel = Travel.of(recording.position)
         words = sides(recording, travel) if side is None else side
         into, out = words > 0, words < 0
@@ -291,16 +293,15 @@ class _Strokes:
 
 
 def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
-    """Findings on recordings of one object whose forces differ at the same positions.
+    """Returns findings on recordings of one object whose forces differ at the same positions.
 
-    Recordings of one stroke each are compared with the same stroke of the others. A press and a release may
-    differ as the strokes of one object do.
+    A recording of one stroke is compared with the same stroke of the others, because of hysteresis.
 
     Parameters
     ----------
     recordings : sequence of Recording
     side : (n,) array, optional
-        Direction of the rows of all recordings, where it was taken from their order or from the force.
+        Direction of the rows of all recordings, if it was computed from their order or from the force.
     """
     if len(recordings) < 2 or any(recording.input_names for recording in recordings):
         return []
@@ -345,7 +346,7 @@ def _name(recordings: Sequence[Recording], index: int) -> str:
 
 
 def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
-    """Mean force over position of some rows."""
+    """Returns the mean force over position of the given rows."""
     x, f = recording.position[rows], recording.force[rows]
     lower, length = float(x.min()), float(np.ptp(x))
     if not length > 0.0:
@@ -361,13 +362,13 @@ def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
 
 
 def _pair(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
-    """The curves by which two recordings are compared: of the stroke that both hold, where one holds one."""
+    """Returns the curves of the stroke that both recordings contain, or of all rows."""
     way = 0 if one.way * other.way < 0 else one.way or other.way
     return one.curves.get(way, one.curves[0]), other.curves.get(way, other.curves[0])
 
 
 def _apart(one: _Strokes, other: _Strokes) -> float:
-    """The difference of two recordings; 0 where they differ as press and release of one object do."""
+    """Returns the difference of two recordings; 0 if they differ only by hysteresis."""
     difference = _curve_difference(*_pair(one, other))
     if one.way * other.way < 0 and np.isfinite(difference):
         press, release = (one, other) if one.way > 0 else (other, one)
@@ -381,7 +382,7 @@ def _apart(one: _Strokes, other: _Strokes) -> float:
 
 
 def _curve_difference(one: Curve, other: Curve) -> float:
-    """RMS difference over the spread of the first force; infinite where the positions do not overlap."""
+    """Returns the RMS difference over the spread of the first force; infinite without overlap."""
     (x, f), (at, force) = one, other
     shared = (at >= x[0]) & (at <= x[-1])
     reach = min(x[-1], at[-1]) - max(x[0], at[0])
@@ -393,7 +394,7 @@ def _curve_difference(one: Curve, other: Curve) -> float:
 
 
 def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
-    """The role and the ratio of two units that explain the difference best; None where none does."""
+    """Returns the role and the ratio of two units that explain the difference best, or None."""
     x, f = other
     tried = []
     for ratio, units in UNIT_RATIOS.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the cells of a table to SI arrays, and where they came from."""
+"""Conversion of the cells of a table to SI arrays with their source."""
 
 from __future__ import annotations
 
@@ -22,40 +22,42 @@ from .table import Cells, Places, Table, parse_number, to_numbers
 from .units import COLUMN_SUFFIX
 
 UNSTATED = ""
-"""The unit of an array that was handed over without one: SI, but not said which."""
+"""Unit of an array that was given without one: SI, but not specified."""
 
 MIN_ROWS = 10
-"""Fewer usable rows are no recording."""
+"""Least number of usable rows of a recording."""
 
 MIN_POSITIONS = 3
-"""Fewer distinct positions show no force over position."""
+"""Least number of distinct positions of a recording."""
 
 FALLING = -0.3
-"""Correlation of force and position below which the force counts as falling over the whole file. A mirrored
-axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction stay between -0.3 and 0.2."""
+"""Correlation of force and position below which the force falls over the whole file.
+
+A mirrored axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction -0.3 to 0.2.
+"""
 
 Range = tuple[int | None, int | None]
-"""Half-open range of rows, counted from 0; None leaves an end open."""
+"""Half-open range of rows, counted from 0. None leaves an end open."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where data came from: enough to find it again, and to tell whether other data is the same."""
+    """Origin of data: the files or arrays, their fingerprints and the columns."""
 
     files: tuple[str, ...]
     sha256: str
-    """SHA-256 of each file (of the arrays, for data that never was a file), separated by spaces."""
+    """SHA-256 of each file, or of arrays that were not read from a file; separated by spaces."""
     rows: int
     columns: Mapping[str, str]
-    """Role (position, force, time, direction, or an input's name) to the column's name in the file."""
+    """Role (position, force, time, direction, or the name of an input) to the column in the file."""
     held_out_every: int = 0
-    """k where the rows i with i mod k = k - 1 were separated from the others; 0: all rows are together."""
+    """k if the rows i with i mod k = k - 1 were separated; 0: no rows were separated."""
     held_out: bool = False
-    """True for the rows that were held out, False for those that were kept."""
+    """True for the held-out rows, False for the other rows."""
 
     @staticmethod
     def merged(sources: Iterable[Source]) -> Source:
-        """One source for data taken from several recordings."""
+        """Returns one source for data from several recordings."""
         parts = list(sources)
         first = parts[0]
         return replace(
@@ -68,10 +70,9 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """All rows of a measured motion, of which a recording holds a part.
+    """All rows of a measured motion; a recording contains some of them.
 
-    Velocity and play depend on the rows before and after a row. Rows that were held out keep the motion
-    between them, so that both are formed from all rows.
+    Velocity and play depend on the rows before and after a row. They are computed from all rows.
     """
 
     position: Float1D
@@ -79,22 +80,22 @@ class Motion:
     time: Float1D | None
     """(m,) [s]"""
     rows: NDArray[np.intp]
-    """(n,) rows that the recording holds"""
+    """(n,) rows that the recording contains"""
 
 
 @dataclass(frozen=True)
 class Conversion:
-    """Columns of a table that were chosen, and how their cells become SI values."""
+    """Chosen columns of a table, and the conversion of their cells to SI values."""
 
     name: str
-    """Of the table, for messages"""
+    """Name of the table for messages"""
     choice: Choice
     direction: str | None
     status: str | None
-    """Column that says of each row whether its force was the model's alone"""
+    """Column that states for each row if its force was the model's alone"""
     negated: frozenset[str]
     drop: bool
-    """Drop and count rows that cannot be used; else refuse the table at the first one"""
+    """Drops and counts rows that cannot be used if True; else the first one refuses the table."""
     metadata: Mapping[str, str]
 
     @staticmethod
@@ -111,7 +112,7 @@ class Conversion:
         negate: Sequence[str] = (),
         drop: bool,
     ) -> Conversion:
-        """Choose the columns of a table; the arguments are those of `read_recording`."""
+        """Chooses the columns of a table; the arguments are those of `read_recording`."""
         metadata = dict(table.metadata)
         layout = Layout.taken_from(name, metadata)
         choice = choose_columns(
@@ -149,12 +150,12 @@ class Conversion:
 
     @property
     def numbers(self) -> list[str]:
-        """Names of the columns of numbers."""
+        """Names of the columns with numbers."""
         return [column.name for column in self.columns]
 
     @property
     def text(self) -> list[str]:
-        """Names of the columns of words."""
+        """Names of the columns with words."""
         return [name for name in (self.direction, self.status) if name is not None]
 
     @property
@@ -175,12 +176,12 @@ class Conversion:
     def checked(
         self, table: Places, cells: Mapping[str, Cells], first: int = 0
     ) -> tuple[RowCheck, Int8Vector | None]:
-        """Check the rows of a table from `first` on; returns the check and the direction of every row.
+        """Checks the rows of a table from `first` on; returns the check and the direction of every row.
 
         Raises
         ------
         InputError
-            A row cannot be used and rows are not to be dropped, or its direction is not known.
+            A row cannot be used and rows may not be dropped, or its direction is not known.
         """
         check = RowCheck(self.name, table, first, len(cells[self.choice.position.name]), self.drop)
         if self.status is not None:
@@ -193,7 +194,7 @@ class Conversion:
         return check, words
 
     def si(self, column: Column, cells: Mapping[str, Cells]) -> Float1D:
-        """Values of a column in SI units, with the sign that was asked for."""
+        """Returns the values of a column in SI units, with the sign that the caller requires."""
         values: Float1D = cells[column.name]
         factor = (1.0 if column.unit is None else column.unit.factor) * (
             -1.0 if column.name in self.negated else 1.0
@@ -201,7 +202,7 @@ class Conversion:
         return values if factor == 1.0 else values * factor
 
     def note(self, torque_constant: float | None = None, dialect: Sequence[str] = ()) -> str:
-        """The column of each role, and how the table was read, in one sentence."""
+        """Returns one sentence with the column of each role and the dialect of the table."""
         choice = self.choice
         parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
         if torque_constant is not None:
@@ -226,7 +227,7 @@ def converted(
     torque_constant: float | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Read a table as a whole; returns the fields of a `Recording`.
+    """Reads a whole table and returns the fields of a `Recording`.
 
     Parameters
     ----------
@@ -234,7 +235,7 @@ def converted(
     name : str
         Of the table, for messages.
     file : Path, optional
-        The file that the table is; without it the source is the fingerprint of the arrays.
+        The file of the table. Without it the source is the fingerprint of the arrays.
     direction, rows, zero, torque_constant, options
         Those of `read_recording`.
     """
@@ -246,7 +247,7 @@ def converted(
         and direction is None
         and all(parse_number(word) is not None for word in cells[stroke])
     ):
-        # Numbered segments state no direction.
+        # Numbered segments do not state a direction.
         cells[stroke], how = to_numbers(cells[stroke]), replace(how, direction=None)
     choice = how.choice
     notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
@@ -310,7 +311,7 @@ def converted(
 
 
 def digest_of(*arrays: NDArray[Any] | None) -> str:
-    """SHA-256 of arrays, in hexadecimal digits."""
+    """Returns the SHA-256 of arrays in hexadecimal digits."""
     digest = hashlib.sha256()
     for array in arrays:
         if array is not None:
@@ -319,7 +320,7 @@ def digest_of(*arrays: NDArray[Any] | None) -> str:
 
 
 def mirrored(correlation: float, against: bool = False) -> list[str]:
-    """The note on a force that falls with position, or on a position that moves against its direction."""
+    """Returns the note on a force that falls with position, or on a mirrored position."""
     signs = []
     if correlation < FALLING:
         signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
@@ -334,7 +335,7 @@ def mirrored(correlation: float, against: bool = False) -> list[str]:
 
 
 def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
-    """Report once what looks mirrored; no sign is turned without an option."""
+    """Reports once a force or position that looks mirrored. No sign changes without an option."""
     x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
     against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0
@@ -342,13 +343,13 @@ def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
 
 
 def _scaled(values: Float1D) -> Float1D:
-    """The values divided by a power of two, so that no square overflows and no digit changes."""
+    """Returns the values divided by a power of two. No square overflows and no digit changes."""
     _, exponent = np.frexp(np.abs(values).max(initial=0.0))
     return np.asarray(np.ldexp(values, -exponent))
 
 
 def _motion(how: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
-    """The motion of all rows of a file, of which these are used; None if it has no continuous time."""
+    """Returns the motion of all rows of a file, or None without continuous time."""
     if how.choice.time is None:
         return None
     position, time = how.si(how.choice.position, cells), how.si(how.choice.time, cells)
@@ -370,7 +371,7 @@ def _row_range(name: str, rows: Range | None, total: int) -> tuple[int, int]:
 
 
 def _si_name(column: Column) -> str:
-    """The name of an input after conversion, so that the name still states the unit."""
+    """Returns the name of an input with its SI unit."""
     return column.name if column.unit is None else f"{column.stem}_{COLUMN_SUFFIX[column.unit.si]}"
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CSV: the dialect is recognised once, then pandas reads the rows; messages name the line of a row.
+"""CSV files. The dialect is recognised once, then pandas reads the rows; messages name their lines.
 
-Rows are counted, and ends of rows are found, without splitting them into cells.
+Rows are counted, and ends of rows are found, without splitting rows into cells.
 """
 
 from __future__ import annotations
@@ -24,41 +24,41 @@ from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
 from .table import MISSING, Cells, LongTable, parse_with, to_numbers
 
 _CHUNK_ROWS = 1_000_000
-"""Rows read at a time: bounds the memory beside the columns themselves."""
+"""Rows read at a time. Limits the memory in addition to the columns."""
 
 _EXACT: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
-"""Numbers to the last bit: what older pandas had to be asked for, newer pandas always does."""
+"""Options for exact conversion of numbers; newer pandas versions always convert exactly."""
 
 _FURTHER = "\n"
-"""Name of the empty column where each row ends with a separator: no header can hold it."""
+"""Name of the empty column if each row ends with a separator. A header cannot contain it."""
 
 _SNIFF_ROWS = 1000
-"""Rows looked at to tell text columns from numeric ones before the fast reader starts."""
+"""Rows that are examined for text columns before the fast reader starts."""
 
 _BLOCK = 1 << 22
 """Bytes in which rows are counted at a time."""
 
 _BLANK = re.compile(rb"\n[ \t\r\n]")
-"""The start of a line that may be blank"""
+"""Start of a line that may be blank."""
 
 _CLOSING = re.compile(rb'(?:[^"]|"")*"(?!")')
-"""The rest of a quoted cell"""
+"""Rest of a quoted cell."""
 
 _OPENING = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator in (b",", b";", b"\t")}
-"""A quote opens a cell only at the start of the cell."""
+"""Quote that opens a cell; it must be the first character of the cell."""
 
 
 class FileBytes(io.RawIOBase):
-    """Some of a file's bytes, [start, stop): a recording without its torn last line, or a part of one."""
+    """The bytes [start, stop) of a file: a recording without its torn last line, or a part of one."""
 
     def __init__(self, path: Path, start: int, stop: int) -> None:
         self._stream = path.open("rb", buffering=0)
         self._stream.seek(start)
         self._start, self._stop = start, stop
         self.failure: OSError | None = None
-        """Why reading failed: a parser that calls this from C tells only that it did"""
+        """Reason for a failed read. A parser in C reports only the failure."""
 
     def readable(self) -> bool:
         return True
@@ -89,10 +89,9 @@ class FileBytes(io.RawIOBase):
 
 
 class CsvFile(LongTable):
-    """A CSV recording. The header is read when it is opened; the rows when :meth:`read` is called.
+    """A CSV recording. Opening reads the header; :meth:`read` reads the rows.
 
-    A name that ends in ``.part`` is a recording that was cut off while it grew: a last line without its line
-    feed is torn and left out.
+    A name that ends in ``.part`` is an incomplete recording. A last line without line feed is ignored.
     """
 
     def __init__(self, path: Path) -> None:
@@ -135,7 +134,7 @@ class CsvFile(LongTable):
 
     @contextmanager
     def _lines(self) -> Iterator[io.TextIOWrapper]:
-        """The lines of data."""
+        """Yields the lines of data."""
         stream = self._bytes(self._dialect.start)
         with io.TextIOWrapper(stream, encoding=self._dialect.encoding, newline="") as lines:
             try:
@@ -146,14 +145,14 @@ class CsvFile(LongTable):
                 raise not_csv(str(self._path), error) from None
 
     def _rows(self, lines: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
-        """Line number and cells of each row: slow, for the start of a file and for error messages."""
+        """Yields line number and cells of each row. Slow: only for the first rows and for error messages."""
         reader = csv.reader(lines, delimiter=self._dialect.separator)
         for cells in reader:
             if len(cells) > 1 or (cells and cells[0].strip()):
                 yield self._dialect.lines_before + reader.line_num, cells
 
     def _sniff(self) -> tuple[set[str], set[str]]:
-        """Names of the columns with text, and of those with one or two values, in the first rows."""
+        """Returns the names of the text columns, and of those with one or two values, in the first rows."""
         text: set[str] = set()
         values: dict[str, set[str]] = {name: set() for name in self.names}
         columns = len(self.names) + self._dialect.trailing
@@ -186,7 +185,7 @@ class CsvFile(LongTable):
         except ValueError as error:
             if isinstance(error, InputError):
                 raise
-        # Somewhere below the sniffed rows a number column holds text: find which, and read those as text.
+        # A number column contains text below the first rows. Find that column and read it as text.
         return self._read(as_text | self._columns_with_text(as_text), numbers, text)
 
     def _read(self, as_text: set[str], numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -199,7 +198,7 @@ class CsvFile(LongTable):
                 elif name in numbers and name not in text:
                     cells = self._to_numbers(name, chunk[name].to_numpy(dtype=object))
                 else:
-                    # Few words, many rows: a categorical keeps one string for each word.
+                    # A categorical keeps one string for each word and saves memory.
                     cells = chunk[name].astype("category").to_numpy(dtype=object)
                 parts[name].append(cells)
         columns: dict[str, Cells] = {}
@@ -221,7 +220,7 @@ class CsvFile(LongTable):
 
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
         if not self._dialect.single_bytes:
-            encoding = self._dialect.encoding.upper().replace("16-", "16")  # as iconv names it
+            encoding = self._dialect.encoding.upper().replace("16-", "16")  # name for iconv
             raise InputError(
                 f"{self._path} is {encoding}, which cannot be read part by part; convert it: "
                 f"iconv -f {encoding} -t UTF-8 OLD.csv > NEW.csv"
@@ -242,8 +241,8 @@ class CsvFile(LongTable):
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
         wanted = [name for name in self.names if name in numbers or name in text]
-        # Most files hold only numbers in number columns, and are read fast. If a block does not, the part is
-        # read again as text, without the rows that were given already.
+        # Most files contain only numbers in number columns and are read fast. If a block does not, the part
+        # is read again as text, without the rows that were already returned.
         given = 0
         for as_text in ({*text}, {*text, *numbers}):
             types = {name: "str" if name in as_text else "float64" for name in wanted}
@@ -287,7 +286,7 @@ class CsvFile(LongTable):
         columns: Collection[str] | None = None,
         rows: int = _CHUNK_ROWS,
     ) -> Iterator[Any]:
-        """Frames of so many rows of the whole file or a part of it."""
+        """Yields frames of the given number of rows, from the whole file or a part."""
         raw = FileBytes(self._path, *(part or (self._dialect.start, self._size)))
         trailing = [_FURTHER] if self._dialect.trailing else []
         before = 0
@@ -322,14 +321,14 @@ class CsvFile(LongTable):
             raise self._not_decoded() from None
         except pd.errors.ParserError as error:
             if "source failed" in str(error):
-                # What was raised while pandas read is lost in it: the disk's failure, or else Ctrl-C.
+                # pandas hides the exception: a disk error or Ctrl-C.
                 raise (raw.failure or KeyboardInterrupt()) from None
             if cells := re.search(r"in line (\d+), saw (\d+)", str(error)):
                 raise self._too_many_cells(self._line(int(cells[1]), part), int(cells[2])) from None
             raise InputError(f"{self._path} is not CSV: {str(error).strip()}") from None
 
     def _require_no_more(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
-        """Refuse a row with more cells than the header has names."""
+        """Refuses a row that has more cells than the header has names."""
         if any(str(word).strip() for word in cells.cat.categories):
             more = cells.notna() & (cells.astype(str).str.strip() != "")
             row = before + int(np.flatnonzero(more)[0])
@@ -337,7 +336,7 @@ class CsvFile(LongTable):
             raise self._too_many_cells(line, len(found))
 
     def _line(self, line: int, part: tuple[int, int] | None) -> int:
-        """The line of the file that is this line of the data or of a part."""
+        """Returns the line of the file for a line of the data or of a part."""
         if part is not None:
             with self._bytes(self._dialect.start, part[0]) as stream:
                 line += sum(1 for _ in stream)
@@ -361,19 +360,19 @@ class CsvFile(LongTable):
 
 @dataclass
 class RowCount:
-    """Rows of a stream."""
+    """Number of rows of a stream."""
 
     rows: int = 0
     ends: list[int] = field(default_factory=lambda: [0])
     """Bytes from the start to ends of rows that are at least one step apart, and to the end"""
     too_wide: tuple[int, int] | None = None
-    """First row with more cells than the table has columns, and the number of its cells"""
+    """First row that has more cells than the table has columns, and its number of cells"""
 
 
 def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int = _BLOCK) -> RowCount:
-    """Count the rows of a stream that begins with a row, and find ends of rows.
+    """Counts the rows of a stream and finds ends of rows. The stream must begin with a row.
 
-    A line break within a quoted cell ends no row. A line of white space is no row.
+    A line break within a quoted cell does not end a row. A line of white space does not count.
 
     Parameters
     ----------
@@ -381,7 +380,7 @@ def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int 
     separator : str
         One character.
     columns : int
-        Look for rows with more cells than this; 0 for not.
+        Reports rows with more cells than this; 0 disables the check.
     step : int
         Least distance of the ends of rows that are returned [bytes].
     """
@@ -400,7 +399,7 @@ def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int 
             for line in block.removesuffix(b"\n").split(b"\n"):
                 if b'"' in line:
                     quoted = _ends_quoted(line, quoted, mark)
-                # A quote that is never closed must not gather the rest of the file.
+                # Limits memory if a quote is never closed.
                 record += line[: _BLOCK - len(record)]
                 if quoted:
                     record += b"\n"
@@ -424,7 +423,7 @@ def _cells(record: bytes, mark: bytes) -> int:
 
 
 def _ends_quoted(line: bytes, quoted: bool, mark: bytes) -> bool:
-    """Whether a line ends within a quoted cell, if it begins within one or not."""
+    """Returns True if a line ends within a quoted cell; `quoted` is the state at its beginning."""
     place = 0
     while True:
         found = (_CLOSING.match if quoted else _OPENING[mark].search)(line, place)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a text file writes its table: encoding, separator, decimal mark, header, line of units, first row."""
+"""Dialect of a text file: encoding, separator, decimal mark, header, line of units, first row."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .table import MISSING, parse_number, parse_with
 from .units import split_name, unit_of
 
 HEAD_BYTES = 1 << 20
-"""Bytes in which the header must stand."""
+"""Number of bytes that must contain the header."""
 
 HEAD_LINES = 1000
-"""Lines, without comments, from which separator and decimal mark are recognised."""
+"""Number of lines, without comments, from which separator and decimal mark are recognised."""
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
-"""On equal evidence the first wins: a comma may be a decimal comma, a tab is only a separator."""
+"""Separators by preference: a comma may be a decimal comma, but a tab is always a separator."""
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 
@@ -33,24 +33,24 @@ RECORDING_FORMATS = "CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or
 Row = Sequence[str]
 
 LEAST_NUMBERS = 2
-"""Cells with numbers that make a row a row of data: a position and a force."""
+"""Least number of cells with numbers in a row of data: position and force."""
 
 LEAST_RUN = 3
-"""Rows of data that must follow each other, or all that the table has."""
+"""Least number of consecutive rows of data, or all rows of a shorter table."""
 
 THOUSANDS = re.compile(
     r"[-+]?(\d{1,3}(,\d{3})+\.\d*|\d{1,3}(\.\d{3})+,\d*|\d{1,3}(,\d{3}){2,}|\d{1,3}(\.\d{3}){2,}"
     r"|\d{1,3}(['’ \u00a0\u202f]\d{3})+([.,]\d*)?)"
 )
-"""A number with thousands separators, whatever the decimal mark."""
+"""Number with thousands separators, with any decimal mark."""
 
 MAYBE_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
-"""A number with one comma that may be a decimal comma or a thousands separator."""
+"""Number with one comma that may be a decimal comma or a thousands separator."""
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a text file is read."""
+    """Dialect of a text file."""
 
     encoding: str
     separator: str
@@ -58,22 +58,22 @@ class Dialect:
     names: tuple[str, ...]
     metadata: dict[str, str]
     start: int
-    """Bytes before the first line after the header (and its units)"""
+    """Bytes before the first line after the header and its units"""
     lines_before: int
     """Lines before that line"""
     trailing: bool
     """Each row ends with a separator"""
     notes: tuple[str, ...]
-    """What differs from a plain CSV file, in parts of a sentence"""
+    """Differences from a plain CSV file, in parts of a sentence"""
 
     @property
     def single_bytes(self) -> bool:
-        """Line feeds, separators and quotes are single bytes, so the file can be divided between rows."""
+        """True if line feeds, separators and quotes are single bytes: the file can be divided."""
         return not self.encoding.startswith("utf-16")
 
 
 def recognise(file: str, head: bytes, whole: bool) -> Dialect:
-    """Recognise the dialect of a text file.
+    """Recognises the dialect of a text file.
 
     Parameters
     ----------
@@ -137,12 +137,12 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
 
 
 def not_csv(file: str, error: csv.Error) -> InputError:
-    """The refusal of text that cannot be split into cells."""
+    """Returns the refusal of text that cannot be split into cells."""
     return InputError(f"{file} is not CSV: {error}; a quotation mark may not be closed")
 
 
 def not_text(file: str) -> InputError:
-    """The refusal of a file that is neither text nor of another known format."""
+    """Returns the refusal of a file that is neither text nor of another known format."""
     return InputError(f"{file} is not text; a recording is {RECORDING_FORMATS}")
 
 
@@ -152,7 +152,7 @@ def _encoding(head: bytes) -> tuple[int, str]:
             return len(mark), encoding
     some = head[:4096]
     even, odd = some[0::2].count(0), some[1::2].count(0)
-    # Latin letters, digits and separators have a zero byte beside them in UTF-16.
+    # In UTF-16, one of the two bytes of Latin letters, digits and separators is zero.
     if 4 * max(even, odd) > len(some) and 20 * min(even, odd) < max(even, odd):
         return 0, "utf-16-le" if odd > even else "utf-16-be"
     return 0, "utf-8"
@@ -165,7 +165,7 @@ def _decoded(file: str, head: bytes, encoding: str, whole: bool) -> str | None:
 
 
 def _is_binary(text: str) -> bool:
-    """Whether one character in ten is a control character, or one is NUL."""
+    """Returns True if one character in ten is a control character, or one is NUL."""
     some = text[:4096]
     control = sum(unicodedata.category(each) == "Cc" and each not in "\t\n\r\f" for each in some)
     return "\x00" in some or 10 * control > len(some)
@@ -178,18 +178,18 @@ def _json(file: str, text: str) -> InputError:
 
 @dataclass(frozen=True)
 class _Found:
-    """The header with one separator."""
+    """Header for one separator."""
 
     header: Header
     separator: str
     spans: list[tuple[int, int]]
     """First and last line of each row, counted from 0"""
     sample: list[list[str]]
-    """First rows of data; none without rows of numbers"""
+    """First rows of data; empty without rows of numbers"""
 
 
 def _header(file: str, lines: list[str]) -> _Found:
-    """The header with the separator that gives most columns of numbers."""
+    """Returns the header with the separator that gives most columns of numbers."""
     every = ((k, line) for k, line in enumerate(lines) if line.strip() and not _is_comment(line))
     plain = list(islice(every, HEAD_LINES))
     if not plain:
@@ -202,7 +202,7 @@ def _header(file: str, lines: list[str]) -> _Found:
         header = find_header(rows)
         above = plain[0][0] - 1
         if header is None and above >= 0 and _is_comment(lines[above]):
-            # numpy.savetxt writes its header as a comment.
+            # `numpy.savetxt` writes its header as a comment.
             spans, rows = _rows(file, [(above, lines[above].lstrip("# \t")), *plain], separator)
             header = find_header(rows)
         if header is not None and (best is None or header.numbers > best.header.numbers):
@@ -221,7 +221,7 @@ def _is_comment(line: str) -> bool:
 def _rows(
     file: str, plain: list[tuple[int, str]], separator: str
 ) -> tuple[list[tuple[int, int]], list[list[str]]]:
-    """First and last line of each row, and its cells."""
+    """Returns the first and last line of each row, and its cells."""
     spans, rows = [], []
     reader = csv.reader((line for _, line in plain), delimiter=separator)
     begun = 0
@@ -236,7 +236,7 @@ def _rows(
 
 
 def _metadata(lines: list[str], separator: str) -> Iterator[tuple[str, str]]:
-    """Key and value of each line before the header."""
+    """Yields key and value of each line before the header."""
     for line in lines:
         text = line.strip()
         if not text:
@@ -251,25 +251,25 @@ def _metadata(lines: list[str], separator: str) -> Iterator[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Header:
-    """Where the parts of a table stand, as indices of the rows that were given."""
+    """Positions of the parts of a table, as indices of the given rows."""
 
     row: int
     names: tuple[str, ...]
-    """Control characters are escaped; a unit from a line of units is added in brackets"""
+    """Column names. Control characters are escaped; a unit from a line of units is added in brackets."""
     first: int
     """First row of data"""
     units_row: int | None = None
     trailing: bool = False
-    """Each row ends with a separator; the last column has no name and is left out"""
+    """Each row ends with a separator; the last column has no name and is ignored"""
     numbers: int = 0
     """Columns that hold numbers in the first row of data"""
 
 
 def find_header(rows: Sequence[Row]) -> Header | None:
-    """Find the header above the first run of rows with two or more numbers, or None without such rows.
+    """Finds the header above the first run of rows with two or more numbers, or None without such rows.
 
-    The header is the row above the run that has the same number of cells, none of them a number; of several
-    such rows it is the one with the most units in its names, then the lowest one.
+    The header is a row above the run with the same number of cells and without numbers. Of several such rows
+    the one with the most units in its names is chosen, then the lowest one.
     """
     first = next((k for k in range(len(rows)) if _starts_run(rows, k)), None)
     if first is None:
@@ -297,17 +297,17 @@ def find_header(rows: Sequence[Row]) -> Header | None:
 
 
 def first_row_as_header(rows: Sequence[Row]) -> Header:
-    """Take the first row as the header, where no row of numbers tells."""
+    """Takes the first row as the header if no row of numbers shows it."""
     return Header(0, tuple(visible(name.strip()) for name in rows[0]), 1)
 
 
 def named(where: str, header: Header) -> tuple[Header, list[str]]:
-    """Check the names of a header. An unnamed first column gets a name; returns notes on what was recognised.
+    """Checks the names of a header and names an unnamed first column. Returns the header and notes.
 
     Raises
     ------
     InputError
-        A name is a number, is missing or stands twice, or there is only one column.
+        A name is a number, missing or repeated, or there is only one column.
     """
     names = list(header.names)
     notes = []
@@ -335,7 +335,7 @@ def named(where: str, header: Header) -> tuple[Header, list[str]]:
 
 
 def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
-    """The decimal mark of rows of data, "." or ",".
+    """Returns the decimal mark of rows of data, "." or ",".
 
     Raises
     ------
@@ -354,12 +354,12 @@ def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
 
 
 def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: str) -> None:
-    """Refuse cells that are numbers with other marks than the first rows have.
+    """Refuses numbers whose marks differ from those of the first rows.
 
     Raises
     ------
     InputError
-        A cell has thousands separators, or a comma in a file with decimal points. The sentence holds a
+        A cell has thousands separators, or a comma in a file with decimal points. The message contains a
         command that changes them.
     """
     for cell in dict.fromkeys(str(cell).strip() for cell in cells):
@@ -382,7 +382,7 @@ def _either(told: str, separator: str) -> InputError:
 
 
 def _remove(mark: str, separator: str, by: str) -> str:
-    """A command that replaces a mark between digits; in a comma-separated file only within quotes."""
+    """Returns a command that replaces a mark between digits; in a comma-separated file only within quotes."""
     escaped = {".": "[.]", "'": "\\x27"}.get(mark, mark)
     digits = "[0-9]" if by else "[0-9]{3}"
     if mark == separator:
@@ -412,9 +412,9 @@ def _starts_run(rows: Sequence[Row], k: int) -> bool:
 
 
 def _fits(rows: Sequence[Row], k: int, first: int) -> bool:
-    """Whether row k can be the header of row `first`: it has as many cells.
+    """Returns True if row k can be the header of row `first`: it has an equal number of cells.
 
-    Directly above it may have one less, if each row ends with a separator, or more, if cells are missing.
+    Directly above, it may have one cell less if each row ends with a separator, or more if cells are missing.
     """
     have, need = len(rows[k]), len(rows[first])
     if have == need:

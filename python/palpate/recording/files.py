@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files as a whole: fingerprint, complete or absent writing, and recordings written as CSV.
+"""Fingerprints of files, atomic writing, and recordings as CSV files.
 
-The CSV states the role of each column, so that it is read back without options. A record of what was rendered
-names one more role than the reader has options for: "status", the column that says of every row whether its
-force was the model's alone.
+The CSV file states the role of each column and can be read without options. A flight record has the
+additional role "status": the column states for every row if its force was the model's alone.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ _BLOCK = 1 << 20
 
 
 def sha256_of_file(path: Path) -> str:
-    """The SHA-256 of a file's bytes, in hexadecimal digits."""
+    """Returns the SHA-256 of a file in hexadecimal digits."""
     digest = hashlib.sha256()
     with path.open("rb") as stream:
         while block := stream.read(_BLOCK):
@@ -38,13 +37,13 @@ def sha256_of_file(path: Path) -> str:
 
 
 def require_file(path: Path) -> None:
-    """Refuse, in one sentence, what is not a readable, non-empty file."""
+    """Refuses a path that is not a readable, non-empty file."""
     if not path.exists():
         raise InputError(f"there is no file {path}")
     if path.is_dir():
         raise InputError(f"{path} is a folder, not a file")
     if not path.is_file():
-        # Opening a pipe without a writer would wait for ever.
+        # Opening a pipe without a writer would block forever.
         raise InputError(f"{path} is a pipe, a device or a socket; save its contents to a file first")
     try:
         with path.open("rb") as stream:
@@ -57,7 +56,7 @@ def require_file(path: Path) -> None:
 
 @contextmanager
 def readable(path: Path, kind: str) -> Iterator[None]:
-    """Turn every failure of a library that reads a file into one sentence with the name of the file.
+    """Converts every exception of a library that reads a file into an `InputError` with the file name.
 
     On broken files these libraries raise exceptions of many kinds.
 
@@ -77,10 +76,10 @@ def readable(path: Path, kind: str) -> Iterator[None]:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator[Path]:
-    """Give a temporary path beside `path`; it is renamed to `path` at the end, or removed if anything fails.
+    """Yields a temporary path in the folder of `path`, and renames it to `path` at the end.
 
-    The temporary name is unpredictable. An existing file keeps its mode and its owner, a symbolic link stays
-    and its target is replaced. The content is on the disk before the file has its name.
+    An error removes the temporary file. Its name is unpredictable. An existing file keeps its mode and owner.
+    A symbolic link is kept and its target is replaced. The content is on the disk before the file is renamed.
 
     Parameters
     ----------
@@ -92,7 +91,7 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
     Raises
     ------
     InputError
-        The folder does not exist or cannot be written, or the file is no ordinary file or exists.
+        The folder does not exist or cannot be written, or the file exists or is not a regular file.
     """
     target = Path(path)
     if target.is_symlink():
@@ -124,18 +123,18 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
 
 
 def require_absent(path: Path) -> None:
-    """Refuse a recording that exists; a broken symbolic link counts as one."""
+    """Refuses a path that exists, also a broken symbolic link."""
     if os.path.lexists(path):
         raise InputError(f"{path} exists already; choose another name, or replace it with --force")
 
 
 def _create(temporary: Path, before: os.stat_result | None) -> None:
-    """Create a file that is not there, with owner and mode of the file that it will replace."""
+    """Creates a new file with the owner and mode of the file that it will replace."""
     mode = 0o666 if before is None else stat.S_IMODE(before.st_mode)
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     try:
         if before is not None:
-            with suppress(PermissionError):  # only root gives files away
+            with suppress(PermissionError):  # only root may change the owner
                 os.fchown(descriptor, before.st_uid, before.st_gid)
             os.fchmod(descriptor, mode)  # without the umask
     finally:
@@ -143,7 +142,7 @@ def _create(temporary: Path, before: os.stat_result | None) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Wait until a file or a folder is on the disk, where its file system can tell."""
+    """Waits until a file or folder is on the disk, if the file system supports it."""
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)
@@ -155,7 +154,7 @@ def _sync(path: Path) -> None:
 
 
 def _rename_to_free_name(temporary: Path, target: Path) -> None:
-    """Give a file its name, unless that is taken meanwhile."""
+    """Renames a file unless the new name was taken in the meantime."""
     try:
         os.link(temporary, target)
     except FileExistsError:
@@ -167,19 +166,19 @@ def _rename_to_free_name(temporary: Path, target: Path) -> None:
 
 
 _KEY = "palpate-columns"
-"""The metadata key: ``# palpate-columns: {"position": "position_rad", ...}``."""
+"""Metadata key: ``# palpate-columns: {"position": "position_rad", ...}``."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Role to column name; empty for a file that does not say."""
+    """Role to column name; empty if the file does not state it."""
 
     roles: dict[str, str] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
 
     @staticmethod
     def taken_from(file: str, metadata: dict[str, str]) -> Layout:
-        """Take the layout out of a file's metadata."""
+        """Removes the layout from the metadata of a file and returns it."""
         text = metadata.pop(_KEY, None)
         if text is None:
             return Layout()
@@ -194,7 +193,7 @@ class Layout:
 
 
 def free_name(stem: str, suffix: str, taken: Collection[str]) -> str:
-    """`stem` + `suffix`, numbered where another column of the recording already has that name."""
+    """Returns `stem` + `suffix`, numbered if another column of the recording has that name."""
     name, number = stem + suffix, 2
     while name in taken:
         name, number = f"{stem}_{number}{suffix}", number + 1
@@ -204,12 +203,12 @@ def free_name(stem: str, suffix: str, taken: Collection[str]) -> str:
 def write_csv(
     path: Path, layout: Layout, columns: Mapping[str, Cells], metadata: Mapping[str, str], *, replace: bool
 ) -> None:
-    """Write columns and metadata; without `replace`, an existing file is refused.
+    """Writes columns and metadata; without `replace`, an existing file is refused.
 
     Raises
     ------
     InputError
-        The folder does not exist or cannot be written, or the metadata cannot stand on one line.
+        The folder does not exist or cannot be written, or the metadata does not fit on one line.
     """
     stated = json.dumps({**layout.roles, "inputs": list(layout.inputs)})
     with (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a file of columns by its kind; Parquet, and the kinds that are read as a whole."""
+"""Opening of files by their format; readers of Parquet and of formats that are read as a whole."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from .files import readable
 from .table import MISSING, Cells, LongTable, Table, parse_with, to_numbers
 
 _BUFFER_BYTES = 1 << 20
-"""Bytes read ahead of each column of Parquet."""
+"""Bytes of each Parquet column that are read ahead."""
 
 MOST_HEADER_ROWS = 200
-"""Rows of a sheet in which its header must stand."""
+"""Number of rows of a sheet that must contain its header."""
 
 STEADY_ROWS = 1000
-"""Rows in which a column with one or two values counts as steady."""
+"""Number of rows in which a column with one or two values counts as steady."""
 
 
 _HEADER = 128
-"""Bytes before the first element."""
+"""Number of bytes before the first element."""
 
 _MATRIX, _COMPRESSED = 14, 15
-"""Types of elements that hold an array, and a compressed one, which has a checksum."""
+"""Types of elements that contain an array, and a compressed array with a checksum."""
 
 _ITEM_BYTES = {
     **dict.fromkeys((1, 2, 14, 15, 16), 1),
@@ -41,22 +41,22 @@ _ITEM_BYTES = {
     **dict.fromkeys((5, 6, 7, 18), 4),
     **dict.fromkeys((9, 12, 13), 8),
 }
-"""Bytes of an item of each type of element."""
+"""Size of an item of each element type [bytes]."""
 
 _NUMERIC = range(6, 16)
-"""Classes of arrays of numbers: they hold flags, dimensions, name, values, and imaginary parts if complex."""
+"""Classes of numeric arrays: flags, dimensions, name, values, and imaginary parts if complex."""
 
 _COMPLEX = 1 << 11
 """Bit of the flags of an array."""
 
 
 def open_table(path: Path) -> Table:
-    """Open a file of columns; the end of its name tells its kind.
+    """Opens a file of columns; the suffix gives its format.
 
     Raises
     ------
     InputError
-        The file is not of its kind, or the library that reads it is not installed.
+        The file does not have that format, or the library that reads it is not installed.
     """
     kinds: dict[str, Callable[[Path], Table]] = {
         ".parquet": ParquetFile,
@@ -70,7 +70,7 @@ def open_table(path: Path) -> Table:
 
 
 class MemoryTable(Table):
-    """Columns that were read as a whole.
+    """Table in memory.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class ParquetFile(LongTable):
         parquet = _needed("pyarrow.parquet", path, "Parquet", "parquet")
         self._path = path
         with readable(path, "Parquet"):
-            # read in small pieces: a file may be larger than memory, and so may one of its row groups
+            # Read in small pieces: a file or one of its row groups may be larger than memory.
             self._file = parquet.ParquetFile(path, buffer_size=_BUFFER_BYTES, pre_buffer=False)
             schema = self._file.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)
@@ -162,7 +162,7 @@ class ParquetFile(LongTable):
             self.metadata = {
                 visible(key.decode()): visible(value.decode())
                 for key, value in (schema.metadata or {}).items()
-                # What the writing libraries note for themselves says nothing about the measurement.
+                # Notes of the writing libraries do not describe the measurement.
                 if key not in (b"pandas", b"ARROW:schema")
             }
         if len(set(self.names)) < len(self.names):
@@ -225,7 +225,7 @@ class ParquetFile(LongTable):
 def _arrow_cells(
     table: Any, names: Sequence[str], numbers: Collection[str], text: Collection[str]
 ) -> dict[str, Cells]:
-    """The columns of a table or batch of Arrow."""
+    """Returns the columns of a table or batch of Arrow."""
     columns: dict[str, Cells] = {}
     for index, name in enumerate(names):
         values = table.column(index).to_pandas().to_numpy()
@@ -246,7 +246,7 @@ def _as_objects(values: Cells) -> Cells:
 
 
 def _excel(path: Path) -> Table:
-    """The first sheet of a workbook that holds cells."""
+    """Returns the first sheet of a workbook that is not empty."""
     openpyxl = _needed("openpyxl", path, "an Excel file", "excel")
     with readable(path, "Excel (.xlsx)"):
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
@@ -281,7 +281,7 @@ def _excel(path: Path) -> Table:
 
 
 def _cells(values: Sequence[Any], decimal: str) -> Cells:
-    """Numbers where every value is one or is missing, else text."""
+    """Returns numbers if every value is a number or missing, else text."""
     if all(
         value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)) for value in values
     ):
@@ -293,7 +293,7 @@ def _cells(values: Sequence[Any], decimal: str) -> Cells:
 
 
 def _numpy(path: Path) -> Table:
-    """Arrays of an .npz file, by their names."""
+    """Returns the arrays of an .npz file by name."""
     with readable(path, "NumPy (.npz)"), path.open("rb") as stream:
         arrays = np.load(stream, allow_pickle=False)
         found = {name: arrays[name] for name in arrays.files}
@@ -301,7 +301,7 @@ def _numpy(path: Path) -> Table:
 
 
 def _matlab(path: Path) -> Table:
-    """Vectors of a .mat file, by their names; the fields of a structure stand beside them."""
+    """Returns the vectors of a .mat file by name, fields of a structure included."""
     from scipy.io import loadmat
 
     with readable(path, "MATLAB (.mat)"):
@@ -325,7 +325,7 @@ def _matlab(path: Path) -> Table:
 
 
 def _refuse_damaged(content: bytes) -> None:
-    """Refuse a MATLAB file of version 5 whose elements do not fit into each other; others pass.
+    """Refuses a MATLAB file of version 5 whose elements do not fit into each other; others pass.
 
     `scipy.io.loadmat` crashes on some of them.
 
@@ -340,7 +340,7 @@ def _refuse_damaged(content: bytes) -> None:
 
 
 def _elements(content: bytes, at: int, end: int, order: str) -> list[tuple[int, int]]:
-    """Check the elements from one byte to another; returns the type and first byte of the data of each."""
+    """Checks the elements from one byte to another; returns the type and first byte of the data of each."""
     found = []
     while at < end:
         start = at
@@ -371,7 +371,7 @@ def _damaged(at: int) -> ValueError:
 
 
 def _of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
-    """The vectors of the most frequent length as columns; single values are metadata."""
+    """Returns the vectors of the most frequent length as columns; single values are metadata."""
     arrays = {visible(str(name)): np.squeeze(np.asarray(value)) for name, value in found.items()}
     vectors = {name: each for name, each in arrays.items() if each.ndim == 1 and each.dtype.kind in "iufbUO"}
     lengths = Counter(len(array) for array in vectors.values())
@@ -392,7 +392,7 @@ def _vector(array: Any) -> Cells:
 
 
 def _mcap(path: Path) -> Table:
-    """JSON messages of an MCAP file: each topic is a table of its numbers, beside the time of its log."""
+    """Returns the JSON messages of an MCAP file: each topic is a table of its numbers and of its log time."""
     reader = _needed("mcap.reader", path, "MCAP", "mcap")
     topics: dict[str, list[dict[str, Any]]] = {}
     others: Counter[str] = Counter()
@@ -428,7 +428,7 @@ def _mcap(path: Path) -> Table:
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Numbers and words of a message, by names such as ``wrench.force_N``."""
+    """Yields numbers and words of a message by names like ``wrench.force_N``."""
     if isinstance(value, dict):
         for key, item in value.items():
             yield from _flat(item, f"{name}.{key}" if name else str(key))

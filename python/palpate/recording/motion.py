@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion of a recording: strokes by the order of rows, even pieces of time, zero-phase derivatives.
+"""Motion of a recording: strokes by the order of rows, pieces on an even time grid, zero-phase derivatives.
 
-Velocity and acceleration come from central differences, which have no phase, followed by one low-pass L run
-forward and backward, which has none either. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2.
+Velocity and acceleration are central differences, which have no phase. One low-pass L then runs forward and
+backward, which also has no phase. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2.
 """
 
 from __future__ import annotations
@@ -21,52 +21,52 @@ from ..errors import InputError
 from .recording import Recording
 
 TURN_SHARE = 0.02
-"""Share of the travel by which the position must move back to count as a turn [-]."""
+"""Least share of the travel by which the position must move back for a turn [-]."""
 
 TURN_NOISE = 8.0
-"""Standard deviations of the position's noise by which it must move back: noise alone does not [-]."""
+"""Standard deviations of the position noise by which it must move back; excludes turns by noise [-]."""
 
 TURN_STEPS = 1.5
-"""Steps of a quantised position by which it must move back: jitter between two steps is no turn [-]."""
+"""Steps of a quantised position by which it must move back; excludes jitter between two steps [-]."""
 
 LARGEST_TURN = 0.4
-"""Largest of these bounds, as a share of the travel: above it turns cannot be told from noise [-]."""
+"""Largest of these limits as a share of the travel; above it turns cannot be separated from noise [-]."""
 
 GRID = 8.0
-"""Steps of that bound to which positions are rounded to find the turns."""
+"""Steps of that limit to which positions are rounded to find the turns."""
 
 MOST_DIFFERENCES = 100_000
-"""Differences of neighbouring rows from which the noise is estimated, at most about."""
+"""Approximate largest number of differences of adjacent rows from which the noise is estimated."""
 
 LEAST_ROWS = 4
-"""Fewer rows from one turn to the next are a jump, as where one stroke ends and the next begins anew."""
+"""Least number of rows between two turns; fewer rows are a jump, for example between two strokes."""
 
 JUMPING_SHARE = 0.1
-"""Share of the rows in jumps above which the rows are in no order [-]."""
+"""Share of the rows in jumps above which the rows have no order [-]."""
 
 HOLD_SHARE = 0.1
-"""Share of a stroke's rows that the position must rest at its end to count as a hold [-]."""
+"""Least share of a stroke's rows that rest at its end for a hold [-]."""
 
 HOLD_ROWS = 10
-"""Fewest rows of a hold."""
+"""Least number of rows of a hold."""
 
 
 def strokes_from_order(position: Float1D) -> Int8Vector | None:
-    """Takes the direction of each row from the order of rows.
+    """Returns the direction of each row from the order of rows.
 
-    A stroke ends at the row that first reaches the position from which it then moves back: by more than the
-    noise, the resolution and 2 % of the travel.
+    A stroke ends at the first row at its extreme position. The motion back must exceed the noise, the
+    resolution and 2 % of the travel.
 
     Parameters
     ----------
     position : (n,) array
-        Positions in the order in which they were recorded, growing into the object.
+        Positions in the recorded order, growing into the object.
 
     Returns
     -------
     (n,) array of int8 or None
         +1 into the object, -1 out of it, 0 in a hold at the end of a stroke. All rows have one direction if
-        the position never turns back. None if the rows are in no order, or too few.
+        the position never turns back. None if the rows have no order or are too few.
     """
     travel = float(np.ptp(position)) if len(position) > LEAST_ROWS else 0.0
     if not 0.0 < travel < np.inf:
@@ -104,33 +104,33 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
 
 
 def ordered_strokes(recording: Recording) -> Int8Vector | None:
-    """Takes the direction of the rows (n,) of a recording from the order of all rows of its motion."""
+    """Returns the direction of the rows (n,) of a recording from the order of all rows of its motion."""
     motion = recording.motion
     direction = strokes_from_order(motion.position)
     return None if direction is None else direction[motion.rows]
 
 
 def turns_of(direction: Int8Vector) -> int:
-    """Number of times that the direction (n,) changes its sign."""
+    """Returns the number of sign changes of the direction (n,)."""
     moving = direction[direction != 0]
     return int(np.count_nonzero(moving[1:] != moving[:-1]))
 
 
 def _noise(x: Float1D) -> float:
-    """Standard deviation of the noise, from third differences: turns and jumps are too few to matter."""
+    """Returns the standard deviation of the noise from third differences; turns are too few to matter."""
     differences = np.abs(x[3:] - x[:-3] - 3.0 * (x[2:-1] - x[1:-2]))
     return float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]) / (0.6745 * math.sqrt(20.0)))
 
 
 def _resolution(x: Float1D) -> float:
-    """Smallest step from row to row, rounding errors left out."""
+    """Returns the smallest step between adjacent rows, without rounding errors."""
     steps = np.abs(np.diff(x))
     return float(np.min(steps[steps > 1e-9]))
 
 
 def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
-    """The row at which each stroke ends, and its direction; a stroke ends where x moves back by more."""
-    # On a grid, few of the rows are local extremes, whatever the noise.
+    """Returns last row and direction of each stroke; a stroke ends if x moves back by more than `back`."""
+    # On a grid few rows are local extremes, at any noise.
     grid = np.rint(x * (GRID / back))
     steps = np.diff(grid)
     moves = np.flatnonzero(steps)
@@ -162,7 +162,7 @@ def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
 
 
 def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
-    """First and last row of the rows around one that stay within a distance of its position."""
+    """Returns the first and last of the adjacent rows within a distance of the position of one row."""
     away = np.abs(x - x[row]) > within
     before, after = np.flatnonzero(away[:row]), np.flatnonzero(away[row:])
     first = int(before[-1]) + 1 if len(before) else 0
@@ -171,25 +171,25 @@ def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
 
 
 GAP = 2.5
-"""Steps of time above this many median ones are gaps: nothing is differentiated or filtered across them."""
+"""Ratio to the median time step above which a step is a gap. Derivatives and filters stop at gaps."""
 
 UNEVEN = 0.01
-"""Share of the period by which the steps of a piece may differ from it before it is resampled."""
+"""Largest difference of the time steps of a piece, as a share of the period, without resampling."""
 
 MARGIN = 3.0
-"""Time constants of L, 2/w_c for its two poles, that are left out at both ends of a piece."""
+"""Time constants of L, 2/w_c for its two poles, that are removed at both ends of a piece."""
 
 FINEST = 0.25
-"""Highest cutoff tried [1/period]: above it L would be no filter."""
+"""Highest cutoff that is tried [1/period]; above it L would not filter."""
 
 NOISE_SHARE = 0.01
-"""Noise of the position that L may let into the variance of a derivative."""
+"""Largest share of position noise in the variance of a derivative after L."""
 
 STEP = 0.85
-"""Ratio of the cutoffs that are tried one after the other."""
+"""Ratio of successive cutoffs."""
 
 LEAST_CONSTANTS = 200.0
-"""1/w_c that the recording must last: what is slower is no motion."""
+"""Least duration of the recording in units of 1/w_c; slower changes are not motion."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class Piece:
     """Rows without a gap, on an even grid of time."""
 
     rows: slice
-    """Of the recording"""
+    """Rows of the recording"""
     time: Float1D
     """(k,) [s]"""
     position: Float1D
@@ -205,16 +205,16 @@ class Piece:
     row_time: Float1D
     """(rows,) [s]"""
     period: float
-    """Of the grid [s]"""
+    """Period of the grid [s]"""
     even: bool
-    """The grid is the recording's own rows; else it was interpolated between them."""
+    """True if the grid is the recording's rows; False if it was interpolated between them"""
 
     def on_grid(self, values: Float1D) -> Float1D:
-        """Values at the piece's rows, at the times of the grid."""
+        """Returns values at the piece's rows, interpolated to the grid."""
         return values if self.even else np.interp(self.time, self.row_time, values)
 
     def at_rows(self, values: Float1D) -> Float1D:
-        """Values on the grid, at the piece's rows."""
+        """Returns values on the grid, interpolated to the piece's rows."""
         return values if self.even else np.interp(self.row_time, self.time, values)
 
     @property
@@ -236,11 +236,11 @@ class LowPass:
     """w_c [rad/s]"""
 
     def margin(self, period: float) -> int:
-        """Samples at each end that the ends of a signal disturb."""
+        """Returns the number of samples at each end that the ends of a signal disturb."""
         return math.ceil(2.0 * MARGIN / (self.cutoff * period))
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
-        """The signal (k,) without what lies above the cutoff, and without delay; its ends are mirrored."""
+        """Returns the signal (k,) below the cutoff without delay. Its ends are mirrored."""
         pole = math.exp(-self.cutoff * period)
         response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
         mirrored = min(len(signal) - 1, self.margin(period))
@@ -252,9 +252,9 @@ class LowPass:
 
 
 def pieces(recording: Recording) -> list[Piece]:
-    """The recording between its gaps, each piece on an even grid of the motion's median step of time.
+    """Divides the recording at its gaps; each piece has an even grid of the motion's median time step.
 
-    The positions are those of the whole motion; the forces are those of the recording's own rows.
+    Positions are from the whole motion, forces from the rows of the recording.
 
     Raises
     ------
@@ -288,12 +288,12 @@ def pieces(recording: Recording) -> list[Piece]:
 
 
 def velocity_of(position: Float1D, period: float) -> Float1D:
-    """Central difference (k,), one-sided at the ends."""
+    """Returns the central difference (k,), one-sided at the ends."""
     return np.gradient(position, period) if len(position) > 1 else np.zeros_like(position)
 
 
 def acceleration_of(position: Float1D, period: float) -> Float1D:
-    """Second central difference (k,), held at the ends."""
+    """Returns the second central difference (k,), constant at the ends."""
     if len(position) < 3:
         return np.zeros_like(position)
     inner = np.diff(position, 2) / period**2
@@ -301,10 +301,10 @@ def acceleration_of(position: Float1D, period: float) -> Float1D:
 
 
 def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
-    """The highest L whose derivative of that order holds at most NOISE_SHARE of noise; None: there is none.
+    """Returns the highest L whose derivative of that order contains at most NOISE_SHARE of noise, or None.
 
-    The position's noise is what sixth differences leave of it, as white noise would; a hand's motion leaves
-    next to nothing there. Noise of the derivative is that through the impulse response of both filters.
+    Sixth differences of the position estimate its noise, because a hand's motion leaves almost nothing in
+    them. The noise of the derivative follows from the impulse response of both filters.
     """
     sixth = [np.diff(part.position, 6) for part in parts if len(part.position) > 6]
     if not sixth:
@@ -333,14 +333,14 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
 
 
 def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
-    """Pieces of which something is left without their margins."""
+    """Returns the pieces that are longer than their margins."""
     return [part for part in parts if len(part.time) > 2 * low_pass.margin(part.period) + 2]
 
 
 def at_rows(
     parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
 ) -> tuple[Float1D, NDArray[np.bool_]]:
-    """A derivative behind L at the n rows that the pieces are of (n,), and the rows that have one (n,)."""
+    """Returns a derivative after L at the n rows of the pieces (n,), and which rows have one (n,)."""
     result, known = np.zeros(n), np.zeros(n, dtype=np.bool_)
     for part in long_enough(parts, low_pass):
         margin = low_pass.margin(part.period)
@@ -351,18 +351,18 @@ def at_rows(
 
 
 def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Velocity [position unit per second] at the rows of a recording (n,), and which rows have one (n,).
+    """Returns the velocity [position unit per second] at the rows (n,), and which rows have one (n,).
 
     Raises
     ------
     InputError
-        The recording has no time, or its position is too noisy or too short to be differentiated.
+        The recording has no time, or its position is too noisy or too short to differentiate.
     """
     return _derivative(recording, 1)
 
 
 def acceleration(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Acceleration [position unit per second squared], as :func:`velocity`."""
+    """Returns the acceleration [position unit per second squared]; see :func:`velocity`."""
     return _derivative(recording, 2)
 
 

@@ -20,82 +20,82 @@ from .motion import GAP
 from .recording import Recording
 
 TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
-"""Least and largest plausible travel, by unit: from a microscope's tip to an arm, and up to 50 turns."""
+"""Least and largest plausible travel by unit: from the tip of a microscope to an arm, and up to 50 turns."""
 
 FORCE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
-"""Least and largest plausible range of the force, by unit; that of N depends on the travel."""
+"""Least and largest plausible force range by unit; that of N depends on the travel."""
 
 SMALL_TRAVEL = 1e-4
-"""Travel below which a recording is one of a microscope [m]."""
+"""Travel below which a recording is from a microscope [m]."""
 
 SMALL_FORCE, LARGE_FORCE = (1e-10, 0.1), (1e-3, 1e4)
-"""Plausible range of the force below that travel, and from it on [N]."""
+"""Plausible force range below that travel, and above it [N]."""
 
 LOOP_IN_LINE = 0.8
 """Share of the positions at which a loop has the sign of its mean."""
 
 LEAST_LOOP = 0.02
-"""Mean of press minus release force, as a share of the force's spread, from which there is a loop."""
+"""Least mean of press minus release force for a loop, as a share of the force's spread."""
 
 LOOP_ERRORS = 5.0
-"""The same mean over its standard error."""
+"""Least mean of press minus release force for a loop, over its standard error."""
 
 CLIPPED_ROWS = 5
-"""Rows that a clipped force or position needs."""
+"""Least number of rows with a clipped force or position."""
 
 CLIPPED_POSITIONS = 3
-"""Positions of a clipped force; a tool that rests has one."""
+"""Least number of positions of a clipped force. A tool at rest has one."""
 
 CLIPPED_RATIO = 5.0
-"""Rows at the extreme value over the rows at any value near it: a rounded force rarely has more than 3."""
+"""Least ratio of rows at the extreme value to rows at any near value. A rounded force rarely exceeds 3."""
 
 NEAR_EXTREME = 0.1
-"""Share of the force's range that is near the extreme."""
+"""Distance from the extreme that counts as near, as a share of the force's range."""
 
 CONTACT_FLOOR = 0.2
-"""Share of the largest |force| below which an extreme is that of a tool that touches nothing."""
+"""Share of the largest |force| below which the extreme belongs to a tool without contact."""
 
 FORCE_GOES_ON = 0.1
-"""Share of the force's range by which the force changes while the position stands still."""
+"""Least change of force at a constant position, as a share of the force's range."""
 
 STANDING_NOISE = 6.0
-"""The same change over the noise of the force."""
+"""Least change of force at a constant position, over the force noise."""
 
 STUCK_FORCE = 0.005
-"""The same share where the position jumps afterwards."""
+"""Least change of force before a jump of the position, as a share of the force's range."""
 
 JUMP = 5.0
-"""Step over the usual one with which a position that was stuck goes on."""
+"""Least ratio of that jump to the usual step."""
 
 REGULAR_RUNS = 0.8
-"""Share of the rows that stand in runs of one length, or of its multiples."""
+"""Least share of the rows in runs of one length or its multiples."""
 
 SLOWER = 1.5
-"""Changes of the other column over those of the held one."""
+"""Least ratio of the changes of the other column to those of the held column."""
 
 TOLD_LAG = 0.005
-"""Change of the force from run to run, as a share of its spread, from which a lag is reported."""
+"""Least change of force from run to run for which a lag is reported, as a share of its spread."""
 
 LONGEST_RUN = 1000
-"""Rows of a run from which it is no held sample but a pause."""
+"""Rows of a run above which it is a pause, not a held sample."""
 
 LEAST_GAP = 0.02
-"""Share of the travel from which an interval without rows is a gap."""
+"""Least width of a gap, as a share of the travel."""
 
 WIDER_GAP = 8.0
-"""Width of a gap over the 90th percentile of the distances between neighbouring positions."""
+"""Least width of a gap over the 90th percentile of the distances between adjacent positions."""
 
 END_GAP = 0.05
-"""Share of the travel that one stroke may leave out at an end."""
+"""Largest share of the travel that one stroke may omit at an end."""
 
 LEAST_LOST = 0.05
-"""Share of the duration from which missing samples are reported."""
+"""Least share of the duration for which missing samples are reported."""
 
 
 def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
-    """Findings on each recording, named where there are several, and on all of them together.
+    """Returns findings on each recording, with its name if there are several, and on all of them together.
 
-    `side` (n,) is the direction of the rows of all recordings, where they do not state it.
+    `side` (n,) is the direction of the rows of all recordings if they do not state it.
     """
     if len(recordings) == 1:
         return quality_findings(recordings[0])
@@ -110,7 +110,7 @@ def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) ->
 
 
 def quality_findings(recording: Recording) -> list[Finding]:
-    """Findings on a recording as it was read, none where nothing looks wrong."""
+    """Returns findings on a recording as it was read; empty without defects."""
     if len(recording) < MIN_ROWS:
         return []
     travel = Travel.of(recording.position)
@@ -126,7 +126,7 @@ def quality_findings(recording: Recording) -> list[Finding]:
 
 
 def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
-    """Findings on an implausible travel or range of force. Nothing is known of units that are not stated."""
+    """Returns findings on an implausible travel or force range. Unstated units are not checked."""
     position, force = recording.units["position"], recording.units["force"]
     inner = recording.force[travel.inside]
     force_bounds = FORCE.get(force)
@@ -151,10 +151,10 @@ def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) -> list[Finding]:
-    """Findings on a turned direction, a loop that gives out energy, and a force that falls with position."""
+    """Returns findings on a reversed direction, an active loop, and a force that falls with position."""
     words = recording.direction
     if words is not None and len(words) > 1:
-        # a spike goes both ways, so it does not count
+        # a spike goes both ways and does not count
         step = np.where(travel.inside[1:] & travel.inside[:-1], np.diff(recording.position) * words[1:], 0.0)
         if step.sum() < 0:
             against = float(np.mean(step[step != 0.0] < 0))
@@ -185,7 +185,7 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
 
 
 def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
-    """Mean of press minus release force, and whether it is clearly not zero."""
+    """Returns the mean of press minus release force, and True if it is clearly not zero."""
     if cells is None or len(cells.loop) < 4:
         return 0.0, False
     mean = float(np.mean(cells.loop))
@@ -196,7 +196,7 @@ def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
 
 
 def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:
-    """Findings on a clipped force, a clipped position, and a position that was stuck."""
+    """Returns findings on a clipped force, a clipped position, and a stuck position."""
     x, f = recording.position, recording.force
     reach = float(np.ptp(f))
     if not reach > 0.0:
@@ -224,7 +224,7 @@ def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def _standing(recording: Recording, travel: Travel, reach: float) -> list[Finding]:
-    """Findings on a position that has the same value in many rows while the force goes on."""
+    """Returns findings on a position that is constant in many rows while the force changes."""
     x, f = recording.position, recording.force
     noise = float(np.median(np.abs(np.diff(f)))) / 0.954
     bound = max(FORCE_GOES_ON * reach, STANDING_NOISE * noise)
@@ -266,16 +266,16 @@ def _standing(recording: Recording, travel: Travel, reach: float) -> list[Findin
 
 
 def _usual_count(x: Float1D, value: float, travel: Travel) -> float:
-    """Rows at the values next to an extreme one."""
+    """Returns the number of rows at the values next to an extreme one."""
     near = x[(np.abs(x - value) <= NEAR_EXTREME * travel.length) & (x != value)]
     return float(np.median(np.unique(near, return_counts=True)[1])) if len(near) else 1.0
 
 
 def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
-    """Largest distance of the force inside a run of consecutive rows from both ends of the run.
+    """Returns the largest distance of the force inside a run of consecutive rows from both ends of the run.
 
-    A hand that turns stands still while friction lets go: the force then ends elsewhere than it began, but
-    lies between.
+    A hand is at rest when it reverses, while friction changes its sign. The force then changes from one end
+    of the run to the other, but does not leave that range.
     """
     first = np.flatnonzero(np.diff(rows, prepend=-2) != 1)
     last = np.r_[first[1:], len(rows)] - 1
@@ -287,15 +287,15 @@ def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
 
 
 def _range_of(values: Float1D) -> float:
-    """Range of the inner 90 %."""
+    """Returns the range of the inner 90 %."""
     low, high = np.percentile(values, (5.0, 95.0))
     return float(high - low)
 
 
 def hold_findings(recording: Recording) -> list[Finding]:
-    """Findings on columns that change only once in several rows.
+    """Returns findings on columns that change only once in several rows.
 
-    Both columns together matter only with time, which then belongs to other rows than they do.
+    Both columns together matter only with time, which then belongs to other rows.
     """
     x, f = recording.position, recording.force
     rows = {"position": _held_for(x), "force": _held_for(f)}
@@ -329,7 +329,7 @@ def _held(recording: Recording, what: str, rows: int, other: str) -> list[Findin
 
 
 def _held_for(values: Float1D) -> int:
-    """Rows for which a column is held; 1 where the runs of equal values have no common length."""
+    """Returns the number of rows for which a column is held; 1 without a common length."""
     edges = np.flatnonzero(np.diff(values)) + 1
     lengths = np.diff(edges)
     lengths = lengths[lengths < LONGEST_RUN]
@@ -341,7 +341,7 @@ def _held_for(values: Float1D) -> int:
 
 
 def gap_findings(recording: Recording, travel: Travel) -> list[Finding]:
-    """Findings on gaps in position and in time."""
+    """Returns findings on gaps in position and in time."""
     return [*_position_gaps(recording, travel), *_time_gaps(recording)]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a recording from a file, or takes it from a frame or arrays; part by part where it is large."""
+"""Reading of recordings from files, frames or arrays; long files are read in parts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .rows import LeftOut
 from .table import LongTable, Places, Table
 
 Given: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
-"""What is a recording, or can be read as one."""
+"""A recording, or data that can be read as one."""
 
 CURE = "give a Recording, the name of a file, a DataFrame, or arrays of position and force"
 
@@ -45,52 +45,52 @@ def read_recording(
     force_late_s: float = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
-    """Read a recording from a file.
+    """Reads a recording from a file.
 
-    The name of a column states its unit (``displacement_mm``, ``Force [gf]``, ``Force (mN)``, ``Force / N``),
-    or a second header line does. The unit is looked up in a closed table, and values are converted to SI.
-    Separator, decimal mark, encoding and lines before the header are recognised; the first note reports them.
+    The name of a column or a second header line states its unit (``displacement_mm``, ``Force [gf]``, ``Force
+    (mN)``, ``Force / N``). Units are those of a closed table, and values are converted to SI. Separator,
+    decimal mark, encoding and lines before the header are recognised; the first note reports them.
 
     Parameters
     ----------
     path : path
-        CSV (separated by commas, semicolons or tabs); a ``.part`` file, a recording cut off while it grew,
-        whose torn last line is left out and counted; ``.parquet`` (needs pyarrow), ``.xlsx`` (openpyxl),
-        ``.npz``, ``.mat``, or ``.mcap`` with JSON messages (mcap).
+        CSV (separated by commas, semicolons or tabs); an incomplete ``.part`` file, whose torn last line is
+        ignored and counted; ``.parquet`` (needs pyarrow), ``.xlsx`` (openpyxl), ``.npz``, ``.mat``, or
+        ``.mcap`` with JSON messages (mcap).
     position, force, time : str, optional
-        Column names. Without them the columns are chosen by name and unit; where that is ambiguous, the error
-        names the candidates.
+        Column names. By default columns are chosen by name and unit; if that is ambiguous, the error names
+        the candidates.
     direction : str, optional
         Column with the direction of the stroke, in words (press, approach, load, loading, forward, +1;
-        release, retract, unload, unloading, back, -1; pause, hold, extra, 0). Without it a column called
-        ``direction``, or one called ``segment`` that holds words, is taken.
+        release, retract, unload, unloading, back, -1; pause, hold, extra, 0). By default a column
+        ``direction``, or a column ``segment`` with words, is used.
     inputs : sequence of str
         Further columns that the force depends on.
     units : mapping of str to str, optional
-        Unit of a column, by its name or by "position", "force" or "time" where that column is named too; for
-        columns without a unit, or in one that the table does not know.
+        Unit of a column without a unit or with an unknown one. The key is the column's name, or "position",
+        "force" or "time" if that column is also named.
     torque_constant : float, optional
-        Torque per current [N*m/A]: turns a force column in A into N*m. Without it current stays in A.
+        Torque per current [N*m/A]: converts a force column from A to N*m. By default current remains in A.
     negate : sequence of str
-        "position", "force" or names of used columns whose sign is to be turned.
+        "position", "force" or names of used columns whose sign is inverted.
     rows : (start, stop), optional
-        Half-open range of data rows to use, counted from 0; None for either end leaves it open.
+        Half-open range of data rows to use, counted from 0; None leaves an end open.
     zero : (start, stop), optional
-        Half-open range of data rows, counted as `rows`, in which the tool touches nothing: their mean force
-        is taken off all forces.
+        Half-open range of data rows, counted as `rows`, without contact. Their mean force is subtracted from
+        all forces.
     force_late_s : float
-        How long after its position each force was recorded [s], as where a load cell's converter averages:
-        every force is brought back to the position it belongs to. Needs time.
+        Delay of the recorded force after its position [s], for example if the converter of a load cell
+        averages. Every force is moved to its position. Needs time.
     invalid : {"refuse", "drop"}
-        What to do with a row that has no number where one is needed, an infinite one, or a time that repeats
-        or runs backward: refuse the file, naming the row, or drop the row and count it.
+        Treatment of a row with a missing or infinite number, or with a time that does not increase: refuse
+        the file and name the row, or drop the row and count it.
 
     Returns
     -------
     Recording
-        SI arrays; its ``notes`` say what was chosen, dropped and noticed. Of what was rendered live only the
-        rows whose force was the model's alone are kept: not the ramp at the start, nor what a limit clipped
-        or a fault set to zero.
+        SI arrays; its ``notes`` report choices, dropped rows and observations. A flight record keeps only the
+        rows whose force was the model's alone: the start ramp and rows that a limit clipped or a fault set to
+        zero are left out.
 
     Raises
     ------
@@ -130,23 +130,23 @@ def recording_from(
     inputs: Sequence[str] = (),
     name: str = "recording",
 ) -> Recording:
-    """The recording that is given, read or made of arrays.
+    """Returns the given recording, or reads it or makes it from arrays.
 
     Parameters
     ----------
     recording : Recording, path, DataFrame or (n,) array_like
-        With `force` it is the array of positions.
+        The array of positions if `force` is given.
     force, time, direction : (n,) array_like, optional
         As in :meth:`palpate.Recording.from_arrays`.
     inputs : sequence of str
-        Further columns to read from a file or a frame.
+        Further columns of a file or a frame.
     name : str
-        The argument in messages.
+        Name of the argument in messages.
 
     Raises
     ------
     InputError
-        It is something else; the message names the argument.
+        The value has another type; the message names the argument.
     """
     if force is not None:
         if isinstance(recording, (Recording, str, os.PathLike, pd.DataFrame)):
@@ -172,12 +172,12 @@ def recordings_from(
     *,
     inputs: Sequence[str] = (),
 ) -> list[Recording]:
-    """The recordings that are given: one, as in :func:`recording_from`, or a list.
+    """Returns the given recordings: one as in :func:`recording_from`, or a list.
 
     Raises
     ------
     InputError
-        One of them is something else, or there is none.
+        The list is empty, or a value has another type.
     """
     several: Any = recording
     is_list = isinstance(recording, Iterable) and not isinstance(
@@ -196,10 +196,10 @@ def recordings_from(
 
 
 PART_ROWS = 4_000_000
-"""Rows of a part: what one worker reads at a time."""
+"""Rows of a part, which one worker reads at a time."""
 
 BLOCK_ROWS = 500_000
-"""Rows that are in memory at a time."""
+"""Rows in memory at a time."""
 
 
 @dataclass(frozen=True)
@@ -212,23 +212,23 @@ class Block:
     """[SI]"""
     direction: Int8Vector | None
     rows: int
-    """Rows of the file, those that are left out included"""
+    """Rows of the file, ignored rows included"""
     left_out: LeftOut
 
 
 @dataclass(frozen=True)
 class LongRecording:
-    """How a file is read; from :func:`open_long_recording`, and light enough to be sent to workers."""
+    """Description of a long file from :func:`open_long_recording`, small enough to send to workers."""
 
     path: Path
     how: Conversion
-    """Of position, force and direction"""
+    """Conversion of position, force and direction"""
     parts: tuple[tuple[int, int], ...]
-    """Places between which the file is read apart"""
+    """Places between which the file is read in parts"""
     rows: int
     """Rows of the file, counted without reading their cells"""
     source: Source
-    """Without the number of rows that are used"""
+    """Source without the number of used rows"""
     notes: tuple[str, ...]
 
     @property
@@ -242,12 +242,12 @@ class LongRecording:
         return self.how.units
 
     def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
-        """Position, force and direction of the rows of a part, block by block.
+        """Yields position, force and direction of the rows of a part in blocks.
 
         Raises
         ------
         InputError
-            A row has no finite number or no known direction, and rows are not to be dropped.
+            A row has no finite number or no known direction, and rows may not be dropped.
         """
         table = _long(open_table(self.path), self.path)
         how = self.how
@@ -260,12 +260,12 @@ class LongRecording:
             yield Block(position, force, direction, len(check.kept), check.left_out)
 
     def places(self) -> Places:
-        """Where the rows of the file stand."""
+        """Returns the places of the rows of the file."""
         return open_table(self.path)
 
 
 class _Part:
-    """Where the rows of a part stand. The rows before the part are counted only when a place is needed."""
+    """Places of the rows of a part. The rows before the part are counted only when a place is needed."""
 
     def __init__(self, table: LongTable, part: tuple[int, int]) -> None:
         self._table, self._part = table, part
@@ -289,12 +289,12 @@ def open_long_recording(
     invalid: Literal["refuse", "drop"] = "refuse",
     part_rows: int = PART_ROWS,
 ) -> LongRecording:
-    """Choose the columns of a file without reading its rows; the arguments are those of `read_recording`.
+    """Chooses the columns of a file without reading its rows; the arguments are those of `read_recording`.
 
     Raises
     ------
     InputError
-        One sentence that names the file, the column and what would be right.
+        One sentence that names the file, the column and the cure.
     """
     file = Path(path)
     require_file(file)

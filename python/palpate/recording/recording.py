@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recording: measured force over position in SI arrays, and where they came from."""
+"""Recording: measured force over position in SI arrays, with its source."""
 
 from __future__ import annotations
 
@@ -28,31 +28,31 @@ T = TypeVar("T")
 class Recording:
     """Measured (or simulated) force over position, in SI units.
 
-    Position grows into the object; force is what the object exerts against the tool, so pressing a spring
-    gives a positive force. Arrays are read-only.
+    Position grows into the object. Force is the force of the object against the tool: pressing a spring gives
+    a positive force. Arrays are read-only.
     """
 
     position: Float1D
     """(n,) [m, rad or count, see `units`]"""
     force: Float1D
-    """(n,) [N, N*m, or A where the force is only known as a motor current]"""
+    """(n,) [N, N*m, or A if the force is only known as a motor current]"""
     time: Float1D | None
     """(n,) [s], strictly increasing, or None"""
     direction: Int8Vector | None
-    """(n,) +1 into the object, -1 out of it, 0 neither; None where the file does not say"""
+    """(n,) +1 into the object, -1 out of it, 0 neither; None if the file does not state it"""
     inputs: Float2D
-    """(n, d) further inputs, SI where their names carry a unit"""
+    """(n, d) further inputs, SI if their names contain a unit"""
     input_names: tuple[str, ...]
     columns: Mapping[str, Cells]
-    """Every other column as it stands in the file: float64, or str objects for text"""
+    """Every other column, unconverted: float64, or str objects for text"""
     metadata: Mapping[str, str]
     units: Mapping[str, str]
-    """"position": "rad" | "m" | "count" | "", "force": "N*m" | "N" | "A" | "" ("": SI, not said which)"""
+    """"position": "rad" | "m" | "count" | "", "force": "N*m" | "N" | "A" | "" ("": SI, not specified)"""
     source: Source
     notes: tuple[str, ...] = field(default=())
-    """What was chosen, dropped and noticed while reading, in sentences"""
+    """Choices, dropped rows and observations of the reader, in sentences"""
     part_of: Motion | None = field(default=None, repr=False)
-    """The motion that the rows were taken from; None where the recording holds all of it"""
+    """Motion that contains the rows; None if the recording contains all of it"""
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -84,7 +84,7 @@ class Recording:
         units: Mapping[str, str] | None = None,
         metadata: Mapping[str, str] | None = None,
     ) -> Recording:
-        """Make a recording from arrays in SI units.
+        """Makes a recording from arrays in SI units.
 
         Parameters
         ----------
@@ -97,17 +97,17 @@ class Recording:
         direction : (n,) array_like, optional
             +1 into the object, -1 out of it, 0 neither.
         inputs : mapping of str to (n,) array_like, optional
-            What else the force depends on, by name, SI.
+            Further inputs of the force, by name, SI.
         units : mapping, optional
-            {"position": "rad", "force": "N*m"}; without it the data is SI, but not said which.
+            {"position": "rad", "force": "N*m"}; by default SI units that are not specified.
         metadata : mapping, optional
-            What the data says about itself.
+            Description of the data.
 
         Raises
         ------
         InputError
             Shapes differ, a value is not finite, time does not increase, a direction is not -1, 0 or +1, or a
-            unit is not one that recordings carry.
+            unit is not allowed in a recording.
         """
         arrays: dict[str, Float1D] = {}
         given_inputs = _mapping("inputs", inputs)
@@ -174,18 +174,19 @@ class Recording:
         units: Mapping[str, str] | None = None,
         invalid: Literal["refuse", "drop"] = "refuse",
     ) -> Recording:
-        """Make a recording from a pandas DataFrame whose column names end in a unit, as from a file.
+        """Makes a recording from a pandas DataFrame. Column names end in a unit, as in a file.
 
         Parameters
         ----------
         frame : pandas.DataFrame
-            Its ``attrs`` become the metadata. An index with a name is taken as one more column.
+            Its ``attrs`` become the metadata. A named index is one more column.
         position, force, time, direction : str, optional
-            Column names; chosen by name and unit where not given, as in :func:`palpate.read_recording`.
+            Column names; by default chosen by name and unit, as in :func:`palpate.read_recording`.
         inputs : sequence of str
             Further columns that the force depends on.
         units : mapping of str to str, optional
-            Unit of a column, by its name or by "position", "force" or "time" where that column is named too.
+            Unit of a column. The key is its name, or "position", "force" or "time" if that column is also
+            named.
         invalid : {"refuse", "drop"}
             Refuse a frame with rows that cannot be used, or drop these rows and count them.
 
@@ -216,27 +217,27 @@ class Recording:
 
     @property
     def motion(self) -> Motion:
-        """The whole motion, rows that were held out included."""
+        """The whole motion, held-out rows included."""
         if self.part_of is not None and len(self.part_of.rows) == len(self):
             return self.part_of
         return Motion(self.position, self.time, np.arange(len(self)))
 
     @property
     def sample_period(self) -> float | None:
-        """The median step of time [s], or None without time."""
+        """Median time step [s], or None without time."""
         if self.time is None or len(self.time) < 2:
             return None
         return float(np.median(np.diff(self.time)))
 
     def split(self, every: int = 5) -> tuple[Recording, Recording]:
-        """Hold out every `every`-th row: (train, test), test being the rows i with i mod every = every - 1.
+        """Holds out every `every`-th row; returns (train, test).
 
-        Both parts keep the motion of all rows, from which velocity and play are formed.
+        `test` has the rows i with i mod every = every - 1. Both parts keep the motion of all rows.
 
         Raises
         ------
         InputError
-            `every` is below 2, or so large that no row would be held out.
+            `every` is below 2, or too large to hold out a row.
         """
         if number_of("every", every) != int(every) or not 2 <= every <= len(self):
             raise InputError(
@@ -268,20 +269,20 @@ class Recording:
         )
 
     def without(self, rows: npt.NDArray[np.bool_]) -> Recording:
-        """The recording without the rows (n,) that are marked."""
+        """Returns the recording without the marked rows (n,)."""
         return self._rows(~rows)
 
     def with_force_earlier(self, late_s: float) -> Recording:
-        """The same motion where the force was recorded late_s [s] after the position it belongs to.
+        """Returns the recording corrected for a force that was recorded late_s [s] after its position.
 
-        Where a stroke turns on a steep force, a late one lies higher on the way back than on the way in,
-        which no passive object does. Positions and further inputs become those of late_s before; the first
-        rows, whose position then was not recorded, are left out.
+        At a reversal on a steep force, a late force is larger in the release than in the press, which a
+        passive object cannot do. Positions and further inputs are shifted by late_s; the first rows, whose
+        shifted position was not recorded, are removed.
 
         Raises
         ------
         InputError
-            The recording has no time, or late_s is negative or leaves nothing.
+            The recording has no time, or late_s is negative or longer than the recording.
         """
         if self.time is None:
             raise InputError("a force that was recorded late can be brought back only with a column of time")
@@ -306,10 +307,10 @@ class Recording:
         return moved._rows(rows)
 
     def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
-        """Write the recording as CSV that :func:`palpate.read_recording` reads back exactly, with no option.
+        """Writes the recording as CSV that :func:`palpate.read_recording` reads back exactly without options.
 
-        The file appears under its name only when it is complete. Numbers are written so that they are read
-        back to the last bit; positions and forces are written in SI units.
+        The file gets its name only when it is complete. Numbers are exact to the last bit; positions and
+        forces are in SI units.
 
         Parameters
         ----------
@@ -320,7 +321,7 @@ class Recording:
         Raises
         ------
         InputError
-            The folder does not exist or cannot be written, or the metadata cannot stand on one line.
+            The folder does not exist or cannot be written, or the metadata does not fit on one line.
         """
         file = path_of("path", path)
         taken = {*self.columns, *self.input_names}
@@ -341,7 +342,7 @@ class Recording:
 
 
 def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:
-    """A copy of an optional mapping."""
+    """Returns a copy of an optional mapping."""
     given: object = {} if value is None else value
     if not isinstance(given, Mapping):
         raise InputError(f"{name} is {shown(given)}; it must be a dictionary")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check every row of the chosen columns: refuse the file at the first bad one, or drop and count them."""
+"""Checks of every row of the chosen columns. Bad rows refuse the file, or are dropped and counted."""
 
 from __future__ import annotations
 
@@ -25,31 +25,31 @@ DIRECTION_WORDS: dict[str, int] = {
 
 @dataclass
 class LeftOut:
-    """Counts of the rows that are not used, by reason."""
+    """Numbers of ignored rows by reason."""
 
     status: Counter[str] = field(default_factory=Counter)
     """Rows whose force was not the model's alone, by the word of their status"""
     dropped: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """Number of rows, and the first one, by the reason for which they were dropped"""
+    """Number of dropped rows and the first one, by reason"""
 
     @property
     def rows(self) -> int:
-        """Number of all rows that are left out."""
+        """Number of all ignored rows."""
         return self.status.total() + sum(count for count, _ in self.dropped.values())
 
     def drop(self, reason: str, count: int, first: int) -> None:
-        """Count dropped rows."""
+        """Counts dropped rows."""
         known, before = self.dropped.get(reason, (0, first))
         self.dropped[reason] = known + count, min(before, first)
 
     def add(self, other: LeftOut, rows_before: int) -> None:
-        """Count the rows left out of a part that begins after so many rows."""
+        """Adds the counts of a part that begins after `rows_before` rows."""
         self.status += other.status
         for reason, (count, first) in other.dropped.items():
             self.drop(reason, count, rows_before + first)
 
     def sentences(self, table: Places) -> list[str]:
-        """One sentence for each reason, with the place of the first row."""
+        """Returns one sentence for each reason, with the place of the first row."""
         told = []
         if count := self.status.total():
             words = ", ".join(f"{number} {word}" for word, number in sorted(self.status.items()))
@@ -60,20 +60,20 @@ class LeftOut:
 
 
 class RowCheck:
-    """Which rows can be used.
+    """Marks the rows that can be used.
 
     Parameters
     ----------
     file : str
         The file's name, for the sentences.
     table : Places
-        Where lines and cells are looked up when something is wrong.
+        Gives lines and cells for messages.
     first_row : int
-        Data row of the file that the arrays begin with.
+        Data row of the file at which the arrays begin.
     rows : int
         Number of rows.
     drop : bool
-        Drop bad rows and count them; else refuse the file at the first one.
+        Drops and counts bad rows if True; else refuses the file at the first one.
     """
 
     def __init__(self, file: str, table: Places, first_row: int, rows: int, drop: bool) -> None:
@@ -83,12 +83,12 @@ class RowCheck:
 
     @property
     def notes(self) -> list[str]:
-        """One sentence for each reason for which rows are left out."""
+        """One sentence for each reason for ignored rows."""
         return self.left_out.sentences(self._table)
 
     def as_modelled(self, words: Cells) -> None:
-        """Leave out the rows whose status says that the force was not the model's alone: not yet all of it
-        after the start, clipped, zero because of a fault. They are no property of the object.
+        """Removes the rows whose status states that the force was not the model's alone: start ramp, clipped,
+        or zero after a fault. They do not describe the object.
         """
         others = ~np.isin(words, (Status.Ok.name,)) & self.kept
         if others.any():
@@ -96,14 +96,14 @@ class RowCheck:
             self.kept &= ~others
 
     def finite(self, name: str, values: Float1D) -> None:
-        """Every row needs a finite number in this column."""
+        """Requires a finite number in every row of this column."""
         bad = self.kept & ~np.isfinite(values)
         self._settle(
             bad, name, "holds {cell}, which is no finite number", "without a finite number in " + name
         )
 
     def directions(self, name: str, cells: Cells) -> Int8Vector:
-        """The direction that each row states. A word that is not known refuses the file in any case."""
+        """Returns the direction that each row states. An unknown word always refuses the file."""
         codes, words = pd.factorize(cells)
         values = np.zeros(len(words), dtype=np.int8)
         for index, word in enumerate(words):
@@ -123,7 +123,7 @@ class RowCheck:
         return values[codes]
 
     def increasing(self, name: str, time: Float1D) -> None:
-        """Time must be later in every usable row than in all usable rows before it."""
+        """Requires in every usable row a later time than in all usable rows before it."""
         rows = np.flatnonzero(self.kept)
         usable = time[rows]
         latest_before = np.maximum.accumulate(usable)[:-1]
@@ -161,9 +161,9 @@ def _rows(count: int) -> str:
 
 
 def direction_of(word: str) -> int | None:
-    """The direction that a cell states, or None for a word that is not known.
+    """Returns the direction that a cell states, or None for an unknown word.
 
-    Numbers count by their value, so ``1``, ``+1`` and ``1.0`` are the same direction.
+    Numbers count by their value: ``1``, ``+1`` and ``1.0`` are the same direction.
     """
     text = word.strip()
     if text in DIRECTION_WORDS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The product's own recording: simulated, never measured, and called so wherever it appears."""
+"""Sample recording of the package. It is simulated and always labelled as simulated."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ STIFFNESS = 2.0
 WALL_STIFFNESS = 58.0
 """Stiffness that the wall adds [N*m/rad]."""
 WALL_POSITION = 0.4
-"""Where the wall begins [rad]."""
+"""Position at which the wall begins [rad]."""
 WALL_WIDTH = 0.01
-"""Over what length it begins [rad]."""
+"""Length over which the wall begins [rad]."""
 LOWER, UPPER = -0.2, 0.469
 """Range of the sweep [rad]."""
 FORCE_LIMIT = 5.0
-"""Largest force that the simulated device holds [N*m]."""
+"""Force limit of the simulated device [N*m]."""
 ENCODER_STEP = 2 * np.pi / 65536
 """16-bit encoder [rad]."""
 FORCE_NOISE = 0.02
@@ -29,13 +29,13 @@ FORCE_NOISE = 0.02
 SAMPLE_PERIOD = 1e-3
 """[s]"""
 SLOWEST_HZ, FASTEST_HZ = 0.2, 2.0
-"""Range over which the frequency of the hand's sweep wanders [Hz]."""
+"""Range of the frequency of the hand's sweep [Hz]."""
 WANDER_HZ = (0.031, 0.073, 0.127)
-"""Slow, incommensurate frequencies at which it wanders [Hz]."""
+"""Slow, incommensurate frequencies that modulate the sweep [Hz]."""
 
 
 def sample_force(x: npt.ArrayLike) -> Float1D:
-    """Force of the sample's object [N*m] at position `x` [rad]: a spring, and a wall that begins smoothly.
+    """Returns the force of the sample's object [N*m] at position `x` [rad]: a spring and a smooth wall.
 
     f(x) = 2 x + 58 * 0.01 softplus((x - 0.4) / 0.01), softplus(u) = ln(1 + e^u), limited to +-5 N*m.
     """
@@ -45,19 +45,19 @@ def sample_force(x: npt.ArrayLike) -> Float1D:
 
 
 def sample_recording(seed: int, duration_s: float = 60.0) -> Recording:
-    """Simulate a recording of the sample's object: a hand that sweeps it at 0.2 to 2 Hz, sampled at 1 kHz.
+    """Simulates a recording of the sample's object: a hand sweeps it at 0.2 to 2 Hz, sampled at 1 kHz.
 
     Parameters
     ----------
     seed : int
-        Seed of the hand's motion and of the noise; seeds 1 and 2 are the sample to identify and a fresh one.
+        Seed of the hand's motion and of the noise. Seed 1 is for identification, seed 2 for verification.
     duration_s : float
         Length [s].
 
     Returns
     -------
     Recording
-        Position as a 16-bit encoder reads it [rad], force with 0.02 N*m of noise [N*m], time [s].
+        Position of a 16-bit encoder [rad], force with 0.02 N*m of noise [N*m], time [s].
     """
     samples = round(duration_s / SAMPLE_PERIOD)
     if samples < 1:

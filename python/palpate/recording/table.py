@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables that are read: names first, cells later; the numbers that cells hold; a DataFrame as a table."""
+"""Tables that read names first and cells later, parsing of numbers, and a DataFrame as a table."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ..arguments import shown
 from ..errors import InputError
 
 Cells: TypeAlias = NDArray[Any]
-"""(n,) float64 for numbers (NaN where a cell holds none), (n,) object of str for text"""
+"""(n,) float64 for numbers (NaN for a cell without a number), (n,) object of str for text"""
 
 
 class Places(Protocol):
-    """Where the rows of a table stand."""
+    """Places of the rows of a table."""
 
     def place(self, row: int) -> str: ...
 
@@ -29,80 +29,82 @@ class Places(Protocol):
 
 
 class Table(ABC):
-    """A table with a header, read in two steps so that only the header is needed to choose columns."""
+    """Table with a header, read in two steps: choosing columns needs only the header."""
 
     names: tuple[str, ...]
     metadata: Mapping[str, str]
     torn = 0
-    """Torn lines at the end that are left out"""
+    """Number of torn lines at the end that are ignored"""
     notes: Sequence[str] = ()
-    """How the table was read where it differs from a plain one, in parts of a sentence"""
+    """Differences from a plain table, in parts of a sentence"""
     text_names: Collection[str] = ()
     """Columns that are known to hold text before the rows are read"""
     steady_names: Collection[str] = ()
-    """Columns that have one or two values at the start of the table, as far as they are read by then"""
+    """Columns that have one or two values at the start of the table, as read until then"""
 
     @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
-        """All columns. Those in `numbers` become float64 whatever they hold, those in `text` become strings;
-        any other is numeric if every cell of it is."""
+        """Returns all columns. Those in `numbers` become float64, those in `text` become strings. Any other
+        column is numeric if all its cells are.
+        """
 
     @abstractmethod
     def place(self, row: int) -> str:
-        """Where a person finds a row: "line 12"."""
+        """Returns the place of a row for messages: "line 12"."""
 
     @abstractmethod
     def cell(self, row: int, name: str) -> str:
-        """The text of one cell as it stands in the table."""
+        """Returns the unchanged text of one cell."""
 
 
 class LongTable(Table):
-    """A table that can also be read part by part."""
+    """Table that can also be read in parts."""
 
     @abstractmethod
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
-        """Number of rows of the file, counted without reading cells, and places (start, stop) that divide it
-        into parts of about so many rows, or more.
+        """Returns the number of rows, counted without reading cells, and places (start, stop) of parts.
+
+        Each part has at least about `rows` rows.
 
         Raises
         ------
         InputError
-            The file cannot be read part by part.
+            The file cannot be read in parts.
         """
 
     @abstractmethod
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
-        """The first row's number within the part, and the columns named, of each block of so many rows."""
+        """Yields, for each block, the number of its first row within the part and the named columns."""
 
     @abstractmethod
     def rows_before(self, part: tuple[int, int]) -> int:
-        """Rows of the file that come before a part."""
+        """Returns the number of rows of the file before a part."""
 
 
 def parse_number(text: str) -> float | None:
-    """The number that a cell holds, or None. NaN and infinity count as numbers here."""
+    """Returns the number in a cell, or None. NaN and infinity count as numbers."""
     try:
-        # float() would accept 1_000, which no other reader of the file does.
+        # float() would accept 1_000, which other readers of the file refuse.
         return None if "_" in text else float(text)
     except ValueError:
         return None
 
 
 def parse_with(text: str, decimal: str) -> float | None:
-    """The number that a cell holds, written with this decimal mark, or None."""
+    """Returns the number in a cell with this decimal mark, or None."""
     if decimal == ".":
         return parse_number(text)
     return None if "." in text or text.count(",") > 1 else parse_number(text.replace(",", "."))
 
 
 MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL", "null", "None")
-"""How a cell of a numeric column says that it has no value."""
+"""Texts of a missing value in a numeric column."""
 
 
 def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
-    """Turn strings into numbers, with NaN where a cell holds none."""
+    """Converts strings to numbers; NaN for a cell without a number."""
 
     def number(cell: Any) -> float:
         value = parse_with(cell, decimal) if isinstance(cell, str) else cell
@@ -112,12 +114,12 @@ def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
 
 
 FRAME = "the frame"
-"""The frame in messages, where a file has its name."""
+"""Name of the frame in messages, instead of a file name."""
 
 
 @contextmanager
 def python_arguments() -> Iterator[None]:
-    """Names the arguments of Python in a message about a file, in place of the command line's options."""
+    """Names arguments of Python instead of command line options in a message about a file."""
     try:
         yield
     except InputError as error:
@@ -148,7 +150,7 @@ class FrameTable(Table):
         self.metadata = {str(key): str(value) for key, value in frame.attrs.items()}
 
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
-        """All columns, as float64 or text."""
+        """Returns all columns as float64 or text."""
         return {
             name: _numbers(self._frame[name])
             if name in numbers
@@ -159,11 +161,11 @@ class FrameTable(Table):
         }
 
     def place(self, row: int) -> str:
-        """Position and index label of a row."""
+        """Returns position and index label of a row."""
         return f"row {row} (index {self._frame.index[row]!r})"
 
     def cell(self, row: int, name: str) -> str:
-        """A cell as text, cut where it is long."""
+        """Returns a cell as text; long texts are cut."""
         value = self._frame[name].iloc[row]
         return "" if value is None or value is pd.NA else shown(str(value))[1:-1]
 
@@ -177,7 +179,7 @@ def _floats(column: pd.Series[Any]) -> Cells:
 
 
 def _numbers(column: pd.Series[Any]) -> Cells:
-    """The column as float64, with NaN where a cell holds no real number."""
+    """Returns the column as float64; NaN for a cell without a real number."""
     if pd.api.types.is_complex_dtype(column.dtype):
         raise InputError(f"{FRAME}: column {column.name} holds complex numbers; give real ones")
     if pd.api.types.is_bool_dtype(column.dtype) or pd.api.types.is_datetime64_any_dtype(column.dtype):
@@ -198,6 +200,6 @@ def _number(cell: object) -> float:
 
 
 def _words(column: pd.Series[Any]) -> Cells:
-    """The cells of a column as text, empty where there is none."""
+    """Returns the cells of a column as text; missing cells are empty."""
     missing = column.isna()
     return np.array(["" if gone else str(cell) for cell, gone in zip(column, missing, strict=True)], object)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed table of units, and the unit that a column name states."""
+"""Closed table of units, and the units in column names."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import pi
 
 GRAVITY = 9.80665
-"""Standard gravity [m/s^2]: turns gram-force into newton."""
+"""Standard gravity [m/s^2], converts gram-force to newton."""
 
 POUND = 0.45359237
 """Avoirdupois pound [kg]."""
@@ -16,11 +16,11 @@ POUND = 0.45359237
 
 @dataclass(frozen=True)
 class Unit:
-    """One unit of the table: its symbol, the SI unit of its quantity, and the factor to it."""
+    """Unit of the table: symbol, SI unit of its quantity, and factor."""
 
     symbol: str
     si: str
-    """The unit inside the package: m, rad, count, N, N*m, A or s."""
+    """Unit inside the package: m, rad, count, N, N*m, A or s."""
     factor: float
     """value in SI = factor * value in this unit"""
 
@@ -48,17 +48,17 @@ _FACTORS: dict[str, dict[str, float]] = {
 UNITS: dict[str, Unit] = {
     symbol: Unit(symbol, si, factor) for si, symbols in _FACTORS.items() for symbol, factor in symbols.items()
 }
-"""Every unit that a column may carry. The table is closed: a units library would read `Nm` as nanometre."""
+"""All units of columns. The table is closed: a units library would read `Nm` as nanometre."""
 
 POSITION_UNITS = ("m", "rad", "count")
 FORCE_UNITS = ("N", "N*m", "A")
 TIME_UNITS = ("s",)
 
 COLUMN_SUFFIX = {"m": "m", "rad": "rad", "count": "count", "N": "N", "N*m": "Nm", "A": "A", "s": "s"}
-"""How an SI unit is written at the end of a column name."""
+"""SI units at the end of a column name."""
 
 MINUTE_STEMS = ("time", "t", "timestamp", "elapsed", "elapsed_time")
-"""Stems after which ``_min`` is the minute. After any other stem it is usually a minimum."""
+"""Stems after which ``_min`` means minute. After other stems it usually means minimum."""
 
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "∙": "*", ".": "*"})
 
@@ -66,7 +66,7 @@ _BRACKETS = re.compile(r"(?P<stem>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round
 
 
 def unit_of(symbol: str) -> Unit | None:
-    """The unit that a symbol stands for, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are Nm."""
+    """Returns the unit of a symbol, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are Nm."""
     text = symbol.strip()
     if text == "°":
         return UNITS["deg"]
@@ -75,16 +75,16 @@ def unit_of(symbol: str) -> Unit | None:
 
 
 def symbols_of(si_units: tuple[str, ...]) -> str:
-    """The symbols of the table that belong to these SI units, joined by commas."""
+    """Returns the symbols of the table that belong to these SI units, joined by commas."""
     return ", ".join(symbol for symbol, unit in UNITS.items() if unit.si in si_units)
 
 
 def split_name(column: str) -> tuple[str, Unit | None]:
-    """Split a column name into its stem and its unit: ``displacement_mm`` is (``displacement``, mm).
+    """Splits a column name into its stem and its unit: ``displacement_mm`` is (``displacement``, mm).
 
-    The unit stands after the last underscore (``force_N``), in brackets at the end (``Force [gf]``,
-    ``Force (mN)``), after the last comma (``force, N``) or after one slash (``Force / N``). Symbols are
-    case-sensitive. A name without a unit of the table keeps its whole text as stem and gets None.
+    The unit follows the last underscore (``force_N``), the last comma (``force, N``) or one slash (``Force /
+    N``), or is in brackets at the end (``Force [gf]``, ``Force (mN)``). Symbols are case-sensitive. Without a
+    unit of the table the stem is the whole name and the unit is None.
     """
     for stem, symbol in _stated(column):
         unit = unit_of(symbol)
@@ -94,7 +94,7 @@ def split_name(column: str) -> tuple[str, Unit | None]:
 
 
 def _stated(column: str) -> list[tuple[str, str]]:
-    """The stem and the text that stands where a unit is written: one pair or none."""
+    """Returns the stem and the text in the place of a unit: one pair or none."""
     if brackets := _BRACKETS.fullmatch(column):
         return [(brackets["stem"], brackets["square"] or brackets["round"] or "")]
     if "," in column:
@@ -112,5 +112,5 @@ def _stated(column: str) -> list[tuple[str, str]]:
 
 
 def stem_key(stem: str) -> str:
-    """A stem as it is compared: ``Tip position`` is ``tip_position``."""
+    """Returns the normalised stem: ``Tip position`` is ``tip_position``."""
     return re.sub(r"\W+", "_", stem.strip()).strip("_").lower()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verify a model: on fresh recordings row by row, in closed loop, and beside another model."""
+"""Verification of a model: on fresh recordings row by row, in closed loop, and against another model."""
 
 from .closed_loop import ClosedLoop, force_driven, motion_driven
 from .metrics import Stroke, compare

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed-loop verification: a recorded motion moves the device, or a recorded force the environment.
 
-The recording is sampled on the even time grid of a controller, with a time of its own or an assumed one.
+The recording is sampled on the even time grid of a controller, with recorded or assumed time.
 """
 
 from __future__ import annotations
@@ -24,37 +24,37 @@ from .metrics import normalised, root_mean_square
 from .prediction import require_same_units
 
 MOST_SAMPLES = 20_000_000
-"""Samples of a motion on an even grid; more would fill the memory."""
+"""Largest number of samples of a motion on an even grid; limits memory."""
 
 ASSUMED_STROKE_S = 1.0
-"""Time in which an assumed motion covers the range of positions once [s]."""
+"""Time in which an assumed motion crosses the range of positions once [s]."""
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """A recording beside what the closed loop made of it, on an even time grid."""
+    """Recorded and simulated motion and force of a closed loop, on an even time grid."""
 
     view: Literal["motion-driven", "force-driven"]
     scheme: Scheme
-    """What was rendered, as it was in the end"""
+    """Rendered scheme, after replacements"""
     period_s: float
     assumed_speed: float | None
-    """[position unit per second]: the recording has no time, its speed is assumed; None: time is recorded"""
+    """[position unit per second]: assumed because the recording has no time; None: time is recorded"""
     time: Float1D
     """(k,) [s]"""
     recorded_position: Float1D
     recorded_force: Float1D
     rendered_position: Float1D
-    """Motion-driven: the recorded one. Force-driven: where the recorded force moves the environment to."""
+    """Motion-driven: recorded position. Force-driven: resulting position of the environment."""
     rendered_force: Float1D
-    """Motion-driven: the force that is rendered. Force-driven: the recorded one."""
+    """Motion-driven: rendered force. Force-driven: recorded force."""
     environment_position: Float1D
     rmse: float
     """Motion-driven: of the force. Force-driven: of the position."""
     nrmse: float
-    """rmse over the population standard deviation of what was recorded"""
+    """rmse over the population standard deviation of the recorded signal"""
     status: Mapping[str, int]
-    """How many ticks ended with which status"""
+    """Number of ticks with each status"""
     units: Mapping[str, str]
     notes: tuple[str, ...]
 
@@ -67,21 +67,21 @@ def motion_driven(
     period_s: float = paper_sample_time_s,
     stroke_speed: float | None = None,
 ) -> ClosedLoop:
-    """The recorded motion moves the device: the rendered force against the recorded one.
+    """Moves the device along the recorded motion and compares the rendered force with the recorded one.
 
     Parameters
     ----------
     model : Model
-        What is rendered, of one position.
+        Rendered model of one position.
     recording : Recording
-        Its motion is resampled every `period_s`; without a time it is followed at `stroke_speed`.
+        Its motion is resampled every `period_s`; without time it has the speed `stroke_speed`.
     scheme : Scheme, optional
-        Structure and coupling; the direct structure when not given.
+        Structure and coupling; by default the direct structure.
     period_s : float
         Sample time [s].
     stroke_speed : float, optional
-        Assumed speed [position unit per second] for a recording without time; the range of positions in one
-        second when not given.
+        Assumed speed [position unit per second] for a recording without time; by default the range of
+        positions in one second.
 
     Raises
     ------
@@ -105,21 +105,20 @@ def force_driven(
     period_s: float = paper_sample_time_s,
     stroke_speed: float | None = None,
 ) -> ClosedLoop:
-    """The recorded force drives the environment alone (paper figure 14).
+    """Drives the environment alone with the recorded force (figure 14 of the paper).
 
-    Force over the resulting position is the paper's figure 15.
+    Force over the resulting position is figure 15 of the paper.
 
     Parameters
     ----------
     model : Model
-        What is driven, of one position.
+        Driven model of one position.
     recording : Recording
-        Its force is resampled every `period_s`; without a time its motion is taken at `stroke_speed`.
+        Its force is resampled every `period_s`; without time its motion has the speed `stroke_speed`.
     scheme : Scheme, optional
-        Structure ("explicit" or "implicit"), mass and damping; the paper's explicit environment with its mass
-        and damping when not given. An explicit environment that would be unstable for the model's steepest
-        slope, which must be below `explicit_slope_limit`, is replaced by the implicit one, and the notes say
-        so.
+        Structure ("explicit" or "implicit"), mass and damping; by default the paper's explicit environment
+        with its mass and damping. If the steepest slope of the model reaches `explicit_slope_limit`, an
+        explicit environment would be unstable; the implicit one replaces it, and the notes report this.
     period_s, stroke_speed
         As for :func:`motion_driven`.
 
@@ -208,7 +207,7 @@ def _counted(status: Any) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class EvenMotion:
-    """A recorded motion and force, sampled evenly."""
+    """Recorded motion and force on an even time grid."""
 
     time: Float1D
     """(k,) [s], from 0"""
@@ -216,20 +215,20 @@ class EvenMotion:
     force: Float1D
     period_s: float
     assumed_speed: float | None
-    """Assumed because the recording has no time [position unit per second]; None if time is recorded"""
+    """Assumed speed if the recording has no time [position unit per second]; None if time is recorded"""
 
 
 def even_motion(recording: Recording, period_s: float, stroke_speed: float | None = None) -> EvenMotion:
-    """Sample a recording every `period_s`, with straight lines between its rows.
+    """Samples a recording every `period_s`, with straight lines between its rows.
 
     Parameters
     ----------
     recording : Recording
-        Without time, its positions are followed in their order at a constant speed.
+        Without time, the motion follows its positions at a constant speed.
     period_s : float
         Sample time [s].
     stroke_speed : float, optional
-        That speed [position unit per second]; the range of positions in one second when not given. Only for a
+        That speed [position unit per second]; by default the range of positions in one second. Only for a
         recording without time.
 
     Raises
@@ -249,13 +248,13 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     if not 0 < speed < np.inf:
         raise InputError(f"stroke_speed is {speed}; it must be > 0 and finite")
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(recording.position)))])
-    with np.errstate(over="ignore"):  # an endless motion is refused below
+    with np.errstate(over="ignore"):  # a motion of infinite length is refused below
         time = way / speed
     return _sampled(recording, time, period_s, speed)
 
 
 def require_period(period_s: float) -> None:
-    """Refuse a sample time that is not positive."""
+    """Refuses a sample time that is not positive."""
     if not 0 < period_s < np.inf:
         raise InputError(f"period_s is {period_s}; it must be > 0 and finite")
 
@@ -266,7 +265,7 @@ def _sampled(recording: Recording, time: Float1D, period_s: float, assumed_speed
             f"the motion lasts {time[-1]:.4g} s, more than {MOST_SAMPLES} samples of {period_s:g} s: "
             + ("choose a larger period" if assumed_speed is None else "choose a higher stroke speed")
         )
-    # Where an assumed motion rests, several rows share one time: the last of them stands for all.
+    # If an assumed motion rests, several rows have the same time: keep the last of them.
     last = np.append(np.diff(time) > 0, True)
     samples = int(time[-1] / period_s * (1 + 1e-12)) + 1
     if samples < 2:

@@ -17,36 +17,36 @@ from .metrics import normalised, root_mean_square
 from .prediction import Prediction
 
 WORTH_TELLING = 0.5
-"""NRMSE under an explanation, as a share of the NRMSE without it, below which it is told [-]."""
+"""Largest NRMSE under an explanation that is reported, as a share of the NRMSE without it [-]."""
 
 AS_GOOD = 1.2
-"""Ratio to the least NRMSE up to which a simpler explanation is preferred [-]."""
+"""Largest ratio to the least NRMSE at which a simpler explanation is preferred [-]."""
 
 SAME_FACTOR = 0.02
-"""Relative difference up to which a factor counts as that of a unit [-]."""
+"""Largest relative difference of a factor from the factor of a unit [-]."""
 
 SHIFTS = 41
-"""Position offsets on a grid."""
+"""Number of position offsets on a grid."""
 
 GRIDS = 3
-"""Grids of position offsets, each finer than the one before."""
+"""Number of grids of position offsets, each finer than the previous one."""
 
 MOST_ROWS = 2000
-"""Rows that are enough to tell one explanation from another."""
+"""Number of rows that suffices to distinguish explanations."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """A change of the recording under which the model fits it."""
+    """Change of the recording after which the model fits it."""
 
     nrmse: float
     sentence: str
     order: int
-    """The simplest has the lowest"""
+    """Rank of the explanation; the simplest has the lowest"""
 
 
 def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
-    """The simplest change of the recording that at least halves the error, or None.
+    """Returns the simplest change of the recording that at least halves the error, or None.
 
     The changes are: the sign of the force, press and release exchanged, the sign of the position, an offset
     of the force, another unit of force or position, an offset of the position, and a factor of the force.
@@ -74,7 +74,7 @@ def _share(error: Float1D, force: Float1D) -> float:
 
 
 def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanation]:
-    """The sign, an offset and a factor of the force."""
+    """Yields the sign, an offset and a factor of the force."""
     yield Explanation(
         _share(modelled + force, force),
         "the recording fits with the sign of its force turned; give --negate force",
@@ -102,7 +102,7 @@ def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanat
 def _of_position(
     model: Model, position: Float1D, side: Float1D | None, force: Float1D, recording: Recording
 ) -> Iterator[Explanation]:
-    """The direction, and the sign, the unit and an offset of the position."""
+    """Yields the direction, and the sign, the unit and an offset of the position."""
 
     def left(at: Float1D, s: Float1D | None) -> float:
         modelled = model.force(at) if s is None else model.force(at, direction=s)
@@ -133,7 +133,7 @@ def _of_position(
                     "--units",
                     order=4,
                 )
-    # The offset is found on a grid over the travel, which is then made finer around the best one.
+    # Search the offset on a grid over the travel, then on finer grids around the best one.
     best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (SHIFTS - 1)
     for _ in range(GRIDS):
         grid = best + step * (np.arange(SHIFTS) - SHIFTS // 2)
@@ -148,7 +148,7 @@ def _of_position(
 
 
 def _unit_of(factor: float, unit: str) -> str | None:
-    """The mistaken unit that a factor corrects, in words, or None."""
+    """Returns the mistaken unit that a factor corrects, in words, or None."""
     for symbol, other in UNITS.items():
         if other.si == unit and other.factor != 1.0:
             if abs(factor / other.factor - 1.0) < SAME_FACTOR:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far one series or model is from another, whether the rest is noise, and which share a hand notices."""
+"""Error metrics of series and models: RMS errors, residual structure, and the share below the JND."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from ..model import Model
 from ..verdict import FORCE_FLOOR, FORCE_JND
 
 STIFFNESS_JND = 0.23
-"""Share of a stiffness by which another must differ (Jones and Hunter 1990: about 23 %)."""
+"""Just noticeable difference of stiffness, as a share of it (Jones and Hunter 1990: about 23 %)."""
 
 STIFFNESS_CELLS = 20
-"""Cells of equal width, over the range of positions, in which a local stiffness is taken."""
+"""Number of equal cells over the range of positions in which a local stiffness is computed."""
 
 _CELL_ROWS = 5
-"""Rows that a cell needs for its stiffness."""
+"""Least number of rows of a cell for its stiffness."""
 
 
 def root_mean_square(values: Float1D) -> float:
-    """RMS of the values, in their unit."""
+    """Returns the RMS of the values in their unit."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
 def normalised(rmse: float, reference: Float1D) -> float:
-    """NRMSE: `rmse` over the population standard deviation of the reference.
+    """Returns the NRMSE: `rmse` over the population standard deviation of the reference.
 
-    A reference that does not vary has no spread to compare with: the result is then 0 for no error, else
-    infinity.
+    For a constant reference the result is 0 without error, else infinity.
     """
     spread = float(np.std(reference))
     if spread == 0:
@@ -40,34 +39,36 @@ def normalised(rmse: float, reference: Float1D) -> float:
 
 
 def lag_one_autocorrelation(residual: Float1D) -> float:
-    """sum e_k e_{k+1} / sum e_k^2: 0 for white residuals, towards 1 where neighbours err alike."""
+    """Returns sum e_k e_{k+1} / sum e_k^2: 0 for white residuals, near 1 if adjacent errors are similar."""
     power = float(residual @ residual)
     return 0.0 if power == 0 else float(residual[:-1] @ residual[1:]) / power
 
 
 def durbin_watson(residual: Float1D) -> float:
-    """sum (e_k - e_{k-1})^2 / sum e_k^2 (Durbin and Watson 1950): 2 for white residuals, towards 0 where
-    neighbours err alike."""
+    """Returns sum (e_k - e_{k-1})^2 / sum e_k^2 (Durbin and Watson 1950).
+
+    It is 2 for white residuals, and tends to 0 if adjacent errors are similar.
+    """
     power = float(residual @ residual)
     return 2.0 if power == 0 else float(np.sum(np.diff(residual) ** 2)) / power
 
 
 def force_floor(force: Float1D) -> float:
-    """The absolute floor for a recording of this force, in the force's unit."""
+    """Returns the smallest just noticeable difference for a recording of this force, in its unit."""
     return FORCE_FLOOR * float(np.abs(force).max())
 
 
 def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
-    """Share of samples whose error stays below 7 % of the local reference force, or below the floor."""
+    """Returns the share of samples with an error below 7 % of the local force, or below the floor."""
     allowed = np.maximum(FORCE_JND * np.abs(reference), force_floor(reference))
     return float(np.mean(np.abs(error) <= allowed))
 
 
 def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Float1D) -> float | None:
-    """Share of cells along the position whose stiffness is within 23 % of the reference's.
+    """Returns the share of position cells whose stiffness is within 23 % of the reference.
 
-    A cell's stiffness is the least-squares slope of force over position in it. A difference that changes the
-    force by less than the force floor across a cell counts as within. None where no cell holds enough rows.
+    The stiffness of a cell is its least-squares slope of force over position. A difference that changes the
+    force by less than the force floor across a cell counts as within. None if no cell has enough rows.
 
     Parameters
     ----------
@@ -99,15 +100,15 @@ def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Flo
 
 
 _POSITIONS = 2001
-"""Positions at which two models are compared."""
+"""Number of positions at which two models are compared."""
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """Two models along one stroke, at the positions that both were identified on."""
+    """Two models along one stroke, at the positions of both domains."""
 
     name: str
-    """press or release; empty where neither model tells them apart"""
+    """press or release; empty if neither model distinguishes them"""
     position: Float1D
     """(n,) [m or rad]"""
     first: Float1D
@@ -115,18 +116,18 @@ class Stroke:
     second: Float1D
     """(n,) force of the second model"""
     perceptible: Float1D
-    """(n,) the force difference that is just noticeable"""
+    """(n,) just noticeable difference of the force"""
 
     @property
     def worst(self) -> float:
-        """Largest difference as a share of what is just noticeable: below 1 nobody feels it."""
+        """Largest difference over the just noticeable difference; below 1 a hand cannot feel it."""
         return float(np.max(np.abs(self.second - self.first) / self.perceptible))
 
 
 def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
-    """Compare the forces of two models over the positions that both were identified on.
+    """Compares the forces of two models over the common part of their domains.
 
-    Just noticeable is 7 % of the first model's local force, or 1 % of its largest force where that is more.
+    The JND is 7 % of the local force of the first model, but at least 1 % of its largest force.
 
     Parameters
     ----------
@@ -136,12 +137,12 @@ def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
     Returns
     -------
     tuple of Stroke
-        Press and release where one of the models tells them apart, else one.
+        Press and release if one of the models distinguishes them, else one.
 
     Raises
     ------
     InputError
-        A model has several inputs, the units differ, or there is no position that both know.
+        A model has several inputs, the units differ, or the domains do not overlap.
     """
     for model in (first, second):
         if model.dimension > 1:

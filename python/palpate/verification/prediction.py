@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The model's force at every row of a recording, strokes and further inputs included."""
+"""Force of a model at every row of a recording, strokes and further inputs included."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are 
 _UNSTATED = ""
 
 _STRUCTURE = "structure"
-"""Line of metadata with the structure that was rendered."""
+"""Metadata key of the rendered structure."""
 
 _OBJECT_POSITION = "environment_position"
 """Stem of the column with the position of the virtual object."""
@@ -34,30 +34,30 @@ _OBJECT_POSITION = "environment_position"
 
 @dataclass(frozen=True)
 class Prediction:
-    """The model's force at those rows of a recording where it says one."""
+    """Force of a model at the rows of a recording for which the model gives one."""
 
     rows: NDArray[np.bool_]
-    """(n,) the rows of the recording that are used"""
+    """(n,) rows of the recording that are used"""
     force: Float1D
-    """(k,) the model's force there"""
+    """(k,) force of the model at these rows"""
     extrapolated: int
-    """How many of them lie outside the model's domain"""
+    """Number of these rows outside the model's domain"""
     notes: tuple[str, ...]
     position: Float1D
-    """(k,) the positions that the force belongs to"""
+    """(k,) positions of the force"""
     side: Float1D | None = None
-    """(k,) the hysteresis input in [-1, 1], for a model that has one"""
+    """(k,) hysteresis input in [-1, 1]; None for a model without hysteresis"""
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
-    """The model's force along a recording.
+    """Returns the model's force along a recording.
 
-    A hysteresis model takes the recording's direction as s = +-1 and leaves out rows that have none. Without
-    direction, time and play radius, the strokes are those of the order of rows. Without a direction, or with
-    a play radius, its play operator follows the positions in their order. The radius is the first of these
-    that is known: `play_radius`, the flight record's, the model's, its plan's, 1 % of the travel.
-    A flight record behind a virtual coupling is compared at the position of the virtual object, one of a
-    predicted position at that.
+    For a hysteresis model s = +-1 is the direction of the recording, and rows without direction are left out.
+    Without direction, time and play radius, the strokes follow from the order of rows. Without a direction,
+    or with a play radius, the play operator follows the positions in their order. The radius is the first
+    known one: `play_radius`, that of the flight record, of the model, of its plan, 1 % of the travel. A
+    flight record behind a virtual coupling is compared at the position of the virtual object. A flight record
+    with prediction is compared at the predicted position.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
 
 
 def _moving(model: Model, recording: Recording, play_radius: float | None) -> Prediction:
-    """With what mass and damping add: m a + B v, from the recording's own time."""
+    """Adds the force of mass and damping: m a + B v, with the time of the recording."""
     if recording.time is None:
         raise InputError(
             "the model has a mass or a damping, which act on acceleration and velocity: "
@@ -133,12 +133,12 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
 
 @dataclass(frozen=True)
 class _State:
-    """The hysteresis input of the rows of a recording."""
+    """Hysteresis input of the rows of a recording."""
 
     side: Float1D
     """(n,) in [-1, 1]"""
     known: NDArray[np.bool_]
-    """(n,) rows that have one"""
+    """(n,) rows with a hysteresis input"""
     notes: tuple[str, ...]
 
 
@@ -169,14 +169,14 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
         notes += (f"{left_out} rows before the motion has covered the play are left out",)
     side = play.side[whole.rows]
     if flight.predicted and flight.object_position is not None:
-        # The play follows the handle; the force is that of a trial move from there.
+        # The play operator follows the handle; the force is that of a trial move from its position.
         ahead = flight.object_position - recording.position
         side = np.clip(side + ahead / radius, -1.0, 1.0)
     return _State(side, known, notes)
 
 
 def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:
-    """The play radius, and where it comes from."""
+    """Returns the play radius and its origin."""
     for radius, origin in (
         (play_radius, "as given"),
         (flight.play_radius, "that of the flight record"),
@@ -189,7 +189,7 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
 
 
 def _gaps(time: Float1D | None) -> NDArray[np.intp]:
-    """Rows at which a motion begins anew after a gap of time."""
+    """Returns the rows at which a motion starts after a gap of time."""
     if time is None or len(time) < 2:
         return np.empty(0, dtype=np.intp)
     steps = np.diff(time)
@@ -197,7 +197,7 @@ def _gaps(time: Float1D | None) -> NDArray[np.intp]:
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:
-    """Refuse a recording in other units than the model's; units that are not stated fit all."""
+    """Refuses a recording whose units differ from those of the model. Unstated units always fit."""
     for role in ("position", "force"):
         ours, theirs = model.units[role], units[role]
         if ours != theirs and _UNSTATED not in (ours, theirs):
@@ -207,7 +207,7 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """Statements of a flight record; None where the recording is none."""
+    """Statements of a flight record; None for other recordings."""
 
     play_radius: float | None = None
     """[position]"""
@@ -218,7 +218,7 @@ class FlightRecord:
 
 
 def flight_of(recording: Recording) -> FlightRecord:
-    """Read what the metadata and the columns of a flight record state."""
+    """Returns the statements in the metadata and columns of a flight record."""
     structure = recording.metadata.get(_STRUCTURE, "")
     found = re.search(r"\br = ([0-9.eE+-]+)", structure)
     radius = float(found.group(1)) if found else None
@@ -234,10 +234,10 @@ def flight_of(recording: Recording) -> FlightRecord:
 
 
 def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
-    """The recording with the strokes that its order of rows gives, and a note; else as it is.
+    """Returns the recording with strokes from its order of rows and a note; otherwise unchanged.
 
-    Used where the model differs between press and release, and neither time nor a play radius is known. A
-    recording that never turns back may be sorted by position: it is the stroke whose force is nearer.
+    Used if the model differs between press and release, and neither time nor a play radius is known. A
+    recording without reversal may be sorted by position; its stroke is the one whose force is nearer.
     """
     known = recording.direction is not None or recording.time is not None or model.play_radius is not None
     if known or not model.hysteretic:

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How well the data determine a model: standard errors of force and slope.
+"""Standard errors of the force and slope of a model.
 
-With theta all fitted numbers of the network, dilations and translations included, and J = df/dtheta at the
-rows, the covariance is sigma^2 (J'J)^-1 and the standard error of f at x is sqrt(j(x)' Cov j(x)) (delta
-method; Seber and Wild, Nonlinear Regression, 1989, section 5.1). sigma^2 = RSS / (n - p). Residuals that
-resemble their neighbours in time say less than as many independent ones: with lag-1 autocorrelation rho > 0
-the variance is (1 + rho)/(1 - rho) times that.
+Let theta be all fitted numbers of the network, dilations and translations included, and J = df/dtheta at the
+rows. The covariance is sigma^2 (J'J)^-1 with sigma^2 = RSS / (n - p). The standard error of f at x is
+sqrt(j(x)' Cov j(x)) (delta method; Seber and Wild, Nonlinear Regression, 1989, section 5.1). Residuals that
+are correlated in time contain less information: with lag-1 autocorrelation rho > 0 the variance is larger by
+the factor (1 + rho)/(1 - rho).
 
-It is the error that noise makes. What a model of this form cannot follow, and outside the domain its
-continuation, are not in it.
+The standard error contains only the effect of noise. It does not contain the error of the model's form, nor
+of its continuation outside the domain.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ BLOCK_ROWS = 50_000
 """Rows whose Jacobian is in memory at a time."""
 
 SLOPE_STEP = 1e-5
-"""Half the distance of two Jacobians whose difference is that of the slope [domain]."""
+"""Half the distance of the two Jacobians whose difference gives that of the slope [domain]."""
 
 SMALLEST = 1e-12
-"""Eigenvalues of J'J on unit columns below this share of the largest say nothing that rounding would not."""
+"""Eigenvalues of J'J on unit columns below this share of the largest are rounding errors."""
 
 LARGEST_RHO = 0.999
-"""Autocorrelation that is believed at most: one independent residual in two thousand."""
+"""Largest autocorrelation that is used: one independent residual in two thousand."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ class Uncertainty:
     """Lag-1, of the residuals in recorded order"""
 
     def force(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
-        """Standard error of the force (n,); twice it is a 95 % band. Outside the domain: that at its edge."""
+        """Returns the standard error (n,) of the force; twice it is a 95 % band. Outside: as at the edge."""
         inside = np.clip(position, self.model.lower[0], self.model.upper[0])
         return self._error(_jacobian(self.model, inside, direction))
 
     def slope(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
-        """Standard error of the slope (n,) [force/position]."""
+        """Returns the standard error of the slope (n,) [force/position]."""
         step = SLOPE_STEP * float(self.model.upper[0] - self.model.lower[0])
         inside = np.clip(position, self.model.lower[0], self.model.upper[0])
         ahead = _jacobian(self.model, inside + step, direction)
@@ -68,13 +68,13 @@ class Uncertainty:
 
 
 def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Uncertainty:
-    """Standard errors of a model, from the recordings that it was identified on.
+    """Returns the standard errors of a model from the recordings that identified it.
 
     Raises
     ------
     InputError
-        The model has several inputs, a mass or a damping, or hysteresis where a recording has no direction;
-        or there are no more rows than parameters.
+        The model has several inputs, a mass or a damping, or hysteresis while a recording has no direction;
+        or the rows do not outnumber the parameters.
     """
     if model.dimension != 1 or model.mass is not None or model.damping is not None:
         raise InputError(
@@ -109,7 +109,7 @@ def _blocks(position: Float1D, direction: Float1D | None) -> Iterator[tuple[Floa
 
 
 def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Float2D:
-    """df/dtheta (n, p); weights of h stand beside those of g with the stroke as a factor."""
+    """Returns df/dtheta (n, p); for the weights of h the columns of g times the stroke."""
     x = np.ascontiguousarray(position, dtype=np.float64)[:, None]
     value, (by_alpha,), (by_beta,) = wavelet_jacobian(x, model.alpha, model.beta)
     linear = np.concatenate([np.ones_like(x), x - model.lower, value], axis=1)
@@ -122,7 +122,7 @@ def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Flo
 
 
 def _inverse(gram: Float2D) -> Float2D:
-    """Pseudo-inverse of J'J, on columns of unit norm."""
+    """Returns the pseudo-inverse of J'J, on columns of unit norm."""
     norm = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     value, vector = np.linalg.eigh(gram / np.outer(norm, norm))
     kept = value > SMALLEST * value.max()

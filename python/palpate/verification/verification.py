@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verification: a model beside a recording, best one that it has not seen, and the verdict on it."""
+"""Verification: comparison of a model with a recording, preferably a fresh one, and its verdict."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ FEW_OUTSIDE = 0.01
 """Share of rows outside the model's domain above which the result is usable with a reservation [-]."""
 
 MOST_OUTSIDE = 0.5
-"""The same above which the model is unfit for the recording [-]."""
+"""Share of rows outside the model's domain above which the model is unfit for the recording [-]."""
 
 FEW_COMPARED = 0.5
-"""Share of rows below which a comparison says little about a recording [-]."""
+"""Share of compared rows below which a comparison does not represent the recording [-]."""
 
 FELT = 0.5
 """Share of rows within the just noticeable difference below which a hand feels the error [-]."""
@@ -49,7 +49,7 @@ STRUCTURED = 0.5
 
 @dataclass(frozen=True)
 class Verification:
-    """How far a model is from a recording. Forces are in the recording's unit (`units`)."""
+    """Errors of a model on a recording. Forces are in the recording's unit (`units`)."""
 
     nrmse: float
     """RMSE over the population standard deviation of the recorded force, on the evaluated rows"""
@@ -64,7 +64,7 @@ class Verification:
     jnd_floor: float
     """1 % of the largest |force| of the evaluated rows"""
     stiffness_within_jnd: float | None
-    """Share of position cells whose stiffness is within 23 %; None where no cell holds enough rows"""
+    """Share of position cells whose stiffness is within 23 %; None if no cell has enough rows"""
     whiteness: float
     """Lag-1 autocorrelation of the residuals in recorded order: 0 is white"""
     durbin_watson: float
@@ -72,26 +72,26 @@ class Verification:
     n: int
     """Evaluated rows"""
     fresh: bool
-    """The model was not identified on this data"""
+    """True if the model was not identified on this data"""
     extrapolated: int
     """Evaluated rows outside the model's domain"""
     units: Mapping[str, str]
     notes: tuple[str, ...] = ()
     verdict: Verdict = GOOD
-    """Judges the model on the recording, with likely causes of a large error"""
+    """Verdict on the model for this recording, with likely causes of a large error"""
     prediction: Prediction = field(repr=False, compare=False, kw_only=True)
-    """The model's force at the evaluated rows"""
+    """Force of the model at the evaluated rows"""
     residual: Float1D = field(repr=False, compare=False, kw_only=True)
-    """(n,) the model's force minus the recorded one"""
+    """(n,) force of the model minus the recorded one"""
 
     @property
     def rows(self) -> NDArray[np.bool_]:
-        """(rows of the recording,) which of them were evaluated"""
+        """(rows of the recording,) True for evaluated rows"""
         return self.prediction.rows
 
     @property
     def force(self) -> Float1D:
-        """(n,) the model's force at the evaluated rows"""
+        """(n,) force of the model at the evaluated rows"""
         return self.prediction.force
 
 
@@ -111,19 +111,20 @@ def verify(
     model : Model
         The identified model.
     recording : Recording, path, DataFrame or (n,) array_like
-        The recording; ``fresh`` in the result is true if the model was not identified on it. With `force` it
-        is the array of positions.
+        The recording, or the array of positions if `force` is given. ``fresh`` in the result is true if the
+        model was not identified on it.
     force, time, direction : (n,) array_like, optional
         As in :func:`palpate.identify`.
     play_radius : float, optional
-        Play radius of a hysteresis model [m or rad]. With it the play operator follows the positions and a
-        direction in the recording is not used. Without it and without a direction, the radius is that of the
-        flight record, the model or its plan, else 1 % of the model's travel; the notes say which.
+        Play radius of a hysteresis model [m or rad]. With it the play operator follows the positions, and a
+        direction in the recording is ignored. Without it and without a direction, the radius is that of the
+        flight record, the model or its plan, else 1 % of the model's travel; the notes report its origin.
 
     Returns
     -------
     Verification
-        Errors, the share that a hand would not feel, residual whiteness, freshness, and the verdict.
+        Errors, the share of rows within the just noticeable difference, residual whiteness, freshness, and
+        the verdict.
 
     Raises
     ------
@@ -169,20 +170,20 @@ def verify(
 
 
 def columns_of(model: Model) -> list[str]:
-    """Columns that the model's inputs beside the position have in a file; a velocity may come from time."""
+    """Returns the columns of the model's inputs except position; a velocity may come from time."""
     known = model.data.columns
     return [known.get(name, name) for name in model.inputs[1:] if name != "velocity" or name in known]
 
 
 def is_fresh(identified_on: Source, data: Source) -> bool:
-    """Whether a model has not seen the data: another file, or the rows held out of the same one."""
+    """Returns True if the model has not seen the data: another file, or held-out rows of the same file."""
     same_file = not set(data.sha256.split()).isdisjoint(identified_on.sha256.split())
     held_out = data.held_out and data.held_out_every == identified_on.held_out_every
     return not same_file or held_out
 
 
 def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Float1D) -> float | None:
-    """Mean of the strokes' shares, each stroke having a stiffness of its own."""
+    """Returns the mean of the shares of the strokes; each stroke has a separate stiffness."""
     position, reference = recording.position[rows], recording.force[rows]
     strokes = np.zeros(len(position)) if recording.direction is None else recording.direction[rows]
     shares = [
@@ -194,17 +195,17 @@ def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Fl
 
 
 def findings_of(model: Model, recording: Recording, found: Verification) -> tuple[Finding, ...]:
-    """All findings of a verification."""
+    """Returns all findings of a verification."""
     return (*error_findings(found.nrmse, f"{found.n} rows"), *circumstances(model, recording, found))
 
 
 def circumstances(model: Model, recording: Recording, found: Verification) -> tuple[Finding, ...]:
-    """Findings beside the error: on the rows that were compared, and on the likely cause."""
+    """Returns the findings that do not judge the error: on the compared rows and on the likely cause."""
     return (*_of_cause(model, recording, found), *_of_rows(model, recording, found))
 
 
 def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Finding]:
-    """Findings on the rows: seen before, outside the domain, or left out."""
+    """Returns findings on the rows: seen before, outside the domain, or left out."""
     findings = []
     if not found.fresh:
         findings.append(
@@ -241,7 +242,7 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
 
 
 def _of_cause(model: Model, recording: Recording, found: Verification) -> list[Finding]:
-    """Findings on the error: whether a hand feels it, and the likely cause of a large one."""
+    """Returns findings on the error: perceptible by a hand, and the likely cause of a large one."""
     findings = []
     if found.nrmse > USABLE_NRMSE:
         cause = explanation(model, recording, found.prediction)

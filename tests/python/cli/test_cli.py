@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line as a whole: endings, exit codes, one clear sentence, who reads what."""
+"""Command line as a whole: endings, exit codes, one clear sentence, recipients of the output."""
 
 import json
 import os
@@ -50,7 +50,7 @@ def test_help_fits_a_narrow_terminal(verb: str) -> None:
     answer = run(verb, "--help", env={**os.environ, "COLUMNS": "40"})
     assert answer.returncode == 0
     wide = [line for line in answer.stdout.splitlines() if len(line) > 40]
-    # Names of options and their values are not broken.
+    # Names of options and their values are not wrapped.
     assert [line for line in wide if not line.lstrip().startswith("-")] == []
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate identify: what is written and printed, and one clear sentence for every wrong input."""
+"""palpate identify: written and printed results, and one clear sentence for every wrong input."""
 
 import json
 import signal
@@ -37,7 +37,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def spring(path: Path, *, n: int = 400, seed: int = 0) -> Path:
-    """A recording of 3 N*m/rad with a little noise."""
+    """Writes a recording of 3 N*m/rad with a little noise."""
     random = np.random.default_rng(seed)
     position = random.uniform(0.0, 1.0, n)
     force = 3.0 * position + random.normal(0.0, 0.01, n)
@@ -74,7 +74,7 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
 def test_held_out_rows_of_a_force_over_velocity_are_those_that_have_one(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """At 100 Hz every fifth row alone gives no velocity: it is formed before the rows are split."""
+    """At 100 Hz every fifth row alone gives no velocity: it is computed before the rows are split."""
     time = 0.01 * np.arange(2000)
     position = 0.3 - 0.3 * np.cos(2.0 * np.pi * 0.5 * time)
     speed = np.gradient(position, time)
@@ -93,7 +93,7 @@ def test_held_out_rows_of_a_force_over_velocity_are_those_that_have_one(
 def test_held_out_rows_are_judged_as_verify_judges_them(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """All the force is in the held-out rows: the model is a constant, and the verdict says no."""
+    """Only the held-out rows have a force: the model is a constant, and the verdict is no."""
     position = np.linspace(0.0, 1.0, 400)
     force = np.where(np.arange(400) % 5 == 4, 3.0 * position, 0.0)
     Recording.from_arrays(position, force, units={"position": "rad", "force": "N*m"}).write(here / "a.csv")

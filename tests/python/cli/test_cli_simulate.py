@@ -117,7 +117,7 @@ def test_a_current_is_not_rendered(here: Path, capsys: pytest.CaptureFixture[str
 def test_a_rendering_that_ran_away_is_a_failure_of_the_work(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """None is known that gets past the checks; the verdict must not depend on that."""
+    """No known plan passes the checks and diverges; the verdict must not depend on that."""
 
     def run_away(*arguments: Any) -> Recording:
         recording = simulate(*arguments)
@@ -195,7 +195,7 @@ def _ring(_number: int, _frame: Any) -> None:
 
 
 def test_a_signal_ends_a_long_simulation_within_a_fifth_of_a_second() -> None:
-    """Of three tries the fastest: the machine of a test may be busy."""
+    """Takes the fastest of three attempts, because the test machine may be busy."""
     model = model_by_hand()
     scheme, device, hand = Scheme(), DeviceProfile(), Hand()
     late = []
@@ -264,7 +264,7 @@ def test_a_model_with_hysteresis_is_rendered_with_a_play_radius(
 
 @pytest.fixture(scope="module")
 def demonstrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
-    """The demo, run once: its folder, what it printed, what it said."""
+    """Runs the demo once; returns its folder, standard output and standard error."""
     from click.testing import CliRunner
 
     folder = tmp_path_factory.mktemp("a name with spaces") / "demo"

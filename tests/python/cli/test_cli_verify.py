@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate verify and palpate show: numbers, figures, and what is said of a model file that is wrong."""
+"""palpate verify and palpate show: numbers, figures, and messages about wrong model files."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ UNITS = {"position": "rad", "force": "N*m"}
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a model, and a recording that it explains to within some noise."""
+    """Returns a folder with a model and a recording that it explains except for noise."""
     monkeypatch.chdir(tmp_path)
     model = model_by_hand()
     model.save("m.json")
@@ -132,7 +132,7 @@ def test_units_that_do_not_fit_are_one_sentence(here: Path, capsys: pytest.Captu
 
 
 def changed(content: dict[str, Any], path: str, value: Any) -> str:
-    """A model file with one field changed; `value` None takes it away."""
+    """Returns a model file with one field changed; `value` None removes it."""
     *parents, last = path.split(".")
     place = content
     for name in parents:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What holds for every verb: standard streams, verdict, control characters, width of the terminal."""
+"""Common behaviour of all verbs: standard streams, verdict, control characters, width of the terminal."""
 
 import subprocess
 import sys
@@ -24,7 +24,7 @@ VERBS = {
     "show": "show m.json",
     "demo": "demo -o demo",
 }
-"""A short command for each verb."""
+"""Short command for each verb."""
 
 UNWRITABLE = {
     "stdout closed": ">&-",
@@ -43,7 +43,7 @@ def here(tmp_path: Path) -> Path:
 
 def run(command: str, here: Path, redirection: str = "") -> subprocess.CompletedProcess[str]:
     program = f"'{sys.executable}' -m palpate {command}"
-    if redirection.startswith("|"):  # the reader is gone before the first word
+    if redirection.startswith("|"):  # the reader has ended before the first word
         program = f"(sleep 0.2; {program}; echo $? > code) {redirection}; sleep 0.2; wait"
         script = f"{program}; while ! test -s code; do sleep 0.05; done; exit $(cat code)"
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every verb prints its verdict first, in --json as a field, and in its exit code."""
+"""Verdict of every verb: printed first, a field in --json, and in the exit code."""
 
 import json
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure files that the verbs make."""
+"""Figure files of the verbs."""
 
 from pathlib import Path
 from typing import Any

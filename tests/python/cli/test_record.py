@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate record: an object on a device becomes a recording, and what is identified from it pushes back."""
+"""palpate record: recordings of an object on a device, and identification from them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def recorded(out: Path, *words: Any, device: list[str]) -> subprocess.CompletedP
 
 
 def stiffness(model: Model) -> float:
-    """Over the inner four fifths of the range; the mean of both strokes."""
+    """Returns the stiffness over the inner four fifths of the range; the mean of both strokes."""
     lower, upper = model.lower[0], model.upper[0]
     ends = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
     near, far = np.mean([model.force(ends, direction=way) for way in (1, -1)], axis=0)
@@ -50,7 +50,7 @@ def test_a_spring_is_identified_with_its_own_stiffness_and_rendered_back_pushes_
     assert answer.returncode == 0, answer.stderr
     summary = json.loads(answer.stdout)
     assert summary["recorded"] == summary["ticks"] == 3000
-    assert not any(frame.enabled for frame in frames(trace))  # a hand moved it: nothing was to make force
+    assert not any(frame.enabled for frame in frames(trace))  # moved by a hand, without force
     recording = read_recording(felt)
     assert recording.metadata["force"].endswith("from the device's force transducer")
     model = identify(recording)
@@ -73,7 +73,7 @@ def test_a_spring_is_identified_with_its_own_stiffness_and_rendered_back_pushes_
         *device, "--duration-s", 3, "--record", again, device=["--lock-step", "--trace", str(trace)]
     )
     assert answer.returncode == 0, answer.stderr
-    # A torque towards smaller positions, in proportion, as the device itself felt it, once the ramp is over.
+    # After the ramp the device receives a torque towards smaller positions, proportional to the position.
     felt = frames(trace)
     acting = [index for index, frame in enumerate(felt) if frame.torque != 0.0]
     pressed = [frame for frame in felt[acting[0] + 300 : acting[-1]] if frame.position > 0.1]
@@ -92,9 +92,9 @@ def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: P
     recording = read_recording(out)
     assert "including the device's friction" in recording.metadata["force"]
     assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
-    # The motor holds the handle's damping too: 0.018 N*m at this speed, of 0.72 N*m between the ends.
+    # The motor also compensates the handle's damping: 0.018 N*m at this speed, of 0.72 N*m between the ends.
     model = identify(recording)
-    assert "velocity" not in model.inputs  # to and fro at one speed tells nothing of it
+    assert "velocity" not in model.inputs  # one speed cannot identify velocity
     assert model.damping is None
     assert stiffness(model) == pytest.approx(STIFFNESS, rel=2 * 0.018 / 0.72)
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.2
@@ -104,7 +104,7 @@ def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: P
 @needs_emulation
 @pytest.mark.parametrize("words", [[], ["--force-limit", 0.05]], ids=["default", "the device's own"])
 def test_a_probe_may_use_the_whole_force_of_a_weak_device(words: list[Any], tmp_path: Path) -> None:
-    """50000 uNm are 0.05 N*m, although 1e-6 * 50000 is a little less; the usual limit is above that."""
+    """50000 uNm are 0.05 N*m, although 1e-6 * 50000 is slightly less; the usual limit is above that."""
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"
     probe = ["--probe", "--upper", 0.1, "--stiffness", 1, "--lowest-rate-share", 0, *words]
     weak = ["--lock-step", "--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
@@ -150,7 +150,7 @@ def test_a_device_that_is_unplugged_leaves_what_was_recorded(tmp_path: Path) -> 
     rows = every_row(out)
     assert len(rows) == summary["recorded"] == summary["ticks"]
     assert summary["lost_records"] == 0
-    # How many samples pass before the first row, or are lost, depends on the machine; each is accounted for.
+    # The number of samples before the first row, or lost, depends on the machine; each is counted.
     samples = rows["sequence"].drop_duplicates().to_numpy()
     lost = np.diff(samples) - 1
     assert (lost >= 0).all()

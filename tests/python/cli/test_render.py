@@ -21,7 +21,7 @@ COMMAND = [sys.executable, "-m", "palpate", "render", str(MODEL)]
 
 
 def render(scheme: Scheme, **words: Any) -> dict[str, Any]:
-    """The machine of a test may be busy: no rate is too low."""
+    """Accepts any rate, because the test machine may be busy."""
     return dict(_core.run.render(load_model(MODEL), scheme, **words, lowest_rate_share=0.0))
 
 
@@ -140,7 +140,7 @@ def test_the_verb_ends_in_an_orderly_way_when_asked(tmp_path: Path, number: sign
     command = [*COMMAND, "--duration-s", "inf", "--record", str(out), "--json", *PATIENT]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for_rows(Path(f"{out}.part"), process)
-    time.sleep(0.8)  # longer than the ramp, whose rows are no one's force
+    time.sleep(0.8)  # longer than the ramp, whose rows are not used
     process.send_signal(number)
     told, talk = process.communicate(timeout=30)
     assert process.returncode == 0, told + talk

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a terminal gets: lines wrapped between words, no control characters from outside, progress, Ctrl-C."""
+"""Terminal output: wrapping between words, no control characters from outside, progress, Ctrl-C."""
 
 import ast
 import json
@@ -29,7 +29,7 @@ Terminal = Callable[..., str]
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """Run something with a terminal of some width as standard output and error; what the terminal got."""
+    """Runs a function with a terminal of some width as standard output and error; returns the output."""
 
     def run(work: Callable[[], object], columns: int = 80) -> str:
         keyboard, screen = pty.openpty()
@@ -90,7 +90,7 @@ def test_no_word_is_broken_at_the_edge_of_a_terminal(
 ) -> None:
     shown = terminal(lambda: main(arguments), columns)
     assert "Traceback" not in shown
-    # Only a word that is longer than the terminal is wide may go over its edge.
+    # Only a word that is longer than the width of the terminal may exceed it.
     assert [line for line in shown.splitlines() if len(line) > columns and len(line.split()) > 1] == []
 
 
@@ -103,7 +103,7 @@ def test_a_message_is_one_line_where_there_is_no_terminal(
 
 
 EVIL = "\x1b[2J\x1b]0;owned\x07\u202e\x9b31m"
-"""Clears a screen, names its window, turns the writing round."""
+"""Clears a screen, names its window, reverses the direction of writing."""
 
 
 def forbidden(text: str) -> list[str]:
@@ -204,7 +204,7 @@ def test_ctrl_c_ends_a_long_computation_of_a_library_at_once() -> None:
         began = time.monotonic()
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=60)
-        # The computation alone takes a minute; 0.2 s are meant, and other tests run at the same time.
+        # The computation alone takes a minute; 0.2 s are intended, but other tests run at the same time.
         assert time.monotonic() - began < 3.0
     assert process.returncode == 130
     assert told == "error: interrupted; nothing was written\n"

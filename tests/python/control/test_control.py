@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control as a program: what it says, what it refuses, and how it ends."""
+"""palpate-control as a program: output, refusals, and endings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def changed_model(folder: Path, **fields: Any) -> Path:
 
 
 def rows_of(recording: Path) -> list[str]:
-    """Its rows, without what is told of them and without their header."""
+    """Returns the rows without comments and header."""
     lines = recording.read_text(encoding="utf-8").splitlines()
     return [line for line in lines if not line.startswith("#")][1:]
 
@@ -147,7 +147,7 @@ def test_asked_to_stop_it_ends_in_an_orderly_way(tmp_path: Path, number: signal.
     out = tmp_path / "felt.csv"
     process = started(MODEL, "--duration-s", "inf", "--record", out, "--json", *PATIENT)
     wait_for_rows(tmp_path / "felt.csv.part", process)
-    time.sleep(0.8)  # longer than the ramp, of which no row is usable
+    time.sleep(0.8)  # longer than the ramp, which has no usable row
     process.send_signal(number)
     told, talk = process.communicate(timeout=20)
     assert process.returncode == 0, talk
@@ -188,7 +188,7 @@ def test_a_passing_fault_is_counted_and_the_run_goes_on(fault: str) -> None:
     answer = control(MODEL, "--duration-s", 0.5, "--json", "--fault", fault, *PATIENT)
     assert answer.returncode == 0, answer.stderr
     assert sum(json.loads(answer.stdout)["ticks_by_status"].values()) == json.loads(answer.stdout)["ticks"]
-    assert len(json.loads(answer.stdout)["ticks_by_status"]) == 3  # Ok, Ramp and the fault's own
+    assert len(json.loads(answer.stdout)["ticks_by_status"]) == 3  # Ok, Ramp and that of the fault
 
 
 def test_a_rate_too_low_is_said_and_ends_the_run(tmp_path: Path) -> None:

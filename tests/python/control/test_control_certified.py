@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control and the plan of its model: taken where it is certified, and kept to."""
+"""palpate-control with the plan of its model: used and kept only if it is certified."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from palpate.planning import Plan
 
 pytestmark = needs_program
 
-# A certificate that a busy machine does not leave: its longest period is a tenth of a second.
+# Certificate that holds on a busy machine: its longest period is a tenth of a second.
 PATIENT_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.01)
 
 
@@ -40,7 +40,7 @@ def metadata(record: Path) -> str:
 def test_the_plan_of_the_file_is_what_is_rendered(tmp_path: Path) -> None:
     scheme = Scheme(structure="massless", coupling_stiffness=70.0, coupling_damping=0.0)
     path = Plan(model_by_hand(), scheme).stored().save(tmp_path / "planned.json")
-    # A limit of one's own is no rendering of one's own.
+    # A limit of the user does not replace the plan.
     for others in ([], ["--uncertified"], ["--slew-s", 0.1]):
         answer = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0, *others)
         assert answer.returncode == 0, answer.stderr
@@ -50,7 +50,7 @@ def test_the_plan_of_the_file_is_what_is_rendered(tmp_path: Path) -> None:
 
 @pytest.fixture
 def limited(tmp_path: Path) -> Path:
-    """A plan that renders another network than the identified one; its device is patient."""
+    """Writes a plan that renders another network than the identified one; its device allows long periods."""
     knob = DeviceProfile(
         id="weak knob",
         inertia=0.05,

@@ -28,7 +28,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "spring.json"
 
 @pytest.fixture
 def spring(tmp_path: Path) -> Path:
-    """A spring of 100 N/m over 20 mm."""
+    """Writes a spring of 100 N/m over 20 mm."""
     model = json.loads(MODEL.read_text(encoding="utf-8"))
     model["units"] = {"position": "m", "force": "N"}
     model["network"]["linear"] = [STIFFNESS]
@@ -62,9 +62,9 @@ def test_a_spring_is_rendered_along_one_axis_and_pushes_back(spring: Path, tmp_p
     assert recording.metadata["service"] == "force gate 0.3, damping 0.5"
     assert recording.position.max() > 0.003
     late = slice(300, None)
-    felt = STIFFNESS * np.maximum(recording.position[late], 0.0)  # below it there is no contact
+    felt = STIFFNESS * np.maximum(recording.position[late], 0.0)  # no contact below zero
     assert recording.force[late] == pytest.approx(felt, abs=1e-6)
-    # Along the axis only, out of the object, and nothing any longer at the end.
+    # The force is along the axis only, out of the object, and zero at the end.
     assert all(force["x"] == force["y"] == 0.0 for force in service.forces)
     assert min(force["z"] for force in service.forces) < -0.2
     assert service.forces[-1]["z"] == 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What palpate-control leaves on the disk, whatever happens to it, and what becomes of it afterwards."""
+"""Flight records of palpate-control after every kind of ending, and their further use."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_after_kill_the_part_is_complete_to_the_last_tenth_of_a_second(tmp_path:
     chance = random.Random(5)
     out = tmp_path / "felt.csv"
     part = tmp_path / "felt.csv.part"
-    as_modelled = ["--ramp-s", 0, "--slew-s", 0]  # every row is one to read
+    as_modelled = ["--ramp-s", 0, "--slew-s", 0]  # every row is usable
     for _ in range(KILLS):
         process = started(MODEL, "--duration-s", "inf", "--record", out, *as_modelled, *PATIENT)
         seen = wait_for_rows(part, process)
@@ -256,7 +256,7 @@ def test_a_full_standard_output_ends_with_1_and_a_sentence(words: list[str]) -> 
 def test_the_verdict_comes_first(
     tmp_path: Path, words: list[Any], level: str, sentence: str, code: int
 ) -> None:
-    """On a busy machine deadlines are missed, which is told as well."""
+    """On a busy machine deadlines are missed, which is also reported."""
     words = [MODEL, *(["--duration-s", 1.2] if "--duration-s" not in words else []), *words, *PATIENT]
     answer = control(*words, cwd=tmp_path)
     assert answer.returncode == code, answer.stderr
@@ -291,7 +291,7 @@ def test_a_file_that_may_not_grow_stops_the_recording_and_not_the_loop(tmp_path:
 
 @pytest.fixture
 def full_disk(tmp_path: Path) -> Path:
-    """A disk of 64 KiB that is seen by nobody else."""
+    """Returns a private disk of 64 KiB."""
     if os.geteuid() != 0 or shutil.which("unshare") is None:
         pytest.skip("needs root and unshare, to mount a small disk")
     place = tmp_path / "disk"
@@ -362,7 +362,7 @@ def test_a_long_run_loses_nothing_and_its_memory_stays_flat(tmp_path: Path) -> N
 
 
 def test_rows_whose_force_was_not_the_model_s_alone_are_left_out_and_counted(tmp_path: Path) -> None:
-    """The ramp, what the limit clipped, and what a fault set to zero: none of it is the object's."""
+    """The ramp, clipped rows and rows after a fault do not describe the object."""
     out = tmp_path / "felt.csv"
     words = ["--duration-s", 2, "--structure", "direct", "--force-limit", 1.2, "--fault", "nan@0.5x3"]
     assert control(MODEL, *words, "--record", out, "--json", *PATIENT).returncode == 0
@@ -384,7 +384,7 @@ def test_a_record_of_nothing_but_the_ramp_is_refused_with_the_reason(tmp_path: P
 
 
 def palpate(*words: Any) -> str:
-    """The command line, whose answer must be a success."""
+    """Runs the command line, which must succeed."""
     command = [sys.executable, "-m", "palpate", *map(str, words)]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stderr
@@ -392,7 +392,7 @@ def palpate(*words: Any) -> str:
 
 
 def test_what_was_rendered_is_identified_as_the_same_model_with_no_hint(tmp_path: Path) -> None:
-    """The whole way with the programs themselves: identify, render, record, identify the record, compare."""
+    """Runs all steps with the programs: identify, render, record, identify the record, compare."""
     sample, felt = tmp_path / "sample.csv", tmp_path / "felt.csv"
     first, again, picture = (tmp_path / name for name in ("first.json", "again.json", "both.png"))
     sample_recording(seed=1).write(sample)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live line of palpate-control: in a terminal, in a narrow one, and nowhere else."""
+"""Live line of palpate-control: shown in a terminal, also in a narrow one, and nowhere else."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from control_program import MODEL, PATIENT, PROGRAM, control, needs_program
 pytestmark = needs_program
 
 AGAIN = "\r\x1b[K"
-"""Back to the start of the line, and nothing on it."""
+"""Returns to the start of the line and clears it."""
 
 WHOLE = re.compile(r"[\d.]+ s  -?[\d.e-]+ rad  -?[\d.e-]+ Nm  [\d.]+ Hz  missed \d+")
 
 
 class Terminal:
-    """A terminal of some columns that runs the program; the summary goes to a pipe."""
+    """Terminal of some columns that runs the program; the summary goes to a pipe."""
 
     def __init__(self, columns: int, *words: Any) -> None:
         self._ours, theirs = os.openpty()
@@ -55,14 +55,14 @@ class Terminal:
         os.close(self._ours)
 
     def watch(self, until_lines: int | None = None) -> None:
-        """Read what is shown, until so many live lines have been, or until the program has ended."""
+        """Reads the output until it has some number of live lines, or until the program has ended."""
         limit = time.monotonic() + 30.0
         while until_lines is None or self.shown.count(AGAIN) < until_lines:
             assert time.monotonic() < limit
             if select.select([self._ours], [], [], 0.1)[0]:
                 try:
                     self.shown += os.read(self._ours, 4096).decode()
-                except OSError:  # nobody is on the other side any more
+                except OSError:  # the other side is closed
                     return
 
     def press(self, key: bytes) -> None:
@@ -74,7 +74,7 @@ class Terminal:
 
     @property
     def lines(self) -> list[str]:
-        """The live lines, one after the other, each over the one before."""
+        """Live lines in order; each replaces the previous one."""
         shown = self.shown.split(AGAIN)[1:]
         return [line for line in shown if line and not line.endswith("\n")]
 
@@ -104,13 +104,13 @@ def test_a_terminal_shows_one_line_that_is_alive_and_gone_at_the_end() -> None:
 
 @pytest.mark.parametrize("columns", [40, 12, 5])
 def test_in_a_narrow_terminal_the_line_stays_one_line(columns: int) -> None:
-    """One character more than the terminal is wide, and its first half would stay behind."""
+    """One character above the width of the terminal would leave a part of the old line."""
     with terminal(columns, MODEL, "--duration-s", 0.8) as screen:
         screen.watch()
         assert screen.process.wait() == 0
         lines = screen.lines
         assert all(len(line) < columns for line in lines)
-        if columns > 5:  # in that one there is no room for anything
+        if columns > 5:  # too narrow for any content
             assert len(lines) >= 2
             assert all(re.match(r"[\d.]+ s", line) for line in lines)
 
@@ -132,7 +132,7 @@ def test_what_is_said_during_a_run_has_a_line_of_its_own() -> None:
         assert screen.process.wait() == 1
         said = screen.shown.partition("error: stopped by a fault of the device: Fault")
         assert said[1]
-        # on a busy machine a warning may stand between the live line and this
+        # on a busy machine a warning may follow the live line
         assert said[0].endswith((AGAIN, "\n"))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control on a USB device that is emulated below libusb: what it refuses, and how it ends."""
+"""palpate-control on a USB device that is emulated below libusb: refusals and endings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "p
 SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 
-# The transfers are the clock: how fast this machine is does not matter, and the rate is nobody's business.
+# The transfers are the clock: the speed and the rate of this machine have no effect.
 LOCK_STEP = ["--lock-step"]
 PATIENT = ["--wait-ms", "10000", "--lowest-rate-share", "0", "--priority", "0"]
 
@@ -85,7 +85,7 @@ def test_a_model_that_is_certified_for_this_device_needs_no_more_words(tmp_path:
 
 
 def planned(folder: Path, **device: Any) -> Path:
-    """The spring, planned for the emulated knob; in lock-step the host may be four packets behind."""
+    """Plans the spring for the emulated knob; in lock-step the host may be four packets behind."""
     profile = {"id": "EMU-1", "viscous_damping": 50.0, "coulomb_friction": 0.01, "force_step": 1e-6}
     plans = plan(load_model(SPRING), DeviceProfile(**{**profile, "delay_s": 5.25e-3, **device}))
     return plans.stored().save(folder / "planned.json")
@@ -95,7 +95,7 @@ def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
     record = tmp_path / "felt.csv"
     words = ["--wait-ms", 500, "--duration-s", 0.6, "--record", record]
     answer = control(*words, device=LOCK_STEP, model=planned(tmp_path))
-    # On a busy machine the first late packet ends it: nothing else is certified.
+    # On a busy machine the first late packet ends the run: a later one is not certified.
     assert answer.returncode == 0 or "zero force sent" in answer.stderr, answer.stderr
     assert "direct, predict 1; emulated knob EMU-1" in answer.stderr
     assert "uncertified" not in answer.stderr
@@ -193,13 +193,13 @@ def test_a_run_is_recorded_and_ends_with_zero_torque_and_a_disabled_device(tmp_p
     assert summary["usb"]["delay_samples"]["p50"] == pytest.approx(1.0, abs=0.01)
     recording = read_recording(record)
     assert recording.force.max() > 0.02
-    # The object pushes back: torque against the position, as the device itself felt it.
+    # The object pushes back: the device receives a torque against the position.
     felt = frames(trace)
     strongest = min(felt, key=lambda frame: frame.torque)
     assert strongest.torque == pytest.approx(-2.0 * strongest.position, rel=0.2)
     assert felt[-1].torque == 0.0
     assert not felt[-1].enabled
-    # What was sent is what was applied two rows later: one sample of delay, and the latch.
+    # The sent force is applied two rows later: one sample of delay, and the latch.
     force, applied = recording.force, recording.columns["applied_Nm"]
     assert abs(force[300:-2] - applied[302:]).max() < 2e-6
 
@@ -253,10 +253,10 @@ def test_killed_it_leaves_the_device_to_its_watchdog(tmp_path: Path) -> None:
     assert felt[-1].status & 2  # the watchdog
 
 
-# Kind -> how many frames it lasts, whether nothing can follow it, within how many frames the torque is zero.
-# What a packet shows is answered at once, and the answer acts one frame later; what takes the packet itself
-# shows in the next one. Otherwise the device's watchdog answers, when the last command's time is over; so it
-# does on a busy machine before a halted OUT endpoint is cleared.
+# Kind -> number of frames of the fault, True if nothing can follow it, frames until the torque is zero. The
+# response to a fault in a packet is immediate and acts one frame later; a lost packet is seen in the next
+# frame. Otherwise the watchdog of the device acts when the time of the last command is over. On a busy
+# machine it also acts before a halted OUT endpoint is cleared.
 SHOWN = 1
 TAKEN = 2
 WATCHDOG = 10
@@ -312,7 +312,7 @@ def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_pa
         for row in record.read_text(encoding="utf-8").splitlines():
             cells = row.split(",")
             if cells[-1] in UNSOUND:
-                assert float(cells[2]) == 0.0, where  # in the tick that saw it
+                assert float(cells[2]) == 0.0, where  # in the tick that detected it
         behind = round(summary["usb"]["delay_samples"]["p50"]) - 1  # in packets; on a busy machine
         felt = frames(trace)
         by_start = {frame.started: index for index, frame in enumerate(felt)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled core as Python sees it: the same numbers as a plain NumPy reference, and sound refusals."""
+"""Compiled core in Python: numbers equal to a plain NumPy reference, and clear refusals."""
 
 import os
 
@@ -25,7 +25,7 @@ CASES = 100 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
 
 def hat(u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The radial Mexican hat over the last axis."""
+    """Returns the radial Mexican hat over the last axis."""
     square = np.sum(u * u, axis=-1)
     return (square - u.shape[-1]) * np.exp(-0.5 * square)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a rendering are values: pickled, copied and compared by one list of fields."""
+"""Settings of a rendering as values: pickled, copied and compared by one list of fields."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_copy_equals_the_original(name: str, copied: Callable[[Any], Any]) -> 
 
 @pytest.mark.parametrize("name", CHANGED)
 def test_the_fields_of_a_copy_are_the_arguments_of_the_constructor(name: str) -> None:
-    """A field that is added to the constructor and not to the list would be lost in a copy."""
+    """A field in the constructor but not in the list would be lost in a copy."""
     value = CHANGED[name]
     rebuild, arguments = value.__reduce__()
     assert arguments == ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C++ and Python agree: the same networks and positions through a C++ program and through the package."""
+"""Equality of C++ and Python: the same networks and positions through a C++ program and the package."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Array = NDArray[np.float64]
 NETWORKS = 1000 * int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 CONTINUATIONS = ("linear", "free")
 TOLERANCE = 1e-12
-"""Of the sum of the absolute terms."""
+"""Relative to the sum of the absolute terms."""
 
 DIFFICULT = [0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, -2e-310, 1e300, -1e300, np.finfo(float).max]
 
 
 @dataclass
 class Case:
-    """A network over [lower, upper], and where it is asked."""
+    """Network over [lower, upper], and the positions of its evaluation."""
 
     alpha: Array
     beta: Array
@@ -43,7 +43,7 @@ class Case:
     x: Array
 
     def stream(self) -> bytes:
-        """As forces.cpp reads it."""
+        """Returns the input of forces.cpp."""
         head = [len(self.alpha), len(self.x), self.linear, self.bias, self.lower, self.upper]
         parts = [[*head, self.below, self.above], self.alpha, self.beta, self.weight, self.x]
         return np.concatenate(parts).astype(np.float64).tobytes()
@@ -69,7 +69,7 @@ def cases() -> Iterator[Case]:
         travel = 10.0 ** random.uniform(-6, 3)
         lower = travel * random.uniform(-2, 1)
         x = lower + travel * random.uniform(-0.2, 1.2, 8)
-        # everything that a double can be, in every network a few
+        # random bits of doubles, four in every network
         bits = random.integers(-(2**63), 2**63 - 1, 4, dtype=np.int64).view(np.float64)
         yield Case(
             np.exp(random.uniform(0.0, 5.0, size)) / travel,
@@ -88,7 +88,7 @@ def cases() -> Iterator[Case]:
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """forces.cpp, compiled as anybody would: the include folder and C++20."""
+    """Compiles forces.cpp with only the include folder and C++20."""
     compiler = shutil.which(os.environ.get("CXX", "c++"))
     if compiler is None:
         pytest.skip("needs a C++ compiler")
@@ -100,7 +100,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def sizes(case: Case) -> Array:
-    """What a rounding error is measured against: sums of absolute terms of force, slope and energy, (3,)."""
+    """Returns the scale of a rounding error: sums of absolute terms of force, slope and energy, (3,)."""
     weight, c = np.abs(case.weight), abs(case.linear)
     reach = max(abs(case.lower), abs(case.upper))
     return np.array(
@@ -134,7 +134,7 @@ def test_inside_the_domain_both_are_equation_4(program: Path) -> None:
         x = case.x[(case.x >= case.lower) & (case.x <= case.upper)]
         u = case.alpha * (x[:, None] - case.beta)
         plain = ((u**2 - 1.0) * np.exp(-0.5 * u**2)) @ case.weight + case.linear * x + case.bias
-        # an error of rounding in u is one of alpha eps |x| in the argument
+        # a rounding error in u corresponds to alpha eps |x| in the argument
         reach = max(abs(case.lower), abs(case.upper))
         size = sizes(case)[0] + sizes(case)[1] * reach
         assert np.abs(case.model().force(x) - plain).max(initial=0.0) <= TOLERANCE * size

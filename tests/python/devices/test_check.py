@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate check-device: what is seen of a device, and that nothing is pushed where a sign is wrong."""
+"""palpate check-device: its observations of a device, and no pushes after a wrong sign."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHARE_OF_FORCE = 0.005
 
 
 def heard(**changed: Any) -> dict[str, Any]:
-    """What `measure` says of a faultless device in a hand against a spring, for `judge`."""
+    """Returns a summary of `measure` for a faultless device in a hand against a spring, for `judge`."""
     time = 1e-3 * np.arange(2000)
     moves = np.where(time > 0.5, 0.2 * (1.0 - np.cos(2 * np.pi * (time - 0.5))), 0.0)
     position = STEP * np.round(moves / STEP)
@@ -153,7 +153,7 @@ def pushed(
     friction: float = 0.0,
     smaller: float = 0.6,
 ) -> dict[str, np.ndarray]:
-    """Ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
+    """Returns ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
     sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
     sent[np.arange(2000) % 200 >= 170] = 0.025
     sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
@@ -244,7 +244,7 @@ def test_the_sign_of_the_force_is_what_moved_the_handle(ticks: dict[str, np.ndar
 
 @pytest.fixture
 def faultless(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever is measured is a faultless device, at once."""
+    """Replaces every measurement by that of a faultless device."""
     push = {"kept": pushed(friction=0.01)}
     monkeypatch.setattr(check, "measure", lambda device, **settings: push if "push" in settings else heard())
 
@@ -343,7 +343,7 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
     assert result["delay_p50_us"] == pytest.approx(1000.0, rel=0.02)
-    assert 1e-3 < result["delay_s"] < 3e-3  # the latest in a thousand: the machine may be busy
+    assert 1e-3 < result["delay_s"] < 3e-3  # largest of a thousand: the machine may be busy
     assert result["round_trip_p50_us"] > 0.0
     assert (result["lost_samples"], result["repeated_samples"]) == (0, 0)
     written = DeviceProfile.load(profile)
@@ -379,7 +379,7 @@ def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
     assert findings["sign of the force"]["right"] is False
     assert "sign of the force: flipped" in result["verdict"]
     assert "do not enable force" in result["verdict"]
-    assert not profile.exists()  # and so nothing is certified for it
+    assert not profile.exists()  # so nothing is certified for it
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.001 * SHARE_OF_FORCE * 5.0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices of other people's making: whatever the protocol leaves open is drawn by a seed."""
+"""Devices with other firmware: a seed draws everything that the protocol leaves open."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def other(seed: int, *words: Any) -> list[str]:
 def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
     trace, record, listed = (tmp_path / name for name in ("trace.csv", "felt.csv", "devices.json"))
     model = json.loads(SPRING.read_text(encoding="utf-8"))
-    model["continuation"] = {**model["continuation"], "below": "linear"}  # wherever the hand is at zero
+    model["continuation"] = {**model["continuation"], "below": "linear"}  # for any zero of the hand
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
     control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *PATIENT, "--wait-ms", 10_000]))
@@ -51,7 +51,7 @@ def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_
     assert summary["usb"]["late_echoes"] == 0
     assert summary["usb"]["watchdog_trips"] == 0
     felt = frames(trace)
-    assert max(abs(frame.torque) for frame in felt) > 1e-3  # the spring was felt
+    assert max(abs(frame.torque) for frame in felt) > 1e-3  # the spring made force
     assert felt[-1].torque == 0.0
     assert not felt[-1].enabled
     assert abs(read_recording(record).force).max() > 1e-3
@@ -63,7 +63,7 @@ def test_its_sign_and_mechanics_are_measured(seed: int) -> None:
     assert answer.returncode in (0, 1), answer.stderr  # this machine may be late
     told = json.loads(answer.stdout)
     findings = {one["name"]: one for one in told["findings"]}
-    # A coarse encoder does not see such a push.
+    # A coarse encoder cannot detect such a push.
     assert findings["sign of the force"]["right"] or told["encoder_step"] > 1e-3, answer.stdout
     assert 0.0 <= told["delay_s"] < 4e-3
     assert findings["wire"]["right"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The udev rule: shipped with the package, written by one command."""
+"""Udev rule: shipped with the package, installed by one command."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palpate.devices import DeviceError, install_rule, usb
 
 @pytest.fixture
 def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
-    """The commands that would have been run."""
+    """Returns the commands that would run."""
     commands: list[tuple[str, ...]] = []
 
     def run(command: tuple[str, ...], **_: Any) -> subprocess.CompletedProcess[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The set-up of a device through real pyusb and libusb, with an emulated device below both."""
+"""Setup of a device through real pyusb and libusb, with an emulated device below both."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COUNTS_A_TURN = 65536
 
 @pytest.fixture(scope="module")
 def told() -> dict[str, Any]:
-    """One session with the device, by what was done."""
+    """Returns the results of one session with the device, by action."""
     answer = emulated(sys.executable, "-W", "error", ROOT / "tests" / "usb" / "set_up_over_pyusb.py")
     assert answer.returncode == 0, answer.stderr
     result: dict[str, Any] = json.loads(answer.stdout)
@@ -82,7 +82,7 @@ def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(told
 
 def test_a_halted_endpoint_stalls_until_it_is_cleared(told: dict[str, Any]) -> None:
     assert told["stalls"][0] == errno.EPIPE
-    assert len(told["stalls"]) == 2  # reading again brings nothing
+    assert len(told["stalls"]) == 2  # reading again gives no data
     assert told["bytes after the stall"] == 32
 
 

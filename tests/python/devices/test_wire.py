@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The binding of the decoder of GET_INFO: SI units, and refusals that name the field."""
+"""Binding of the decoder of GET_INFO: SI units, and refusals that name the field."""
 
 from __future__ import annotations
 

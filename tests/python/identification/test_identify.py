@@ -56,7 +56,7 @@ def test_several_recordings_of_one_environment_are_identified_together() -> None
 
 
 def test_play_starts_at_rest_in_every_recording() -> None:
-    """A sweep, and twenty rests elsewhere: only a new start explains that a rest lies between the strokes."""
+    """A sweep, and twenty rests elsewhere: only a new start explains a rest between the strokes."""
     random = np.random.default_rng(1)
     t = np.linspace(0.0, 4.0 * np.pi, 1600)
     x = 0.5 - 0.5 * np.cos(t)
@@ -116,7 +116,7 @@ def test_control_c_leaves_identify_at_once(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
-    """Every fifth row held out; one model for both strokes."""
+    """Holds out every fifth row; fits one model for both strokes."""
     kept, held = palpate.read_recording(path).split(every=5)
     model = identify(kept, **options)
     assert held.direction is not None
@@ -133,7 +133,7 @@ def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
 def test_measured_strokes_are_held_to_their_error(
     data: Path, folder: str, every: int, median: float, bounded: bool
 ) -> None:
-    """Some files of each set, more in the long run; the whole table is a benchmark's business."""
+    """Some files of each set, more in long runs; a benchmark covers the whole table."""
     errors = []
     apart = every if SCALE > 1 else 3 * every if bounded else 6 * every
     for path in sorted((data / folder).glob("*.csv"))[::apart]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that do not fit into memory are read part by part."""
+"""Files that do not fit into memory are read in parts."""
 
 import json
 import os
@@ -28,7 +28,7 @@ SCALE = float(os.environ.get("PALPATE_TEST_SCALE", "1"))
 
 
 def rows(n: int, seed: int = 0, step: float = 0.0) -> pd.DataFrame:
-    """A soft spring that ends at a wall, press and release apart; positions in steps where asked for."""
+    """Returns a soft spring that ends at a wall, with hysteresis; `step` quantises positions."""
     random = np.random.default_rng(seed)
     phase = 2.0 * np.pi * 0.8e-3 * np.arange(n)
     x = 0.3 - 0.3 * np.cos(phase)
@@ -177,7 +177,7 @@ def test_several_processes_give_the_same_to_the_last_bit(tmp_path: Path) -> None
 
 @contextmanager
 def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """A real scheduler and worker processes of this machine: its address, and the workers."""
+    """Starts a real scheduler and worker processes; yields its address and the workers."""
     place = folder / "scheduler.json"
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
@@ -300,7 +300,7 @@ def _small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def stroke_rows(n: int) -> pd.DataFrame:
-    """A spring with hysteresis, pressed and released; every force differs."""
+    """Returns a spring with hysteresis, pressed and released; every force differs."""
     phase = 2.0 * np.pi * np.arange(n) / 97.0
     press = np.sin(phase) >= 0.0
     x = 0.3 - 0.3 * np.cos(phase)

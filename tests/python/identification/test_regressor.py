@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wavelet network among scikit-learn's estimators: their rules, their tools, and weights that count."""
+"""Wavelet network as a scikit-learn estimator: its rules, its tools, and weights of rows."""
 
 import inspect
 import pickle
@@ -29,7 +29,7 @@ def test_scikit_learn_finds_nothing_to_object_to(estimator: Any, check: Any) -> 
 
 
 def bump(n: int = 300, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """A hump and a slope under noise, one input."""
+    """Returns a hump and a slope with noise, one input."""
     random = np.random.default_rng(seed)
     x = random.uniform(-1.0, 1.0, n)
     return x[:, None], x + np.exp(-(((x - 0.2) / 0.15) ** 2)) + random.normal(0.0, 0.01, n)
@@ -92,7 +92,7 @@ def test_nothing_is_learned_from_a_row_of_no_weight() -> None:
 
 
 def test_the_domain_reaches_beyond_rows_drawn_from_a_range_as_far_as_they_fall_short_of_it() -> None:
-    """The least of m values from 0 to 1 stands at 1/(m + 1) on average, and the domain's edge at 0."""
+    """The least of m values from 0 to 1 is 1/(m + 1) on average, and the edge of the domain is 0."""
     random = np.random.default_rng(0)
     edges = []
     for _ in range(200):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every model file of the corpus, the published schema, and texts that are no JSON."""
+"""Every model file of the corpus, the published schema, and texts that are not JSON."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def good_text(name: str) -> str:
 
 
 def patched(content: Any, patch: list[dict[str, Any]]) -> Any:
-    """The content after a JSON patch of add, replace and remove."""
+    """Returns the content after a JSON patch of add, replace and remove."""
     for change in patch:
         *way, last = change["path"].split("/")[1:]
         parent = content
@@ -59,7 +59,7 @@ def bad_bytes(entry: dict[str, Any]) -> bytes:
 
 
 def refusal(path: Path, content: bytes) -> str:
-    """The sentence with which a file of this content is refused, without its name."""
+    """Returns the refusal of a file with this content, without the file name."""
     path.write_bytes(content)
     with pytest.raises(InputError) as refused:
         load_model(path)
@@ -70,7 +70,7 @@ def refusal(path: Path, content: bytes) -> str:
 
 
 def refused(path: Path) -> str | None:
-    """The sentence that refuses a file, or None."""
+    """Returns the refusal of a file, or None."""
     try:
         load_model(path)
     except InputError as error:
@@ -133,7 +133,7 @@ def test_a_long_value_is_shortened(tmp_path: Path) -> None:
 
 
 def objects(schema: dict[str, Any], content: Any, path: str) -> Iterator[tuple[str, dict[str, Any], Any]]:
-    """Each object in a file with its path and its schema."""
+    """Yields each object in a file with its path and its schema."""
     if "$ref" in schema:
         schema = SCHEMA["$defs"][schema["$ref"].split("/")[-1]]
     for choice in schema.get("anyOf", ()):
@@ -150,7 +150,7 @@ def objects(schema: dict[str, Any], content: Any, path: str) -> Iterator[tuple[s
 
 
 def spoiled(schema: dict[str, Any], content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Changes of an object that its schema forbids: JSON patches without the path of the object."""
+    """Yields changes of an object that its schema forbids: JSON patches without the path of the object."""
     yield "unknown_key", {"op": "add", "value": 0}
     for name in schema["required"]:
         yield name, {"op": "remove"}

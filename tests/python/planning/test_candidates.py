@@ -20,7 +20,7 @@ BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))
 
 
 def wheel() -> Model:
-    """A wheel with one peak of about 8 N*m; its unlimited force has no mean."""
+    """Returns a wheel with one peak of about 8 N*m; its unlimited force has zero mean."""
     model = model_by_hand(
         alpha=[[8.0], [0.6], [0.6]],
         beta=[[2.0], [4.5], [1.2]],
@@ -33,7 +33,7 @@ def wheel() -> Model:
 
 
 def given_in_a_turn(model: Model, force_limit: float) -> float:
-    """Energy of one slow turn: the limited force summed over fine steps [J]."""
+    """Returns the energy of one slow turn: the limited force summed over fine steps [J]."""
     x = TURN * (np.arange(100_000) + 0.5) / 100_000
     return float(abs(np.clip(model.force(x), -force_limit, force_limit).mean()) * TURN)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The TOML file of a device profile: every refusal is one sentence with the file's name."""
+"""TOML file of a device profile: every refusal is one sentence with the file's name."""
 
 from __future__ import annotations
 

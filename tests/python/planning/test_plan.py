@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Device profiles, the ladder of the plan, its certificate in the model file, and the verb."""
+"""Device profiles, candidate structures, certificates in model files, and the verb."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMOOTH = DeviceProfile(id="smooth knob", encoder_step=0.0)
 
 
 def slide(viscous_damping: float) -> DeviceProfile:
-    """For key switches."""
+    """Returns a device for key switches."""
     return DeviceProfile(
         id="slide",
         position_unit="m",
@@ -123,7 +123,7 @@ def test_a_prediction_never_costs_the_network_or_the_certificate() -> None:
 
 
 def test_a_late_device_that_holds_a_model_only_with_a_prediction_gets_one() -> None:
-    """A sample of delay: slopes up to 40 need 0.060 without prediction, 0.052 with one of a sample."""
+    """A sample of delay: slopes up to 40 need 0.060 without prediction, 0.052 with that of one sample."""
     model = model_by_hand(weight=[0.0], linear=[40.0])
     device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3)
     chosen = plan(model, device)
@@ -198,7 +198,7 @@ def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
 
 
 def test_a_switch_that_is_too_steep_where_contact_begins_is_left_alone_behind_it() -> None:
-    """Both strokes begin there with one force: h, dying out beyond the edge, would be too steep."""
+    """Both strokes begin there with one force: the decrease of h beyond the edge would be too steep."""
     model = keyswitch_by_hand(beta=[[0.0]], weight=[0.3], bias=0.33, bias_hysteresis=0.02)
     weak = slide(viscous_damping=0.35)
     chosen = plan(model, weak)
@@ -285,7 +285,7 @@ def test_an_edited_model_is_refused_when_it_is_read(tmp_path: Path) -> None:
 
 
 def test_what_is_planned_survives_hands_on_the_device_it_was_planned_for() -> None:
-    """As proved, so simulated: the plan for a weak device keeps its error, the model itself shakes there."""
+    """The plan for a weak device keeps its error in the simulation, the model alone oscillates."""
     from palpate import Hand, simulate
     from palpate.planning import force_error
 

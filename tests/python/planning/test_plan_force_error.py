@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force error of a plan: its share, its verdict, the device property that is named, and the model file."""
+"""Force error of a plan: its share, its verdict, the named device property, and the model file."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A force of position and velocity: planned, stored, rendered directly, and refused everywhere else."""
+"""Force of position and velocity: planned, stored, rendered directly, and refused by other structures."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from palpate.cli.main import main
 from palpate.planning import force_at, force_error, rig_for
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.02)
-# A certificate that a busy machine does not leave: its longest period is a tenth of a second.
+# Certificate that holds on a busy machine: its longest period is a tenth of a second.
 PATIENT_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.05)
 
 
 def fluid_by_hand(**changes: Any) -> Model:
-    """f = 5 x + 0.01 v and one wavelet over both, to 0.5 rad and 4 rad/s."""
+    """Returns f = 5 x + 0.01 v and one wavelet over both, to 0.5 rad and 4 rad/s."""
     return model_by_hand(
         **{
             "kind": "position_velocity",
@@ -96,7 +96,7 @@ def test_the_plan_comes_back_from_its_file_and_an_edited_bound_does_not(tmp_path
     path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(InputError, match=r"certificate\.bounds\.drag is .*must be at least"):
         load_model(path)
-    # Read as a force of anything else but the velocity, it is another force.
+    # Read as a force of another input than velocity, it is another force.
     content["certificate"]["bounds"]["drag"] /= 0.99
     content["kind"] = "general"
     path.write_text(json.dumps(content), encoding="utf-8")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendering a model on a test rig: plans, hands, force errors, and what is refused."""
+"""Rendering of a model on a test rig: plans, hands, force errors, and refusals."""
 
 from typing import Any
 
@@ -50,7 +50,7 @@ def test_a_plan_names_its_structure_and_its_solver(structure: str, solver: str |
 
 
 def test_a_plan_does_not_claim_a_table_that_cannot_be_certified() -> None:
-    # So far from zero the positions of doubles lie farther apart than the error of a table may be.
+    # At this distance from zero, the spacing of doubles exceeds the allowed error of a table.
     far = model_by_hand(beta=[[1e6 + 0.3]], lower=[1e6], upper=[1e6 + 0.5])
     assert Plan(far, Scheme(structure="massless")).solver == "newton"
 
@@ -91,7 +91,7 @@ def test_an_explicit_plan_beyond_its_slope_limit_is_refused_with_both_numbers() 
     ids=["knob", "keyswitch", "both sides of 0"],
 )
 def test_a_hand_leads_the_handle_through_the_domain_and_not_beyond(model: Model, structure: str) -> None:
-    """The first second starts at 0, wherever the domain lies."""
+    """The first second starts at 0, for any domain."""
     _, recording = rendered(model, structure=structure)
     lower, upper = float(model.lower[0]), float(model.upper[0])
     travel = upper - lower
@@ -124,7 +124,7 @@ def test_the_rig_of_another_unit_is_the_knob_as_a_scale_model() -> None:
     plan, recording = rendered(linear, structure="implicit")
     relative = force_error(plan, recording).end / np.abs(recording.force).max()
     plan, recording = rendered(rotary, structure="implicit")
-    # Not equal: the knob is not filled to its force limit by this model, the scale model is.
+    # Not equal: this model does not reach the force limit of the knob, but that of the scale model.
     assert relative == pytest.approx(
         force_error(plan, recording).end / np.abs(recording.force).max(), rel=0.5
     )
@@ -188,7 +188,7 @@ def test_the_play_radius_is_chosen_only_where_the_model_leaves_it_open() -> None
 
 
 def test_the_structures_stand_in_the_order_of_what_they_lose() -> None:
-    """Compensated equals direct; softness of the coupling comes next; added damping costs most."""
+    """Compensated equals direct; softness of the coupling comes next; added damping has the largest error."""
     model = model_by_hand(linear=[8.0])
     rows = compare_structures(model, rig_for(model), 4.0)
     assert [row.scheme.structure for row in rows] == [

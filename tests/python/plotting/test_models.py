@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a model draw what they are given, in its units, so that black and white can tell it apart."""
+"""Figures of a model: drawn data, units, and lines that differ in black and white."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a rendering: recorded beside rendered force, force errors of the structures, root locus."""
+"""Figures of a rendering: recorded and rendered force, force errors of the structures, root locus."""
 
 import numpy as np
 import pytest
@@ -48,8 +48,8 @@ def test_the_poles_are_those_of_the_step_and_leave_the_circle_where_the_certific
     assert reach[2] > 1.0
     # z^2 + a z + b: b is the product, and 1 - T (B_o + B_c) / m.
     assert np.prod(locus.chosen[0]).real == pytest.approx(1.0 - T * 0.51 / 1e-3)
-    # Where two poles meet there is a sample: the drawn path has its corner.
+    # A sample exists where two poles meet: the drawn path has its corner there.
     assert np.abs(np.diff(locus.poles[0], axis=-1)).min() < 1e-6
-    # The step itself, undriven: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
+    # The undriven step: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
     a, b = -np.sum(locus.chosen[0]).real, np.prod(locus.chosen[0]).real
     assert a == pytest.approx(T**2 / 1e-3 * (0.5 * limit + 60.0) - 1.0 - b)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rules by which columns are chosen, and the sentences when they do not choose."""
+"""Rules for the choice of columns, and the refusals if no rule chooses."""
 
 import re
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What goes wrong with recordings never gives a good verdict on an error that is far below the true one."""
+"""Corrupted recordings never give a good verdict on an error that is far below the true one."""
 
 import os
 

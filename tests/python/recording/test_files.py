@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files are replaced as a whole, with their own mode, and never through a name that others can guess."""
+"""Files are replaced as a whole, keep their mode, and never use a predictable temporary name."""
 
 from __future__ import annotations
 

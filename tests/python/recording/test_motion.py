@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strokes taken from the order of rows."""
+"""Strokes from the order of rows."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def test_strokes_of_a_quantised_position_end_where_it_turns_back(scale: float, s
     position = np.round(IN_AND_OUT / step) * step if step else IN_AND_OUT
     found = strokes_from_order(scale * position)
     assert found is not None
-    # Rows within one step of the turn may belong to either stroke.
+    # Rows within one step of the reversal may belong to either stroke.
     assert np.count_nonzero(found != STATED) <= 200 * step
     assert turns_of(found) == 1
 

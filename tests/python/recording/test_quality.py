@@ -24,7 +24,7 @@ def sentences(*rows: Rows) -> list[str]:
 
 
 def only(*rows: Rows) -> str:
-    """The one sentence on the recordings."""
+    """Returns the only sentence on the recordings."""
     (sentence,) = sentences(*rows)
     return sentence
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading recordings: what is accepted, converted, chosen and kept."""
+"""Reading of recordings: accepted, converted, chosen and kept data."""
 
 from pathlib import Path
 

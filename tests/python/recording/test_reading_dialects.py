@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Text files of other programs: where header, units and rows stand, and what the first note reports."""
+"""Text files of other programs: positions of header, units and rows, and the first note."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def comma(value: float) -> str:
 ROWS = [f"{0.5 * k},{10 * k}" for k in K]
 SEMICOLONS = [f"{comma(0.5 * k)};{comma(10 * k)}" for k in K]
 
-# What a program writes: (the lines, what the first note reports, the metadata).
+# Program -> (its lines, the report of the first note, the metadata).
 FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
     "header in a comment, as numpy.savetxt writes it": (
         ["# bench: 3", "# depth_mm,force_N", *ROWS],

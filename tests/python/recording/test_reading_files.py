@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files in their states: one that grows or was cut off while it did, and Parquet."""
+"""Files in their states: growing, cut off while growing, and Parquet."""
 
 import importlib
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Excel, NumPy, MATLAB and MCAP files are read like CSV, and broken Parquet is named."""
+"""Excel, NumPy, MATLAB and MCAP files are read like CSV, and refusals name broken Parquet files."""
 
 import contextlib
 import importlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every file of the measured data: which resolve without a hint, and what the others ask for."""
+"""Every file of the measured data: read without options, or with those of its refusal."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from conftest import measured_data
 from palpate import InputError, read_recording
 from small_files import options_in, refusal
 
-# Sets whose files resolve without an option. A file of any other set resolves, or its refusal names options
+# Sets whose files are read without an option. A file of any other set is read, or its refusal names options
 # that work: a new set needs no change here.
 RESOLVES = {
     "afm_indentation",
@@ -25,7 +25,7 @@ RESOLVES = {
 
 VOLTS = {"position": "speed_out", "force": "input_V", "units": {"speed_out": "rad", "input_V": "Nm"}}
 
-# File or set -> the columns that the set is about.
+# File or set -> the main columns of the set.
 HINTS: dict[str, dict[str, object]] = {
     "davinci_grip": {"position": "back_angle_rad", "force": "back_torque_Nm"},
     "palpation_continuous": {"position": "pos_z_mm", "force": "force_z_N"},
@@ -76,15 +76,15 @@ HINTS: dict[str, dict[str, object]] = {
     },
 }
 
-# A table of published figures beside the recordings: text, and no recording.
+# Table of published figures in the folder of the recordings: text, not a recording.
 NO_RECORDING = "sysid_benchmarks/published_results.csv"
 
 MOST_REFUSALS = 3
-"""Refusals one after the other: the header, then rows that cannot be used."""
+"""Largest number of successive refusals: the header, then rows that cannot be used."""
 
 
 def measured_files() -> list[str]:
-    """Every CSV file of the measured data; without it one name, for which the tests skip."""
+    """Returns every CSV file of the measured data; without it one name, for which the tests skip."""
     folder = measured_data()
     if folder is None:
         return ["keyswitches", "teacher_functions"]

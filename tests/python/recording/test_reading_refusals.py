@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is refused while reading a recording, in which words, and what is dropped on request."""
+"""Refusals while reading a recording, their sentences, and rows that are dropped on request."""
 
 import os
 import re
@@ -17,13 +17,13 @@ from small_files import HEADER, Write, options_in, refusal, rows, timed
 
 
 def lines(*parts: str | list[str]) -> str:
-    """A file's text from lines and lists of lines."""
+    """Returns the text of a file from lines and lists of lines."""
     return "\n".join(line for part in parts for line in (part if isinstance(part, list) else [part]))
 
 
 PLAIN = [f"{k},{k}" for k in range(40)]
 
-# What it is: (the file's text, the options of reading, the whole sentence).
+# Case: (text of the file, options of reading, whole sentence).
 REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "empty": ("", {}, "press.csv is empty"),
     "metadata only": (
@@ -237,7 +237,7 @@ def test_a_decimal_comma_far_below_is_refused_with_the_cure(csv_file: Write) -> 
 
 
 def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> None:
-    """The command in a refusal, with the names of the files filled in, gives a file with this force."""
+    """Checks that the command in a refusal, with the file names filled in, gives a file with this force."""
     command = refusal(path).split(f"{before}sed -E ")[1].split(" OLD.csv > NEW.csv")[0]
     new = path.with_name("new.csv")
     new.write_bytes(
@@ -246,7 +246,7 @@ def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> 
     assert read_recording(new).force[row] == force
 
 
-# What a bad row holds: (header, bad row, what it is called).
+# Case of a bad row: (header, bad row, its name).
 BAD_ROWS = {
     "not a number": (HEADER, "nan,1,press", "column depth_mm holds 'nan', which is no finite number"),
     "infinity": (HEADER, "1,-inf,press", "column force_gf holds '-inf', which is no finite number"),

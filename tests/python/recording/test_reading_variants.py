@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Variants of a recording, as other programs write it, give the same arrays and the same model."""
+"""Variants of a recording from other programs give the same arrays and the same model."""
 
 import contextlib
 import re
@@ -46,7 +46,7 @@ FORCE_UNITS = {"N": ("N", "mN", "kN", "gf", "lbf", "ozf"), "N*m": ("Nm", "mNm", 
 
 
 def sources() -> list[Recording]:
-    """Clean recordings of a few hundred rows: measured ones, or the built-in sample."""
+    """Returns clean recordings of a few hundred rows: measured ones, or the built-in sample."""
     folder = measured_data()
     found = (
         []
@@ -70,16 +70,16 @@ def thinned(recording: Recording) -> Recording:
 
 @dataclass(frozen=True)
 class Variant:
-    """A text file, and the clean recording with the columns that the file has."""
+    """Text file, and the clean recording with the columns of the file."""
 
     data: bytes
     clean: Recording
     told: tuple[str, ...]
-    """What the first note says"""
+    """Reports of the first note"""
 
 
 def variant(clean: Recording, random: np.random.Generator) -> Variant:
-    """One random way to write a recording."""
+    """Returns one random way to write a recording."""
 
     def pick(*choices: str) -> str:
         return str(random.choice(np.array(choices)))
@@ -157,7 +157,7 @@ def quoted(cell: str, separator: str) -> str:
 
 
 def read(path: Path) -> Recording:
-    """The recording, after at most one refusal whose cure is applied literally."""
+    """Returns the recording, after at most one refusal whose cure is applied literally."""
     with contextlib.suppress(InputError):
         recording = read_recording(path)
         silent = [note for note in recording.notes if "has no unit and is not used" in note]

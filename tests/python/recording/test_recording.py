@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings in memory and on disk: shapes, holding out, exact round trips."""
+"""Recordings in memory and on disk: shapes, held-out rows, exact round trips."""
 
 import hashlib
 import re
@@ -16,7 +16,7 @@ N = 37
 
 
 def awkward_numbers(seed: int) -> np.ndarray:
-    """Numbers that lose digits in any short decimal form."""
+    """Returns numbers that lose digits in any short decimal form."""
     random = np.random.default_rng(seed)
     return random.normal(size=N) * 10.0 ** random.integers(-12, 12, N)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated recording that comes with the package."""
+"""Simulated sample recording of the package."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_the_noise_is_that_of_the_sensor() -> None:
 
 
 def test_the_encoder_rounds_to_the_nearest_count() -> None:
-    # A bias of half a count would show on the wall, 0.003 N*m against 0.0003 of noise on the mean.
+    # A bias of half a count would be visible on the wall: 0.003 N*m against 0.0003 of noise on the mean.
     recording = sample_recording(1)
     wall = recording.position > 0.42
     assert abs(np.mean((recording.force - sample_force(recording.position))[wall])) < 1e-3

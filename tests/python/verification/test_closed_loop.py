@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two closed-loop views, and the time that a recording without time is given."""
+"""Both ways to close the loop, and the assumed time of a recording without time."""
 
 import re
 from typing import Any
@@ -31,7 +31,7 @@ def spring(stiffness: float = 2.0, hysteresis: float = 0.0, **change: Any) -> Mo
 
 
 def sweep(stiffness: float = 2.0, timed: bool = True, seconds: float = 4.0) -> Recording:
-    """A slow sweep of a spring, from rest."""
+    """Returns a slow sweep of a spring, from rest."""
     t = np.arange(round(seconds * 1000)) * 1e-3
     x = 0.25 * (1 - np.cos(np.pi * t))
     return Recording.from_arrays(x, stiffness * x, t if timed else None, units=RAD)
@@ -121,7 +121,7 @@ def test_a_play_radius_that_is_known_is_used() -> None:
 
 
 def test_sticking_counts_as_slope_of_the_explicit_environment() -> None:
-    # While it sticks the slope is K + h/r = 2 + 0.1 / 0.00003 > 3000.
+    # In the stick phase the slope is K + h/r = 2 + 0.1 / 0.00003 > 3000.
     loop = force_driven(spring(hysteresis=0.1, play_radius=3e-5), sweep())
     assert loop.scheme.structure == "implicit"
     assert force_driven(spring(hysteresis=0.1, play_radius=4e-5), sweep()).scheme.structure == "explicit"

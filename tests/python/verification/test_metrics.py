@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors, whiteness and perception, each by its definition or its law; two models beside each other."""
+"""Errors, whiteness and perception by definition or law; comparison of two models."""
 
 from pathlib import Path
 
@@ -111,7 +111,7 @@ def spring(stiffness: float, reach: float = 1.0, loss: float = 0.0) -> Model:
 def test_a_difference_counts_in_just_noticeable_ones() -> None:
     (stroke,) = compare(spring(10.0), spring(10.35))
     assert stroke.name == ""
-    # 3.5 % of the force, where 7 % are just noticeable; near zero force 1 % of the largest is.
+    # 3.5 % of the force, with a just noticeable difference of 7 %; near zero force it is 1 % of the largest.
     assert stroke.worst == pytest.approx(0.5, rel=1e-6)
     assert stroke.perceptible[0] == pytest.approx(0.1, rel=1e-6)
     (same,) = compare(spring(10.0), spring(10.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight record of a model with hysteresis is verified with the play that was rendered."""
+"""A flight record of a model with hysteresis is verified with the rendered play."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ UNITS = {"position": "m", "force": "N"}
 
 
 def keyswitch() -> Model:
-    """A switch that is pressed and released: the file states directions, and no play radius."""
+    """Returns a switch that is pressed and released: the file states directions, and no play radius."""
     x = np.concatenate([np.linspace(0.0, 4e-3, 400), np.linspace(4e-3, 0.0, 400)])
     side = np.repeat([1, -1], 400)
     force = 120.0 * x + 0.1 * np.exp(-(((x - 2e-3) / 4e-4) ** 2)) + side * 0.05

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard errors say how far a model is from the truth when only noise stands between them."""
+"""Standard errors equal the distance of a model from the truth if noise is the only cause."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def hat(u: np.ndarray) -> np.ndarray:
 
 
 def truth(x: np.ndarray) -> np.ndarray:
-    """A force that a network of two wavelets follows exactly."""
+    """Returns a force that a network of two wavelets follows exactly."""
     return 3.0 * x + hat(20.0 * (x - 0.3)) - 0.5 * hat(9.0 * (x - 0.7))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A model beside a recording, row by row."""
+"""Comparison of a model with a recording, row by row."""
 
 import re
 from dataclasses import replace
@@ -18,7 +18,7 @@ NOISE = 0.01
 
 
 def model_of(data: Source, hysteresis: bool = False, **change: Any) -> Model:
-    """2 x + 1 over [0, 1]; with hysteresis plus or minus (0.25 + 0.5 x)."""
+    """Returns 2 x + 1 over [0, 1]; with hysteresis plus or minus (0.25 + 0.5 x)."""
     given: dict[str, Any] = {
         "kind": "hysteresis" if hysteresis else "position",
         "inputs": ["position"],
@@ -39,7 +39,7 @@ def model_of(data: Source, hysteresis: bool = False, **change: Any) -> Model:
 
 
 def stroke(n: int = 400, seed: int = 1, direction: bool = True) -> Recording:
-    """A press and a release of the hysteresis model, with noise."""
+    """Returns a press and a release of the hysteresis model, with noise."""
     x = np.concatenate([np.linspace(0, 1, n), np.linspace(1, 0, n)])
     s = np.repeat([1, -1], n)
     noise = np.random.default_rng(seed).normal(0.0, NOISE, 2 * n)
@@ -86,7 +86,7 @@ def test_press_and_release_are_told_apart_by_the_direction() -> None:
 
 
 def test_the_stiffness_is_that_of_each_stroke() -> None:
-    # Steeper by half on the press, flatter by half on the release: each is felt, their mean is not.
+    # Half steeper on the press, half flatter on the release: each is perceptible, their mean is not.
     recording = stroke()
     assert recording.direction is not None
     wrong = Recording.from_arrays(
@@ -124,7 +124,7 @@ def test_a_single_valued_model_keeps_rows_without_a_direction() -> None:
 def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     model = model_of(curve().source, hysteresis=True, play_radius=0.005)
     result = verify(model, stroke(direction=False))
-    # All but the 2r after each turning point slide, as if the direction were known.
+    # All rows except the 2r after each turning point slide, as with a known direction.
     assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
     assert "the play operator follows the positions" in result.notes[0]
 
@@ -154,7 +154,7 @@ def test_a_play_radius_that_is_given_is_used_even_with_a_direction() -> None:
 
 
 def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
-    """Every 60th row of a fast motion: without the rows between, the play is another one."""
+    """Every 60th row of a fast motion: without the rows between, the play differs."""
     time = np.arange(6000) * 1e-3
     x = 0.5 - 0.45 * np.cos(2 * np.pi * 3.0 * time) * np.cos(2 * np.pi * 0.11 * time)
     model = model_of(curve().source, hysteresis=True, play_radius=0.05)
@@ -182,7 +182,7 @@ def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
 def test_a_large_error_names_the_change_under_which_the_recording_fits(
     changed: dict[str, Any], sentence: str
 ) -> None:
-    """The force bends, so that an offset of the position is none of the force."""
+    """The force is curved, so an offset of the position differs from one of the force."""
     model = model_of(
         stroke().source,
         alpha=[[4.0]],
@@ -281,7 +281,7 @@ def test_further_inputs_are_taken_by_name() -> None:
         lower=[0.0, 0.25],
         upper=[1.0, 1.0],
     )
-    # Outside its box the network is continued by a clamped gradient, which need not be the plane.
+    # Outside its box a clamped gradient continues the network; it may differ from the plane.
     inside = load >= 0.25
     result = verify(model, both)
     assert np.abs(result.residual[inside]).max() < 5 * NOISE

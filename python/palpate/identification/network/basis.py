@@ -78,7 +78,8 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     """Daubechies' estimate of the frame bounds of the unit-norm Mexican hat (Daubechies 1990, section II.C).
 
     A, B = (2 pi / b0) (inf, sup over 1 <= |xi| <= a0 of sum_v sum_m |psi_v^(a0^m xi)|^2
-    -/+ sum_v sum_(k != 0) [beta_v(2 pi k / b0) beta_v(-2 pi k / b0)]^(1/2)), with
+    -/+ sum_v sum_(k != 0) [beta_v(2 pi k / b0) beta_v(-2 pi k / b0)]^(1/2)).
+
     beta_v(s) = sup over xi of sum_m |psi_v^(a0^m xi)| |psi_v^(a0^m xi + s)|.
 
     Parameters

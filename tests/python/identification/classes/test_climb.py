@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ladder climbs as far as the data earn it, and no further."""
+"""Model selection accepts exactly the model classes that the data support."""
 
 import os
 
@@ -19,7 +19,7 @@ ALLOWED_SURPRISES = 5 if LONG else 2
 
 
 def sweep(n: int, seed: int, encoder_step: float = 0.0) -> np.ndarray:
-    """A hand sweeping 0.6 rad, read by an encoder if a step is given."""
+    """Returns the motion of a hand that sweeps 0.6 rad, quantised if an encoder step is given."""
     random = np.random.default_rng(seed)
     phase = np.cumsum(random.uniform(0.5, 1.5, n)) * 40.0 / n
     x = 0.3 - 0.3 * np.cos(phase)
@@ -30,7 +30,7 @@ def sweep(n: int, seed: int, encoder_step: float = 0.0) -> np.ndarray:
     ("n", "encoder_step"), [(50, 0.0), (300, 0.0), (3000, 7.7e-4)], ids=["n50", "n300", "n3000-encoder"]
 )
 def test_a_linear_spring_with_noise_needs_no_wavelet(n: int, encoder_step: float) -> None:
-    """0 wavelets in at least 38 of 40 draws (95 of 100), whatever the noise."""
+    """0 wavelets in at least 38 of 40 draws (95 of 100), at any noise."""
     surprises = 0
     for draw in range(DRAWS):
         random = np.random.default_rng(1000 + draw)
@@ -63,7 +63,7 @@ def test_exactly_linear_data_are_linear() -> None:
 
 @pytest.mark.parametrize("encoder_step", [0.0, 9.6e-5], ids=["exact", "encoder"])
 def test_data_without_noise_stop_growth_where_a_sensor_would_see_no_difference(encoder_step: float) -> None:
-    """What was rendered and recorded is exact: there is always a smaller error, and nobody measures it."""
+    """A rendered recording is exact: the error could always be smaller, but no sensor would measure it."""
     x = sweep(3000, 6, encoder_step)
     force = 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
     network = fit_environment(x[:, None], force, starts=[0])
@@ -117,7 +117,7 @@ def test_rows_without_a_direction_come_back_when_hysteresis_is_refused() -> None
 
 
 def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -> None:
-    """A periodic sweep meets each stroke at its own places, and their alternation is no force of position."""
+    """In a periodic sweep each stroke has other positions; their alternation is not a force of position."""
     random = np.random.default_rng(3)
     cycle, sample = np.divmod(np.arange(1600), 80)
     phase = 2.0 * np.pi * (sample + 0.25) / 80 + 0.0005 * cycle
@@ -134,7 +134,7 @@ def test_strokes_that_gain_energy_are_not_taken_for_a_rapidly_changing_force() -
 
 
 def test_noise_in_rows_that_one_model_class_does_not_see_is_no_evidence_for_it() -> None:
-    """Where a motion begins its hysteresis input is unknown: luck with the noise there is no gain."""
+    """At the start of a motion its hysteresis input is unknown: a random gain there does not count."""
     for draw in range(20 if not LONG else 200):
         time = np.arange(3000) / (2000.0 + 30.0 * draw)
         x = 1.0 - np.abs((2.0 * time) % 2.0 - 1.0)
@@ -297,7 +297,7 @@ def test_a_search_setting_given_as_an_option_names_the_cure() -> None:
 
 
 def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() -> None:
-    """As a recording whose time has a gap every few rows."""
+    """Like a recording whose time has a gap every few rows."""
     x = np.linspace(0.0, 1.0, 600)
     force = 2.0 * x + np.random.default_rng(5).normal(0.0, 1e-3, len(x))
     starts = [0, *range(70, len(x), 3)]
@@ -311,7 +311,7 @@ def test_motions_too_short_for_any_play_leave_hysteresis_untried_and_say_so() ->
 
 
 def test_a_motion_that_never_turns_back_leaves_hysteresis_untried_and_says_so() -> None:
-    """Two magnets pulled apart: where the play is known there is one stroke, and h could be anything."""
+    """Two magnets pulled apart: rows with known play are one stroke, which does not determine h."""
     x = np.linspace(0.0, 1.0, 3000)
     force = 1e-4 / (x + 0.08) ** 4 + np.random.default_rng(7).normal(0.0, 0.005, len(x))
     network = fit_environment(x[:, None], force, starts=[0])
@@ -324,7 +324,7 @@ def test_a_motion_that_never_turns_back_leaves_hysteresis_untried_and_says_so() 
 
 
 def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A press and a release of 2 x with half the loop's height on either side."""
+    """Returns a press and a release of 2 x with half the loop's height on either side."""
     n = len(height)
     x = np.concatenate([np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)])
     side = np.repeat([1.0, -1.0], n)

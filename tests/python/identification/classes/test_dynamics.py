@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity, mass, damping and hysteresis are found where they are, and nowhere else."""
+"""Velocity, mass, damping and hysteresis are identified only if they are present."""
 
 import os
 from pathlib import Path
@@ -32,7 +32,7 @@ NOISE = 0.02
 def moved(
     seed: int, *, seconds: float = 10.0, mass: float = 0.0, damping: float = 0.0, hysteresis: float = 0.0
 ) -> Recording:
-    """The sample's object with more to it: a hand that sweeps at 0.2 to 2 Hz, encoder and noise as there."""
+    """Returns the sample's object with further terms, swept at 0.2 to 2 Hz with its encoder and noise."""
     random = np.random.default_rng(seed)
     time = np.arange(round(seconds * 1000)) * 1e-3
     wander = np.sin(2.0 * np.pi * (0.31 * time[:, None] * [0.1, 0.23, 0.41] + random.uniform(0, 1, 3)))
@@ -111,7 +111,7 @@ def test_a_damping_that_depends_on_position_earns_velocity_as_an_input() -> None
 
 
 def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
-    """A soft joint with Coulomb and viscous friction, moved for 20 s and sampled at 100 Hz."""
+    """Returns a soft joint with Coulomb and viscous friction, moved for 20 s and sampled at 100 Hz."""
     random = np.random.default_rng(seed)
     time = 0.01 * np.arange(2000)
     phase = 2.0 * np.pi * 0.01 * np.cumsum(0.4 + 0.2 * np.sin(0.7 * time + random.uniform(0.0, 6.0)))
@@ -123,7 +123,7 @@ def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
 
 
 def test_friction_that_no_passive_hysteresis_explains_earns_velocity_as_an_input() -> None:
-    """The torque of a motor that drives the joint: it has the sign of the other side."""
+    """Torque of a motor that drives the joint: it has the opposite sign."""
     kept, held = jointed(1, -0.3).split(5)
     model = identify(kept)
     assert (model.fit.model_class, model.inputs) == ("velocity", ("position", "velocity"))
@@ -154,7 +154,7 @@ def test_noise_that_does_not_depend_on_velocity_earns_no_velocity() -> None:
 
 
 def test_a_measured_relaxation_is_identified_without_velocity(data: Path) -> None:
-    """The position stands still in all rows that have a velocity."""
+    """The position is constant in all rows that have a velocity."""
     model = identify(read_recording(data / "vhb4910_viscoelastic" / "relax_stretch_6d0.csv"))
     assert model.kind == "position"
 
@@ -193,7 +193,7 @@ def test_measured_joints_are_held_to_their_error(data: Path) -> None:
 
 
 def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float = 2e-3) -> Recording:
-    """A spring that something draws over 0.3 rad and lets back, time by time at one of the speeds."""
+    """Moves a spring over 0.3 rad and back, each time at one of the speeds."""
     path = np.cumsum(np.repeat(speeds, [round(300 / speed) for speed in speeds])) * 1e-3
     x = 0.3 * np.abs((path / 0.3 + 1.0) % 2.0 - 1.0)
     time = 1e-3 * np.arange(len(x))
@@ -203,7 +203,7 @@ def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float =
 
 
 def test_one_speed_tells_no_damping_from_hysteresis_but_two_do() -> None:
-    """v is then its sign, and a loop of constant height as likely friction."""
+    """v is then its sign, and friction explains a loop of constant height equally well."""
     for seed in range(1 if SCALE == 1 else 20):
         one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reported error is that of the rows, and findings name what the inputs cannot explain."""
+"""The reported error is that of the rows, and findings name errors that the inputs cannot explain."""
 
 import os
 from pathlib import Path
@@ -141,7 +141,7 @@ def test_noise_alone_gives_no_wavelet() -> None:
 
 
 def test_a_force_far_beyond_the_recorded_ones_between_the_rows_is_no_good_model() -> None:
-    """A motion that turns where the play begins: the rows hold no pressed force there."""
+    """The motion reverses at the start of the play: the rows contain no pressed force there."""
     time = 1e-3 * np.arange(8000)
     x = 2.0 * np.pi * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
     force = (
@@ -165,7 +165,7 @@ DATA = Path(os.environ.get("PALPATE_DATA", "../shared/data"))
 
 
 def relaxation() -> tuple[Array, Array, Array]:
-    """A ramp, then a pause during which the force relaxes and the position's sensor flickers."""
+    """Returns a ramp, then a pause during which the force relaxes and the position sensor flickers."""
     random = np.random.default_rng(4)
     x = np.concatenate([np.linspace(0.0, 1.0, 200), 1.0 + random.normal(0.0, 1e-5, 2000)])
     force = np.concatenate([np.linspace(0.0, 1.0, 200), 0.3 + 0.7 * np.exp(-np.arange(2000) / 400.0)])
@@ -225,7 +225,7 @@ def test_measured_relaxation_is_named(name: str, least: float) -> None:
     assert "relaxation, creep or drift" in str(model.verdict)
     secant = float(np.ptp(recording.force) / np.ptp(recording.position))
     assert model.slope_bounds is not None
-    assert max(np.abs(model.slope_bounds)) < 250.0 * secant  # 100 000 times before
+    assert max(np.abs(model.slope_bounds)) < 250.0 * secant  # formerly 100 000 times
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data, set PALPATE_DATA")

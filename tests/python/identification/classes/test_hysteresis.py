@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hysteresis from a motion whose beginning nobody saw."""
+"""Hysteresis from a motion with unknown beginning."""
 
 import os
 
@@ -15,7 +15,7 @@ MOTIONS = 20 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
 
 def wandering(n: int, seed: int) -> np.ndarray:
-    """A motion in [0, 1] that turns at random places, starting anywhere."""
+    """Returns a motion in [0, 1] that reverses at random positions and starts anywhere."""
     rng = np.random.default_rng(seed)
     turns = rng.uniform(0.0, 1.0, n // 200 + 2)
     return np.interp(np.arange(n) / 200.0, np.arange(len(turns)), turns)
@@ -32,7 +32,7 @@ def test_where_the_input_is_known_no_history_before_the_motion_changes_it() -> N
         edge = HysteresisInput.of_play([motion], radius, [1.0])
         far = HysteresisInput.of_play([motion], radius, [-1.0])
         first = int(np.argmax(edge.known))
-        if first:  # and not one row is left out for nothing
+        if first:  # no row is left out without reason
             assert edge.side[first - 1] != pytest.approx(far.side[first - 1], abs=1e-9)
 
 
@@ -50,7 +50,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
 @pytest.mark.parametrize("radius", [0.0033, 0.0071])
 @pytest.mark.parametrize("noise", [0.0, 2e-3], ids=["rendered", "measured"])
 def test_a_play_between_those_tried_is_found_and_costs_no_wavelets(radius: float, noise: float) -> None:
-    """Wavelets grown at a wrong radius model the error of the radius, and there is no end to them."""
+    """Wavelets grown at a wrong radius model the error of the radius without limit."""
     x = 0.45 * wandering(10_000, 1)
     side = HysteresisInput.of_play([x], radius).side
     force = 1.5 * np.tanh(12 * (x - 0.2)) + side * (0.1 + 0.1 * x)
@@ -63,7 +63,7 @@ def test_a_play_between_those_tried_is_found_and_costs_no_wavelets(radius: float
 
 
 def test_short_strokes_along_a_sweep_are_as_simple_as_long_ones() -> None:
-    """Press a little, release a little, while the mean advances: every place is met on both sides."""
+    """Press a little, release a little, while the mean advances: both strokes cover every position."""
     k = np.arange(10_000)
     x = 0.4 * np.interp(k, [0, 5000, 10_000], [0.0, 1.0, 0.0]) + 0.03 * np.abs((k % 200) / 100.0 - 1.0)
     side = HysteresisInput.of_play([x], 0.005).side

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compressed rows stand for all rows: the same least squares, a cost that stops growing."""
+"""Compressed rows represent all rows: the same least squares at a limited cost."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_what_stays_within_cells_is_noise_and_not_the_slope_across_them() -> Non
 
 
 def test_the_error_of_cells_is_second_order_and_bounded_by_the_estimate() -> None:
-    """Halving the cells quarters it, and the estimate is the difference that is really there."""
+    """Half the cell size quarters the error, and the estimate is the actual difference."""
     x = np.random.default_rng(2).uniform(0.0, 1.0, 200_000)
     errors = []
     for cells in (50, 100):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong readings are left out or weighed down, and counted."""
+"""Wrong readings are removed or get less weight, and are counted."""
 
 import numpy as np
 import pandas as pd
@@ -119,7 +119,7 @@ FEW = 4000
 
 
 def with_outliers(y: Array, share: float) -> Array:
-    """The force with that share of rows moved by ten ranges."""
+    """Returns the force with that share of rows moved by ten ranges."""
     random, wrong = np.random.default_rng(8), y.copy()
     rows = random.choice(len(y), round(share * len(y)), replace=False)
     wrong[rows] += random.choice([-10.0, 10.0], len(rows)) * np.ptp(y)

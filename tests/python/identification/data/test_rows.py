@@ -159,7 +159,7 @@ TURN = 2.0 * np.pi
 
 
 def knob(turns: float, n: int = 400, *, end: bool = False, seed: int = 0) -> Recording:
-    """Seven detents a turn, sampled from 0.3 rad on; without its end, one step of the turn is missing."""
+    """Returns seven detents a turn, sampled from 0.3 rad; without `end`, one step of the turn is missing."""
     x = 0.3 + np.linspace(0.0, turns * TURN, n, endpoint=end)
     force = np.sin(7.0 * x) + 0.3 * np.cos(x) + np.random.default_rng(seed).normal(0.0, 0.01, n)
     return Recording.from_arrays(x, force)
@@ -235,7 +235,7 @@ def test_every_measured_turn_takes_its_period(data: Path) -> None:
 
 
 def spring(rate: float, *, mass: float = 0.0, damping: float = 0.0) -> Recording:
-    """3 N*m/rad swept sinusoidally, with a mass and a damping."""
+    """Returns 3 N*m/rad swept sinusoidally, with a mass and a damping."""
     t = np.arange(0.0, 10.0, 1e-3)
     x = 0.3 * np.sin(rate * t)
     force = 3.0 * x - mass * rate**2 * x + damping * 0.3 * rate * np.cos(rate * t)
@@ -246,7 +246,7 @@ def spring(rate: float, *, mass: float = 0.0, damping: float = 0.0) -> Recording
     ("filters", "mass", "damping"), [("paper-implicit", 0.02, 0.0), ("paper-explicit", 0.02, 0.5)]
 )
 def test_a_slow_motion_leaves_the_static_force(filters: str, mass: float, damping: float) -> None:
-    """G I is within 5 % of 1 well below 100 rad/s; what is left of m and B_o is small."""
+    """G I is within 5 % of 1 well below 100 rad/s; the remaining m and B_o are small."""
     recording = spring(4.0, mass=mass, damping=damping)
     options = IdentifyOptions(search=SearchOptions(filters=filters, assumed_mass=0.02, assumed_damping=0.5))
     target = paper_target(recording, options)[200:]
@@ -273,7 +273,7 @@ def test_the_model_holds_the_assumed_mass_and_damping() -> None:
 
 
 def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> None:
-    """Known truth: the paper's lag costs it, the matched route uses raw positions and forces."""
+    """Known truth: the lag of the paper causes an error, the matched route uses raw positions and forces."""
     recording = sample_recording(1, duration_s=20.0)
     x = np.linspace(-0.2, 0.469, 2001)
     truth = sample_force(x)

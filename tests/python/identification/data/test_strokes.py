@@ -143,7 +143,7 @@ def test_repeated_rows_of_one_stroke_with_noise_give_no_finding(times: int) -> N
 
 
 def test_strokes_that_do_not_differ_leave_the_model_as_it_was() -> None:
-    """To the last bit the model of the same rows in no order."""
+    """Equal to the last bit to the model of the same rows without order."""
     force = loop(h=0.0)
     ordered = identify(Recording.from_arrays(IN_AND_OUT, force))
     assert "1 turn; press and release do not differ" in notes(ordered)
@@ -181,7 +181,7 @@ def test_the_command_identifies_and_verifies_two_columns(
     result = json.loads(captured.out)
     assert result["model_class"] == "hysteresis"
     assert result["verdict"] == "good"
-    # The average of the strokes has 0.16. Of the held-out rows one lies at the turn, where the force jumps.
+    # The average of the strokes has 0.16. One held-out row is at the reversal, where the force jumps.
     assert result["nrmse"] < 0.04
     assert "direction is taken from the order of rows: 1 turn" in captured.err
     assert main(["verify", model, files[1], "--json"]) == 0
@@ -213,7 +213,7 @@ def measured_files(data: Path) -> list[Path]:
 
 
 def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
-    """At most 1 % of the rows are given to the other stroke: those that rest at the turn."""
+    """At most 1 % of the rows get the other stroke: those that rest at the reversal."""
     files = measured_files(data)
     assert files
     for path in files:
@@ -224,7 +224,7 @@ def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
 
 
 def test_measured_recordings_without_direction_are_identified_as_well(data: Path) -> None:
-    """NRMSE within 1.05 of the file with its direction. Where the strokes are the same, so is the model."""
+    """NRMSE within 1.05 of the file with its direction. Equal strokes give equal models."""
     for path in measured_files(data):
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)

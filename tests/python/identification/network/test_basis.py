@@ -8,7 +8,7 @@ from palpate import InputError, frame_bounds
 from palpate.identification.network.basis import Resolution, truncated_frame
 
 # Unit-norm Mexican hat, a0 = 2: b0 -> (A, B) for 1, 2 and 4 voices; the frame table of section 2 of the
-# mathematics that the product follows (Daubechies 1990, table of the Mexican hat).
+# mathematics that the package implements (Daubechies 1990, table of the Mexican hat).
 TABLE = {
     0.25: [(13.091, 14.184), (27.273, 27.278), (54.552, 54.552)],
     0.50: [(6.545, 7.092), (13.637, 13.639), (27.276, 27.276)],
@@ -27,7 +27,7 @@ def test_frame_bounds_are_those_of_the_published_table_to_every_printed_digit(b0
 def test_bounds_enclose_the_energy_of_a_function_in_the_frame() -> None:
     """A |f|^2 <= sum |<f, psi_mk>|^2 <= B |f|^2: the law behind the table, summed on a grid.
 
-    f has next to no energy in wavelets narrower than 1/8.
+    f has almost no energy in wavelets narrower than 1/8.
     """
     x = np.linspace(-60.0, 60.0, 12001)
     f = np.exp(-0.5 * (x - 0.3) ** 2) * np.cos(1.7 * x)
@@ -44,7 +44,7 @@ def test_bounds_enclose_the_energy_of_a_function_in_the_frame() -> None:
 
 
 def test_three_vectors_of_the_plane_are_a_tight_frame() -> None:
-    """The paper's example, section 2.4: T'T = 1.5 I, and (1, 1) comes back from its three coefficients."""
+    """Example of the paper, section 2.4: T'T = 1.5 I, and its three coefficients reconstruct (1, 1)."""
     half, root = 0.5, np.sqrt(3.0) / 2.0
     frame = np.array([[0.0, 1.0], [root, half], [root, -half]])
     np.testing.assert_allclose(frame.T @ frame, 1.5 * np.eye(2), atol=1e-15)

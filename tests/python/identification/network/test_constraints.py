@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constraints hold everywhere over the domain, and notes name where strokes cross."""
+"""Constraints hold everywhere over the domain, and notes name crossings of the strokes."""
 
 import itertools
 import re
@@ -74,7 +74,7 @@ def test_imposed_bounds_hold_between_grid_points(seed: int, slopes: tuple[float,
 
 
 def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:
-    """h = 1e-3 less a hat 1e-3 wide: certifying finds the dip that sampling the cells would miss."""
+    """h = 1e-3 minus a hat 1e-3 wide: the certificate finds the dip that sampling the cells would miss."""
     problem, free = random_network(0)
     basis = Basis(np.array([[1000.0]]), np.array([[0.50195]]))
     coefficients = np.array([[1e-3, 0.0, 2e-3], [-1e-3, 0.0, -2e-3]])
@@ -86,7 +86,7 @@ def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_cells_are_bounded_by_the_derivatives_of_the_core(order: int) -> None:
-    """Sampled derivatives stay below the bound of each cell; near the centre of a wavelet they reach it."""
+    """Sampled derivatives are below the bound of each cell; near the centre of a wavelet they reach it."""
     alpha, beta, weight = np.array([[3.0], [20.0]]), np.array([[0.2], [0.6]]), np.array([1.0, -0.5])
     edges = np.linspace(0.0, 1.0, 33)
     cells = derivative_bounds(
@@ -109,7 +109,7 @@ def test_cells_are_bounded_by_the_derivatives_of_the_core(order: int) -> None:
 
 
 def test_the_bounded_least_squares_is_the_best_one() -> None:
-    """Against brute force: on three wavelets, minimise over the active sets of a fine grid."""
+    """Compares with brute force: on three wavelets, minimises over the active sets of a fine grid."""
     random = np.random.default_rng(3)
     x = np.linspace(0.0, 1.0, 60)
     side = np.repeat([1.0, -1.0], 60)
@@ -117,7 +117,7 @@ def test_the_bounded_least_squares_is_the_best_one() -> None:
     problem = problem_of(Compressor(np.tile(x, 2)[:, None], y, max_positions=500).rows(side), resolved_by=5)
     free = problem.solve(Basis.empty(1))
     kept = impose(problem, free, domain_bounds(problem, hysteresis=True, slopes=None))
-    # h is a straight line here: it is non-negative if both ends are, so four active sets are all there are
+    # h is a straight line here: it is non-negative if both ends are, so there are only four active sets
     best = np.inf
     ends = np.array([[0.5, 0.0, -0.5, 0.0], [0.5, 0.5, -0.5, -0.5]])
     design = np.zeros((120, 4))
@@ -144,7 +144,7 @@ def test_hysteresis_that_vanishes_with_noise_stays_non_negative_at_no_price() ->
 
 
 def test_a_stroke_that_crosses_over_is_met_half_way_where_it_does() -> None:
-    """Where the release lies above the press, h = 0 and g is their mean; elsewhere nothing is lost."""
+    """If the release is above the press, h = 0 and g is their mean; elsewhere nothing changes."""
     x = np.linspace(0.0, 0.004, 400)
     h = 0.05 * np.sin(np.pi * x / 0.002)
     positions, force, side = strokes(h, x, 0.002)
@@ -173,7 +173,7 @@ def test_slope_bounds_and_a_coupling_limit_the_slope_everywhere() -> None:
 
 
 def test_the_slope_limited_fit_is_close_to_the_nearest_slope_limited_force() -> None:
-    """Isotonic regression of the true force is the best any force with that slope can do."""
+    """Isotonic regression of the true force is the best force with that slope."""
     from scipy.optimize import isotonic_regression
 
     x = np.linspace(0.0, 0.6, 1200)
@@ -223,7 +223,7 @@ TURN = 0.004
 
 
 def pressed_onto_a_wall(late_s: float, seed: int = 0) -> Recording:
-    """0.4 N of friction that ends before a wall of 10^4 N/m at 3.6 mm, pressed and released at 10 mm/s."""
+    """Returns 0.4 N of friction that ends before a wall of 10^4 N/m at 3.6 mm; both strokes at 10 mm/s."""
     t = np.arange(0.0, 0.8, 5e-4)
 
     def force(t: np.ndarray) -> np.ndarray:

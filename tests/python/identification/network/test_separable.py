@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Variable projection: exact where it must be, within its bounds, and never worse than its start."""
+"""Variable projection: exact eliminations, valid bounds, and never worse than its start."""
 
 from typing import Any
 
@@ -108,7 +108,7 @@ def test_refinement_finds_the_wavelet_that_made_the_force() -> None:
 
 
 def test_no_dilation_runs_away_on_a_jump() -> None:
-    """A discontinuity pulls dilations to infinity; the data's resolution holds them."""
+    """A discontinuity pulls dilations to infinity; the resolution of the data limits them."""
     x = np.linspace(0.0, 1.0, 300)
     problem = problem_from(x, np.where(x < 0.5, 0.0, 1.0))
     start = problem.solve(Basis(np.full((4, 1), 60.0), np.array([[0.48], [0.49], [0.51], [0.52]])))

@@ -54,7 +54,7 @@ def test_rules_on_fresh_rows_stop_earlier_and_say_so(criterion: str) -> None:
 
 
 def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
-    """One stretch that is held back goes on into a wall, where no fitted row is."""
+    """One held-out stretch continues into a wall without fitted rows."""
     n = 2000
     x = 0.5 - 0.5 * np.cos(20.0 * np.pi * np.arange(n) / n)
     fresh = np.flatnonzero(held_out_rows(n, (0,)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Growth ends with finer wavelets where there is no noise, or with wide ones alone, and only there."""
+"""Growth ends with finer wavelets without noise, or with wide ones alone, and in no other case."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +20,7 @@ OPTIONS = IdentifyOptions()
 
 
 def kinked(noise: float, seed: int = 0) -> SeparableProblem:
-    """Two kinks 100 samples apart."""
+    """Returns two kinks 100 samples apart."""
     x = np.linspace(0.0, 1.0, 200)
     y = 2.0 * np.abs(x - 0.25) - 3.0 * np.maximum(x - 0.75, 0.0)
     y = y + np.random.default_rng(seed).normal(0.0, noise, len(x))
@@ -53,7 +53,7 @@ def test_noise_is_not_taken_for_structure(noise: float) -> None:
 def over_two_inputs(
     law: Callable[[Float1D, Float1D], Float1D], n: int, noise: float = 0.0
 ) -> SeparableProblem:
-    """Rows drawn from the unit box, far apart."""
+    """Returns rows drawn from the unit box, far apart."""
     random = np.random.default_rng(1)
     x = random.uniform(size=(n, 2))
     y = law(x[:, 0], x[:, 1]) + random.normal(0.0, noise, n)
@@ -76,7 +76,7 @@ def errors_between_rows(found: Grown, law: Callable[[Float1D, Float1D], Float1D]
 
 
 def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They err between rows that are far apart less than half as much as whatever fits these best."""
+    """Between distant rows, their error is less than half that of the network that fits the rows best."""
     problem = over_two_inputs(smooth, 200)
     found = grown(problem)
     assert problem.rmse(found.solution) <= WORTH_FINER * RESOLVED * problem.force_range
@@ -111,7 +111,7 @@ def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.Mo
 
 
 def detents(noise: float, seed: int = 0) -> SeparableProblem:
-    """A knob with 20 detents of either sign, each five samples wide."""
+    """Returns a knob with 20 detents of either sign, each five samples wide."""
     random, x = np.random.default_rng(seed), np.linspace(0.0, 1.0, 300)
     alpha, beta = np.full((20, 1), 2.0 * CORE / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
     y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)

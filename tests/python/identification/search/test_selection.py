@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forward orthogonal least squares is least squares, one wavelet at a time."""
+"""Forward orthogonal least squares equals least squares, one wavelet at a time."""
 
 import itertools
 
@@ -57,7 +57,7 @@ def test_gains_are_what_a_new_least_squares_would_gain(kind: str) -> None:
     for index in np.argsort(gains)[-5:]:
         added = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
         direct = start.rss - problem.solve(start.basis.joined(added)).rss
-        # a library is in single precision; what the earlier columns take from a column amplifies its rounding
+        # the library is in single precision; orthogonalisation amplifies its rounding
         column = wavelet_columns(x, added.alpha, added.beta)[:, 0]
         new = column - before @ (before.T @ column)
         rounding = float(np.finfo(np.float32).eps) * (column @ column) / (new @ new)
