@@ -47,11 +47,9 @@ RENDERED_S = 4.0
 def demo(output: Path, as_json: bool) -> None:
     """Identify, verify and render a sample, without any input or device.
 
-    Everything is simulated, and nothing was measured: two recordings of a knob with a soft spring and a hard
-    stop are simulated; a model is identified from one of them, verified on the other, and rendered on a
-    simulated device with each structure.
+    Two recordings of a knob with a soft spring and a hard stop are simulated. A model is identified from one
+    of them, verified on the other, and rendered on a simulated device with each structure.
     """
-
     _require_folder(output)
     talk(f"everything in this demo is simulated, nothing was measured; its files go to {output}")
     recording, fresh = (sample_recording(seed) for seed in (IDENTIFY_SEED, FRESH_SEED))

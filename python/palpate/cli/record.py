@@ -60,9 +60,9 @@ def record(
 ) -> None:
     """Record position and force of a real object.
 
-    Somebody moves the handle, which is free; or with --probe the device does, and turns round where the
-    object holds the force limit. The force is the transducer's; without one it is what the motor holds, the
-    friction of the device included. Ctrl-C ends it in an orderly way.
+    You move the free handle. With --probe the device moves it, and reverses where the object holds the force
+    limit. The force is that of the transducer; without one it is the motor's force, which includes the
+    friction of the device. Ctrl-C ends the recording and keeps it.
     """
     require_writable(recording, inputs=(object_file,))
     if not force:

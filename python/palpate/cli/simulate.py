@@ -49,10 +49,9 @@ def simulate(
 
     The hand sweeps through the model's domain twice in four seconds. An angle is rendered on a knob with a
     16-bit encoder at 1 kHz; for other units the knob is scaled to the model's travel and force. A model with
-    a plan is rendered as planned, on the device that it was certified for, unless a structure is asked for.
-    This shows what happens, and proves nothing.
+    a plan is rendered as planned, on the device that it was certified for, unless a structure is given.
+    A simulation shows one case; it does not prove stability.
     """
-
     require_writable(output, plot, inputs=(model_file,))
     if output is not None and not force:
         require_absent(output)
