@@ -96,8 +96,8 @@ def main() -> None:
         draws = min(options.draws or full, count(full))
         found = Parallel(n_jobs=-1)(delayed(is_right)(claim, draw) for draw in range(draws))
         wrong = [draw for draw, each in enumerate(found) if not each]
-        told = f"  wrong in draws {', '.join(map(str, wrong))}" if wrong else ""
-        print(f"{claim:44}{draws - len(wrong):7d}{draws:5d}{told}", flush=True)
+        reported = f"  wrong in draws {', '.join(map(str, wrong))}" if wrong else ""
+        print(f"{claim:44}{draws - len(wrong):7d}{draws:5d}{reported}", flush=True)
         results.append({"claim": claim, "right": draws - len(wrong), "draws": draws})
     write_results(options.json, results)
 

@@ -32,8 +32,8 @@ def order(words: str) -> str:
 
 
 def state() -> dict[str, Any]:
-    told: dict[str, Any] = json.loads(order("state"))
-    return told
+    reported: dict[str, Any] = json.loads(order("state"))
+    return reported
 
 
 def refusal(action: Callable[[], Any]) -> str:
@@ -64,32 +64,32 @@ def packet() -> tuple[int, int]:
 
 
 def main() -> dict[str, Any]:
-    told: dict[str, Any] = {"found": [asdict(device) for device in find_devices()]}
-    told["another serial"] = refusal(lambda: open_usb("OTHER"))
+    reported: dict[str, Any] = {"found": [asdict(device) for device in find_devices()]}
+    reported["another serial"] = refusal(lambda: open_usb("OTHER"))
 
     with open_usb() as device:
-        told["name"] = device.name
-        told["watchdog before"] = device.identify()["watchdog_ms"]
+        reported["name"] = device.name
+        reported["watchdog before"] = device.identify()["watchdog_ms"]
         device.set_watchdog(137)
-        told["watchdog after"] = device.identify()["watchdog_ms"]
-        told["watchdog out of range"] = refusal(lambda: device.set_watchdog(1))
+        reported["watchdog after"] = device.identify()["watchdog_ms"]
+        reported["watchdog out of range"] = refusal(lambda: device.set_watchdog(1))
 
         wait_until(lambda: state()["position_rad"] > 0.2)
-        told["count before"] = packet()[0]
+        reported["count before"] = packet()[0]
         device.zero()
-        told["count after"] = packet()[0]
+        reported["count after"] = packet()[0]
 
         device.enable()
-        told["enabled"] = state()["enabled"], packet()[1]
+        reported["enabled"] = state()["enabled"], packet()[1]
         device.disable()
-        told["disabled"] = state()["enabled"], packet()[1]
+        reported["disabled"] = state()["enabled"], packet()[1]
 
         order("fault emergency-stop 1")
         wait_until(lambda: packet()[1] & 64)
-        told["enabled after an emergency stop"] = refusal(device.enable)
+        reported["enabled after an emergency stop"] = refusal(device.enable)
         device.clear()
         device.enable()
-        told["enabled after it was cleared"] = state()["enabled"]
+        reported["enabled after it was cleared"] = state()["enabled"]
         device.disable()
 
     # The endpoint of the stream halts; it reports the halt until it is cleared.
@@ -102,21 +102,21 @@ def main() -> dict[str, Any]:
         except usb.core.USBError as error:
             stalls.append(error.errno)
     handle.clear_halt(STREAM_IN)
-    told["stalls"] = stalls
-    told["bytes after the stall"] = len(handle.read(STREAM_IN, 64, timeout=1000))
+    reported["stalls"] = stalls
+    reported["bytes after the stall"] = len(handle.read(STREAM_IN, 64, timeout=1000))
     usb.util.dispose_resources(handle)
 
     with open_usb() as device:
         order("fault unplug 1")
         wait_until(lambda: raw() is None)
-        told["unplugged"] = refusal(device.identify)
-    told["found without it"] = len(find_devices())
-    told["opened without it"] = refusal(open_usb)
+        reported["unplugged"] = refusal(device.identify)
+    reported["found without it"] = len(find_devices())
+    reported["opened without it"] = refusal(open_usb)
     order("plug")
     wait_until(raw)
     with open_usb() as device:
-        told["found again"] = device.serial
-    return told
+        reported["found again"] = device.serial
+    return reported
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ COUNTS_A_TURN = 65536
 
 
 @pytest.fixture(scope="module")
-def told() -> dict[str, Any]:
+def reported() -> dict[str, Any]:
     """Returns the results of one session with the device, by action."""
     answer = emulated(sys.executable, "-W", "error", ROOT / "tests" / "usb" / "set_up_over_pyusb.py")
     assert answer.returncode == 0, answer.stderr
@@ -38,61 +38,63 @@ def devices(*words: str, device: list[str]) -> subprocess.CompletedProcess[str]:
     return emulated(sys.executable, "-m", "palpate", "devices", *words, device=device)
 
 
-def test_a_device_is_found_and_says_who_it_is(told: dict[str, Any]) -> None:
-    (found,) = told["found"]
+def test_a_device_is_found_and_says_who_it_is(reported: dict[str, Any]) -> None:
+    (found,) = reported["found"]
     assert (found["product"], found["serial"], found["problem"]) == ("emulated knob", "EMU-1", "")
     assert found["info"]["counts_per_rev"] == COUNTS_A_TURN
     assert found["info"]["max_torque"] == pytest.approx(5.0)
     assert found["info"]["rate_hz"] == 1000
     assert found["info"]["transducer"]
-    assert told["name"].startswith("emulated knob EMU-1 (USB bus ")
+    assert reported["name"].startswith("emulated knob EMU-1 (USB bus ")
 
 
-def test_a_serial_number_that_nobody_has_is_refused_by_name(told: dict[str, Any]) -> None:
-    assert told["another serial"] == (
+def test_a_serial_number_that_nobody_has_is_refused_by_name(reported: dict[str, Any]) -> None:
+    assert reported["another serial"] == (
         "no haptic USB device with serial number OTHER is plugged in; `palpate devices` lists what there is"
     )
 
 
-def test_the_watchdog_is_set_and_read_back(told: dict[str, Any]) -> None:
-    assert told["watchdog before"] == 20
-    assert told["watchdog after"] == 137
-    assert told["watchdog out of range"] == "watchdog is 1 ms, must be 2 to 1000"
+def test_the_watchdog_is_set_and_read_back(reported: dict[str, Any]) -> None:
+    assert reported["watchdog before"] == 20
+    assert reported["watchdog after"] == 137
+    assert reported["watchdog out of range"] == "watchdog is 1 ms, must be 2 to 1000"
 
 
-def test_the_present_position_becomes_zero(told: dict[str, Any]) -> None:
+def test_the_present_position_becomes_zero(reported: dict[str, Any]) -> None:
     few_ms_of_motion = 0.03 * COUNTS_A_TURN / 6.28
-    assert told["count before"] > 0.15 * COUNTS_A_TURN / 6.28
-    assert abs(told["count after"]) < few_ms_of_motion
+    assert reported["count before"] > 0.15 * COUNTS_A_TURN / 6.28
+    assert abs(reported["count after"]) < few_ms_of_motion
 
 
-def test_force_is_enabled_and_disabled(told: dict[str, Any]) -> None:
-    enabled, status = told["enabled"]
+def test_force_is_enabled_and_disabled(reported: dict[str, Any]) -> None:
+    enabled, status = reported["enabled"]
     assert enabled
     assert status & 1
-    enabled, status = told["disabled"]
+    enabled, status = reported["disabled"]
     assert not enabled
     assert not status & 1
 
 
-def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(told: dict[str, Any]) -> None:
-    assert "enabling its force: it refused a request" in told["enabled after an emergency stop"]
-    assert told["enabled after it was cleared"]
+def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(reported: dict[str, Any]) -> None:
+    assert "enabling its force: it refused a request" in reported["enabled after an emergency stop"]
+    assert reported["enabled after it was cleared"]
 
 
-def test_a_halted_endpoint_stalls_until_it_is_cleared(told: dict[str, Any]) -> None:
-    assert told["stalls"][0] == errno.EPIPE
-    assert len(told["stalls"]) == 2  # reading again gives no data
-    assert told["bytes after the stall"] == 32
+def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) -> None:
+    assert reported["stalls"][0] == errno.EPIPE
+    assert len(reported["stalls"]) == 2  # reading again gives no data
+    assert reported["bytes after the stall"] == 32
 
 
-def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(told: dict[str, Any]) -> None:
-    assert told["unplugged"].endswith(
+def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(
+    reported: dict[str, Any],
+) -> None:
+    assert reported["unplugged"].endswith(
         "asking who it is: it was unplugged meanwhile; plug it in and try again"
     )
-    assert told["found without it"] == 0
-    assert told["opened without it"].startswith("no haptic USB device is plugged in")
-    assert told["found again"] == "EMU-1"
+    assert reported["found without it"] == 0
+    assert reported["opened without it"].startswith("no haptic USB device is plugged in")
+    assert reported["found again"] == "EMU-1"
 
 
 def test_devices_lists_what_is_plugged_in() -> None:

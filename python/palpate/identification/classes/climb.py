@@ -83,9 +83,7 @@ class Climb:
         self.spread = float(np.std(data.force)) or 1.0
         given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))
         if self.samples.used < given:
-            self.report.notes.append(
-                f"{self.samples.used} of {given} rows, evenly spread, stand for all of them"
-            )
+            self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread")
         self.best = constant(self)
         """The candidate of the highest class that the judge accepted"""
         self.take(classes)

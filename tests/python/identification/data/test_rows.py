@@ -74,7 +74,7 @@ def test_six_inputs_and_many_rows_need_no_grid() -> None:
         IdentifyOptions(max_wavelets=6, search=SearchOptions(max_positions=64)),
     )
     assert network.nrmse < 0.5
-    assert any("evenly spread, stand for all of them" in note for note in network.notes)
+    assert any("rows are used, evenly spread" in note for note in network.notes)
 
 
 def test_columns_are_named_as_in_the_file_and_their_units_converted(
@@ -112,15 +112,15 @@ def test_velocity_comes_from_time_where_it_is_no_column() -> None:
 
 
 @pytest.mark.parametrize(
-    ("inputs", "told"),
+    ("inputs", "reported"),
     [
         ("position,place", "has no input place, only position, velocity; read the recording with"),
         ("position,hysteresis,velocity", "hysteresis is identified over position alone"),
         ("position,position", "inputs is 'position,position'"),
     ],
 )
-def test_an_input_that_cannot_be_had_is_refused_in_one_sentence(inputs: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_an_input_that_cannot_be_had_is_refused_in_one_sentence(inputs: str, reported: str) -> None:
+    with pytest.raises(InputError, match=reported):
         identify(contact(0, 100), inputs=inputs)
 
 
@@ -137,8 +137,8 @@ def test_strokes_that_one_recording_does_not_state_leave_hysteresis_untested_and
     stated = Recording.from_arrays(x, force, direction=side)
     order = np.random.default_rng(1).permutation(400)
     shuffled = Recording.from_arrays(x[order], force[order])
-    told = str(identify([stated, shuffled]).verdict)
-    assert "hysteresis was not tested: recording 2 has no direction" in told
+    reported = str(identify([stated, shuffled]).verdict)
+    assert "hysteresis was not tested: recording 2 has no direction" in reported
     assert identify([stated, stated]).kind == "hysteresis"
     assert identify([stated, Recording.from_arrays(x, force)]).kind == "hysteresis"
 

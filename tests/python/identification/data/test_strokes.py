@@ -112,19 +112,22 @@ def test_two_strokes_in_one_file_without_order_are_reported_with_their_differenc
     if order == "shuffled":
         rows = np.random.default_rng(5).permutation(800)
     found = identify(Recording.from_arrays(IN_AND_OUT[rows], loop()[rows], units={"force": "N"}))
-    told = str(found.verdict)
-    assert told.startswith("usable: hysteresis was not tested")
-    assert "two values at the same position, typically 0.39" in told
-    assert " N apart" in told
-    assert "add a column direction" in told
+    reported = str(found.verdict)
+    assert reported.startswith("usable: hysteresis was not tested")
+    assert "two values at the same position, typically 0.39" in reported
+    assert " N apart" in reported
+    assert "add a column direction" in reported
     stated = Recording.from_arrays(IN_AND_OUT[rows], loop()[rows], direction=SIDE[rows])
     assert identify(stated).kind == "hysteresis"
 
 
 def test_a_difference_below_the_noise_is_bounded_where_rows_are_in_no_order() -> None:
     rows = np.random.default_rng(5).permutation(800)
-    told = str(identify(bare(rows, loop(h=0.05, noise=0.2))).verdict)
-    assert "its rows are in no order. At the same position the force has a standard deviation of 0.19" in told
+    reported = str(identify(bare(rows, loop(h=0.05, noise=0.2))).verdict)
+    assert (
+        "its rows are in no order. At the same position the force has a standard deviation of 0.19"
+        in reported
+    )
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.3])

@@ -236,7 +236,7 @@ def pressed_onto_a_wall(late_s: float, seed: int = 0) -> Recording:
     return Recording.from_arrays(x, force(t - late_s) + noise, t, np.where(t <= 0.4, 1, -1))
 
 
-def told(recording: Recording) -> list[str]:
+def reported(recording: Recording) -> list[str]:
     assert recording.direction is not None
     network = fit_environment(recording.position[:, None], recording.force, recording.direction.astype(float))
     assert network.model_class == "hysteresis"
@@ -246,7 +246,7 @@ def told(recording: Recording) -> list[str]:
 @pytest.mark.parametrize("seed", range(2))
 def test_a_late_force_crosses_its_strokes_and_the_notes_say_where(seed: int) -> None:
     recording = pressed_onto_a_wall(LATE_S, seed)
-    (note,) = told(recording)
+    (note,) = reported(recording)
     found = re.search(r"by up to (\S+) between (\S+) and (\S+), ", note)
     assert found is not None
     depth, near, far = map(float, found.groups())
@@ -254,9 +254,9 @@ def test_a_late_force_crosses_its_strokes_and_the_notes_say_where(seed: int) -> 
     assert depth == pytest.approx(1e4 * 0.06e-3, rel=0.1)
     assert 3.3e-3 < near < 3.7e-3
     assert far == pytest.approx(TURN, abs=1e-4)
-    assert told(recording.with_force_earlier(LATE_S)) == []
+    assert reported(recording.with_force_earlier(LATE_S)) == []
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_strokes_that_only_touch_are_not_told(seed: int) -> None:
-    assert told(pressed_onto_a_wall(0.0, seed)) == []
+    assert reported(pressed_onto_a_wall(0.0, seed)) == []
