@@ -284,8 +284,18 @@ def findings(text: Text) -> Iterator[tuple[str, str]]:
 
 
 READERS = {".py": python_texts, ".cpp": cpp_texts, ".hpp": cpp_texts, ".md": page_texts}
-_SCRIPTS = (".sh", ".cmake", ".toml", ".yml", "Makefile", "CMakeLists.txt", "run")
-READERS |= dict.fromkeys(_SCRIPTS, script_texts)
+SCRIPTS = (
+    ".sh",
+    ".cmake",
+    ".toml",
+    ".yml",
+    "run",
+    "Makefile",
+    "CMakeLists.txt",
+    ".clang-tidy",
+    ".clang-format",
+)
+READERS |= dict.fromkeys(SCRIPTS, script_texts)
 """Reader for each suffix or name of a file"""
 
 
