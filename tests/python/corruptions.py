@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 SEED = 20261122
 
-WORSE = 1.2
+LARGEST_ERROR_RATIO = 1.2
 """Ratio of the true to the reported NRMSE above which a warning is required."""
 
 DATA = measured_data() or Path("without measured data")
@@ -220,11 +220,11 @@ def _held(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 
 
 def _thinning(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    left = int(12 * (200 / 12) ** random.random())
-    case.strength.append(f"{left} of {len(rows)} rows left")
+    kept_rows = int(12 * (200 / 12) ** random.random())
+    case.strength.append(f"{kept_rows} of {len(rows)} rows left")
     if random.random() < 0.5:
-        return [rows.take(np.unique(np.linspace(0, len(rows) - 1, left).astype(int)))]
-    return [rows.take(np.sort(random.choice(len(rows), left, replace=False)))]
+        return [rows.take(np.unique(np.linspace(0, len(rows) - 1, kept_rows).astype(int)))]
+    return [rows.take(np.sort(random.choice(len(rows), kept_rows, replace=False)))]
 
 
 def _reversed(random: Generator, rows: Rows, case: Case) -> list[Rows]:
@@ -347,7 +347,7 @@ CAUSES = {
     "wrong unit": r"unit|scale|factor|differ|spike|stretch",
     "merged files": r"merge|two objects|part|recordings|drift|apart|restart|repeat|time",
     "gaps": r"gap|without rows|no rows|interval|interpolat",
-    "saturation": r"satur|clip|range of the sensor|stuck|stands still|limit",
+    "saturation": r"satur|clip|range of the sensor|stuck|is constant|limit",
 }
 """Words of a sentence that names a plausible cause."""
 
@@ -389,9 +389,9 @@ class Outcome:
     seconds: float = 0.0
 
     @property
-    def honest(self) -> bool:
+    def correct_error(self) -> bool:
         """True if the reported error is not far below the true one."""
-        return bool(self.reported >= self.true / WORSE)
+        return bool(self.reported >= self.true / LARGEST_ERROR_RATIO)
 
     @property
     def warned(self) -> bool:
@@ -407,7 +407,7 @@ class Outcome:
     @property
     def silent(self) -> bool:
         """True for a wrong result without a warning that names a plausible cause."""
-        return bool(self.crashed) or not (self.honest or (self.warned and self.names_cause))
+        return bool(self.crashed) or not (self.correct_error or (self.warned and self.names_cause))
 
 
 def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
@@ -452,7 +452,7 @@ def outcome_of(case: Case) -> Outcome:
     return found
 
 
-def told(found: Outcome) -> str:
+def described(found: Outcome) -> str:
     """Returns one case in one line."""
     if found.refused:
         return f"{found.case}: refused: {found.refused}"
@@ -465,12 +465,12 @@ def told(found: Outcome) -> str:
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Returns counts by kind; a case of two kinds counts for its first."""
-    lines = [f"{'kind':16}{'cases':>7}{'honest':>8}{'warned':>8}{'cause named':>13}{'silent':>8}"]
+    lines = [f"{'kind':16}{'cases':>7}{'correct':>8}{'warned':>8}{'cause named':>13}{'silent':>8}"]
     for kind in (*KINDS, "all"):
         group = [each for each in outcomes if kind in ("all", each.case.kinds[0])]
         warned = [each for each in group if each.warned]
         lines.append(
-            f"{kind:16}{len(group):7d}{sum(each.honest for each in group):8d}{len(warned):8d}"
+            f"{kind:16}{len(group):7d}{sum(each.correct_error for each in group):8d}{len(warned):8d}"
             f"{sum(each.names_cause for each in warned):13d}{sum(each.silent for each in group):8d}"
         )
     return "\n".join(lines)
@@ -494,7 +494,7 @@ def main() -> None:
     if not options.no_clean:
         print("clean recordings:")
         for name in base_names():
-            print("   ", told(clean_outcome(name)), flush=True)
+            print("   ", described(clean_outcome(name)), flush=True)
     seeds = options.seeds or range(options.first, options.first + options.count)
     outcomes = []
     for seed in seeds:
@@ -502,7 +502,10 @@ def main() -> None:
         outcomes.append(found)
         if options.each or found.silent or found.seconds > 20:
             print(
-                "SILENT " if found.silent else "       ", told(found), f"({found.seconds:.1f} s)", flush=True
+                "SILENT " if found.silent else "       ",
+                described(found),
+                f"({found.seconds:.1f} s)",
+                flush=True,
             )
     print(table(outcomes))
     print(Counter(each.level or "refused" for each in outcomes))

@@ -94,9 +94,8 @@ class Check:
         if inertia is None or damping is None or friction is None:
             raise InputError(
                 "a profile needs inertia, damping and friction: check a free handle without load "
-                "for 10 s with "
-                "--push; if the friction exceeds the pushes, give it with --coulomb-friction (in Python "
-                "coulomb_friction)"
+                "for 10 s with --push; if the friction exceeds the pushes, give it with --coulomb-friction "
+                "(in Python coulomb_friction)"
             )
         period, jitter, delay = self.numbers["period_s"], self.numbers["jitter_s"], self.numbers["delay_s"]
         assert period is not None
@@ -197,7 +196,7 @@ def check_device(
     check = judge(summary)
     if not push:
         check = _with(
-            check, Observation(_FORCE_SIGN, "not measured", None, "let it push a free handle: --push")
+            check, Observation(_FORCE_SIGN, "not measured", None, "check a free handle with --push")
         )
     elif not check.may_push:
         check = _with(check, Observation(_FORCE_SIGN, "not measured: a wrong result forbids force"))
@@ -309,8 +308,7 @@ def _sign(push: Push, step: float, unit: str) -> Observation:
     ):
         advice = (
             f"must be at least {_LEAST_SIGN_STEPS:g} encoder steps and {_LEAST_SIGN_ERRORS:g} "
-            "standard errors: "
-            "take the hand off the handle"
+            "standard errors: take the hand off the handle"
         )
         return Observation(_FORCE_SIGN, f"not clear: {text}", None, advice)
     if push.displacement < 0.0:

@@ -168,9 +168,8 @@ def _encoder(position: Float1D, step: float, unit: str, rate_hz: float) -> Obser
         f"step {step:.4g} {unit}, noise at rest {in_steps:.2f} steps RMS, moved by "
         f"{np.ptp(position):.4g} {unit}",
         in_steps <= _LARGEST_NOISE_STEPS,
-        f"noise must be at most {_LARGEST_NOISE_STEPS:g} steps: hold the handle still for one "
-        "second; check the cable and "
-        "the ground of the encoder",
+        f"noise must be at most {_LARGEST_NOISE_STEPS:g} steps: hold the handle still for one second; "
+        "check the cable and the ground of the encoder",
         True,
     )
 
@@ -220,9 +219,8 @@ def _transducer(position: Float1D, measured: Float1D, step: float) -> Observatio
         f"{'correct' if correlation > 0.0 else 'reversed'}: correlation of force and position "
         f"{correlation:.2f}",
         correlation > 0.0,
-        "must be positive when an object is pressed: reverse the sign of the encoder or the "
-        "transducer; do not "
-        "enable force",
+        "must be positive when an object is pressed: reverse the sign of the encoder or the transducer; do "
+        "not enable force",
         True,
     )
 

@@ -156,7 +156,7 @@ def choose_columns(
         return replace(choice, notes=(*choice.notes, note))
     message = "; ".join(problems.values())
     if "no column" in message:
-        message += f"; its columns are {listed(names)}"
+        message += f". Its columns are {listed(names)}"
     raise InputError(f"{file}: {message}{_cure(names, request, unstated, text, steady, problems)}")
 
 
@@ -301,7 +301,7 @@ def _cure(
     problems: Mapping[str, str],
 ) -> str:
     """Returns the options to add. They are tried first."""
-    no_cure = "; a recording needs two columns of numbers, a position and a force"
+    no_cure = ". A recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(request.roles), dict(request.units), request.direction
     inputs = tuple(name for name in request.inputs if name in names)
     assumed: list[str] = []
@@ -350,8 +350,8 @@ def _cure(
     options = " ".join(added)
     if choice is None or not added or len(options) > LONGEST_CURE:
         return no_cure
-    condition = f"if {' and '.join(assumed)}, " if assumed else "for example "
-    return f"; {condition}add: {options}"
+    condition = f"If {' and '.join(assumed)}, " if assumed else "For example, "
+    return f". {condition}add: {options}"
 
 
 def _time_without_unit(names: Sequence[str], request: _Request, text: Collection[str]) -> str | None:

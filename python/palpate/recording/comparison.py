@@ -204,9 +204,8 @@ def merged_findings(recording: Recording, cells: CellRows | None) -> list[Findin
     if (copy_start := _copy_start(recording)) is not None:
         return [
             usable(
-                f"the rows from {copy_start} on repeat those from 0 on exactly: the file was "
-                "probably appended to "
-                f"itself; give --rows 0:{copy_start}"
+                f"the rows from {copy_start} on repeat those from 0 on exactly: the file was probably "
+                f"appended to itself; give --rows 0:{copy_start}"
             )
         ]
     return [] if cells is None else _change_findings(recording, cells)

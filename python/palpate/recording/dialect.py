@@ -380,9 +380,8 @@ def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: s
 def _ambiguous_comma(finding: str, separator: str) -> InputError:
     points, nothing = (_sed_command(",", separator, by) for by in (".", ""))
     return InputError(
-        f"{finding}: the comma may be a decimal comma or a thousands separator. If it is a decimal "
-        "comma, write "
-        f"points: {points}; if it is a thousands separator, remove it: {nothing}"
+        f"{finding}: the comma may be a decimal comma or a thousands separator. If it is a decimal comma, "
+        f"write points: {points}; if it is a thousands separator, remove it: {nothing}"
     )
 
 

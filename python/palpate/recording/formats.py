@@ -417,9 +417,8 @@ def _mcap(path: Path) -> Table:
     wide = [topic for topic, size in sizes.items() if size > 2]
     if len(wide) != 1:
         raise InputError(
-            f"{path}: {len(wide)} topics hold two values or more ({listed(wide or sizes)}); one "
-            "topic must hold "
-            "position and force. Write both to one topic or export them as CSV"
+            f"{path}: {len(wide)} topics hold two values or more ({listed(wide or sizes)}); one topic must "
+            "hold position and force. Write both to one topic or export them as CSV"
         )
     rows = topics[wide[0]]
     names = dict.fromkeys(name for row in rows for name in row)

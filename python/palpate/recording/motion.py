@@ -371,9 +371,8 @@ def _derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.b
     low_pass = quiet_low_pass(parts, order=order)
     if low_pass is None:
         raise InputError(
-            f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from "
-            f"{len(recording)} rows: the "
-            "pieces between gaps in time are too short, or the noise of the position is too large"
+            f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from {len(recording)} rows: "
+            "the pieces between gaps in time are too short, or the noise of the position is too large"
         )
     derive = (lambda part: part.velocity) if order == 1 else (lambda part: part.acceleration)
     return at_rows(parts, low_pass, derive, len(recording))

@@ -172,10 +172,9 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
         late = "" if recording.time is None else "; if the force was recorded late, --force-late-s SECONDS"
         return [
             usable(
-                f"on average the force on release is {amount(-mean, recording.units['force'])} "
-                "above that on press; "
-                "a passive object cannot do that. If a sign is reversed, give --negate force or --negate "
-                f"position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
+                f"on average the force on release is {amount(-mean, recording.units['force'])} above that "
+                "on press; a passive object cannot do that. If a sign is reversed, give --negate force or "
+                f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
             )
         ]
     x, f = recording.position[travel.inside], recording.force[travel.inside]
@@ -260,10 +259,9 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
             return [
                 usable(
                     f"the position is constant in rows {start} to {stop - 1}, then jumps by "
-                    f"{amount(jump, unit)}, while the force changes by "
-                    f"{_inner_range(f[start:stop]):.3g}: the "
-                    f"position sensor was probably stuck; use the rows before or after with --rows 0:{start} "
-                    f"or --rows {stop}:{len(x)}"
+                    f"{amount(jump, unit)}, while the force changes by {_inner_range(f[start:stop]):.3g}: "
+                    "the position sensor was probably stuck; use the rows before or after with --rows "
+                    f"0:{start} or --rows {stop}:{len(x)}"
                 )
             ]
     return []
