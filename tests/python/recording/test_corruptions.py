@@ -15,7 +15,7 @@ def test_a_corrupted_recording_gives_a_correct_error_or_a_warning_that_names_a_c
     first = list(KINDS).index(kind)
     outcomes = [outcome_of(case_of(seed)) for seed in range(first, COUNT, len(KINDS))]
     print(table(outcomes))
-    assert [described(each) for each in outcomes if each.silent] == []
+    assert [described(each) for each in outcomes if each.unreported] == []
 
 
 @pytest.mark.parametrize("name", base_names())

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from palpate import InputError, read_recording
-from small_files import HEADER, Write, refusal, rows, timed
+from small_files import HEADER, Write, refusal, rows, timed_rows
 
 
 def test_values_are_converted_to_si(csv_file: Write) -> None:
-    recording = read_recording(csv_file("time_ms,angle_deg,torque_mNm", timed()))
+    recording = read_recording(csv_file("time_ms,angle_deg,torque_mNm", timed_rows()))
     k = np.arange(12)
     assert recording.time is not None
     np.testing.assert_allclose(recording.time, 0.01 * k, rtol=1e-15)

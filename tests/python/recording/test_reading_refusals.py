@@ -13,7 +13,7 @@ import pytest
 
 from palpate import identify, read_recording
 from palpate.recording import sample_recording
-from small_files import HEADER, Write, options_in, refusal, rows, timed
+from small_files import HEADER, Write, options_in, refusal, rows, timed_rows
 
 
 def lines(*parts: str | list[str]) -> str:
@@ -264,7 +264,7 @@ BAD_ROWS = {
 
 def with_bad_row(write: Write, case: str, count: int = 1) -> Path:
     header, bad, _ = BAD_ROWS[case]
-    good = rows(20) if header == HEADER else timed(20)
+    good = rows(20) if header == HEADER else timed_rows(20)
     return write(header, good[:6] + [bad] * count + good[6:])
 
 
@@ -290,7 +290,7 @@ def test_a_row_with_two_defects_is_counted_once(csv_file: Write) -> None:
 
 
 def test_time_must_be_later_than_all_times_before_it(csv_file: Write) -> None:
-    lines = [*timed(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
+    lines = [*timed_rows(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
     recording = read_recording(csv_file("time_ms,depth_mm,force_N", lines), invalid="drop")
     np.testing.assert_allclose(recording.position[11:], [5.5e-3, 93e-3])
     assert recording.notes[2] == "dropped 2 rows with a time that repeats or decreases (first: line 14)"
