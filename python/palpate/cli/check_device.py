@@ -18,8 +18,8 @@ from ..planning import DeviceProfile
 from ..verdict import Verdict, no
 from .exit_status import end_with
 from .live import device_options, live_line
-from .printing import number, print_json, print_numbers, print_verdict, talk
-from .verb import PATH, json_option, require_writable, verb
+from .printing import number, print_details, print_json, print_numbers, print_verdict, talk
+from .verb import PATH, json_option, require_writable, verb, verbose_option
 
 _MARKS = {True: "ok", False: "WRONG", None: "-"}
 
@@ -49,6 +49,7 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
 )
 @click.option("--yes", is_flag=True, help="Push without asking.")
 @json_option
+@verbose_option
 def check_device(
     device: str,
     object_file: Path | None,
@@ -63,6 +64,7 @@ def check_device(
     coulomb_friction: float | None,
     yes: bool,
     as_json: bool,
+    verbose: bool,
 ) -> None:
     """Measure a device and judge if it can render force.
 
@@ -121,16 +123,17 @@ def check_device(
         print_verdict(verdict)
         print_numbers(
             {
-                "palpate": f"{__version__}, Python {platform.python_version()}, {platform.platform()}, "
-                f"{os.cpu_count()} cores",
                 "device": found.device,
                 **{
                     each.name: f"{_MARKS[each.right]:5} {each.text}"
-                    + (f" ({each.advice})" if each.right is None and each.advice else "")
                     for each in found.observations
+                    if verbose or not each.detail or each.right is False
                 },
             }
         )
+        if verbose:
+            python = f"palpate {__version__}, Python {platform.python_version()}"
+            print_details([f"{python}, {platform.platform()}, {os.cpu_count()} cores"])
     if written is not None:
         talk(f"wrote {written}")
     end_with(verdict)

@@ -16,7 +16,7 @@ from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..errors import InputError
 from ..recording import Recording, read_recording
 from .exit_status import interrupted_at_once
-from .printing import Verb, talk
+from .printing import Option, Verb, talk
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -112,28 +112,39 @@ class ReadingOptions:
         return recording
 
 
-_column = partial(click.option, metavar="COLUMN", default=None)
-_rows = partial(click.option, metavar="START:STOP", callback=_row_range, default=None)
+expert_option = partial(click.option, cls=Option, group="Expert")
+"""Option of a long verb, in the group "Expert" or another one."""
+
+_column = partial(expert_option, metavar="COLUMN", default=None)
+_rows = partial(expert_option, metavar="START:STOP", callback=_row_range, default=None)
 
 _READING = options(
-    _column("--position", help="Column of the position; else chosen by name and unit."),
-    _column("--force", help="Column of the force; else chosen by name and unit."),
-    _column("--time", help="Column of the time; else chosen by name and unit."),
-    _column("--direction", help="Column of the stroke's direction (press, release)."),
-    click.option(
+    _column("--position", group="Input", help="Column of the position; else chosen by unit."),
+    _column("--force", group="Input", help="Column of the force; else chosen by unit."),
+    expert_option(
         "--units",
+        group="Input",
         metavar="NAME=UNIT",
         callback=_names_and_units,
         multiple=True,
-        help="Unit of a column whose name has none. Repeat for several.",
+        help="Unit of a column whose name has none.",
     ),
-    click.option(
+    expert_option(
+        "--force-late-s",
+        metavar="SECONDS",
+        type=float,
+        default=0.0,
+        help="Delay of the recorded force [s]; needs time.",
+    ),
+    _column("--time", help="Column of the time; else chosen by unit."),
+    _column("--direction", help="Column of the stroke's direction (press, release)."),
+    expert_option(
         "--negate",
         metavar="COLUMN",
         multiple=True,
         help="Turn the sign of position, force or a column. Repeat for several.",
     ),
-    click.option(
+    expert_option(
         "--torque-constant-Nm-per-A",
         "torque_constant",
         type=float,
@@ -142,13 +153,7 @@ _READING = options(
     ),
     _rows("--rows", help="Use these rows only, counted from 0."),
     _rows("--zero", help="Rows in which the tool touches nothing: their mean force is taken off."),
-    click.option(
-        "--force-late-s",
-        type=float,
-        default=0.0,
-        help="How long after its position each force was recorded [s]; needs time.",
-    ),
-    click.option(
+    expert_option(
         "--invalid",
         type=click.Choice(["refuse", "drop"]),
         default="refuse",
@@ -218,6 +223,7 @@ scheme_options = options(
 """Options for the fields of `Scheme`. A missing one is None and follows the model."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="Print all details below the summary.")
 
 
 def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
