@@ -117,9 +117,7 @@ _IDENTIFY_OPTIONS = [
 
 @verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png")
 @click.argument("recording_files", metavar="RECORDING...", type=PATH, nargs=-1, required=True)
-@click.option(
-    "-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="Model file to write."
-)
+@click.option("-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="Model file to write.")
 @click.option(
     "--hold-out-every",
     type=click.IntRange(min=2),

@@ -73,7 +73,10 @@ def _list_examples(*, as_json: bool) -> None:
     examples = example_profiles()
     if as_json:
         print_json(
-            {name: {"file": str(file), "sources": list(sources)} for name, (file, sources) in examples.items()}
+            {
+                name: {"file": str(file), "sources": list(sources)}
+                for name, (file, sources) in examples.items()
+            }
         )
         return
     for name, (file, sources) in examples.items():

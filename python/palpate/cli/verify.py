@@ -136,5 +136,7 @@ def _further_numbers(recording: Recording, found: Verification) -> list[str]:
         f"{FORCE_JND:.0%} of the force, or {recording.in_file_unit('force', found.jnd_floor)}",
     ]
     if found.stiffness_within_jnd is not None:
-        numbers.append(f"stiffness within {STIFFNESS_JND:.0%} of the recorded one in {found.stiffness_within_jnd:.1%} of the position cells")
+        numbers.append(
+            f"stiffness within {STIFFNESS_JND:.0%} of the recorded one in {found.stiffness_within_jnd:.1%} of the position cells"
+        )
     return numbers
