@@ -141,7 +141,7 @@ _IDENTIFY_OPTIONS = [
     "--jobs",
     type=click.IntRange(min=1),
     default=1,
-    help="Processes that read the files; more than one implies --out-of-core.",
+    help="Processes that read the files; above 1 implies --out-of-core.",
 )
 @expert_option(
     "--scheduler",

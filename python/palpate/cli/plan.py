@@ -95,11 +95,30 @@ def _list_examples(*, as_json: bool) -> None:
 )
 @click.option("-o", "--output", type=PATH, metavar="OUT.json", default=None, help="Write model and plan.")
 @click.option("--coupling", is_flag=True, help="Render through a virtual coupling.")
-@click.option("--coupling-stiffness", type=float, default=None, help="K_c; chosen from the device.")
-@click.option("--coupling-damping", type=float, default=None, help="B_c; chosen from the device.")
-@click.option("--mass", type=float, default=None, help="Object mass; the model's own. 0 leaves it out.")
-@click.option("--damping", type=float, default=None, help="Object damping; the model's own. 0 leaves it out.")
-@click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
+@click.option(
+    "--coupling-stiffness",
+    type=float,
+    default=None,
+    help="K_c [N/m or N*m/rad]; default: chosen from the device.",
+)
+@click.option(
+    "--coupling-damping",
+    type=float,
+    default=None,
+    help="B_c [N*s/m or N*m*s/rad]; default: chosen from the device.",
+)
+@click.option(
+    "--mass",
+    type=float,
+    default=None,
+    help="Mass of the object [kg or kg*m^2]; default: that of the model; 0: none.",
+)
+@click.option(
+    "--damping", type=float, default=None, help="Damping of the object; default: that of the model; 0: none."
+)
+@click.option(
+    "--play-radius", type=float, default=None, help="Play radius r of a model with hysteresis [m or rad]."
+)
 @click.option(
     "--predict",
     type=Samples(),
@@ -113,14 +132,14 @@ def _list_examples(*, as_json: bool) -> None:
     metavar="SHARE",
     default=None,
     show_default="0.1",
-    help="Largest difference of felt and identified force to accept, over the range of the force.",
+    help="Largest accepted force error, as a share of the range of the force.",
 )
 @plot_option("the root locus of the explicit structure over its damping")
 @click.option(
     "--examples",
     is_flag=True,
     expose_value=False,
-    help="List the example profiles with their sources, and end.",
+    help="List the example profiles with their sources, then exit.",
 )
 @json_option
 @verbose_option

@@ -142,22 +142,22 @@ _READING = options(
         "--negate",
         metavar="COLUMN",
         multiple=True,
-        help="Turn the sign of position, force or a column. Repeat for several.",
+        help="Invert the sign of position, force or a column; repeatable.",
     ),
     expert_option(
         "--torque-constant-Nm-per-A",
         "torque_constant",
         type=float,
         default=None,
-        help="Turns a force column in A into N*m.",
+        help="Converts a force column from A to N*m.",
     ),
-    _rows("--rows", help="Use these rows only, counted from 0."),
-    _rows("--zero", help="Rows in which the tool touches nothing: their mean force is taken off."),
+    _rows("--rows", help="Use only these rows, counted from 0."),
+    _rows("--zero", help="Rows without contact; their mean force is subtracted."),
     expert_option(
         "--invalid",
         type=click.Choice(["refuse", "drop"]),
         default="refuse",
-        help="What to do with rows without a number.",
+        help="Refuse or drop rows without a number.",
     ),
 )
 
@@ -179,38 +179,38 @@ scheme_options = options(
         type=click.Choice(structure_names),
         default=None,
         show_default=f"the model's plan, else {_SCHEME.structure}",
-        help="How the force is computed.",
+        help="Structure that computes the force.",
     ),
-    click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model."),
+    click.option("--compensated", is_flag=True, help="Subtract the softness of the coupling from the model."),
     click.option(
         "--coupling-stiffness",
         type=float,
         show_default=f"{_SCHEME.coupling_stiffness:g} N*m/rad, scaled to the model",
-        help="K_c, in force per position of the model's units.",
+        help="Coupling stiffness K_c, in force per position of the model's units.",
     ),
     click.option(
         "--coupling-damping",
         type=float,
         show_default=f"{_SCHEME.coupling_damping:g} N*m*s/rad, scaled",
-        help="B_c, in force per velocity.",
+        help="Coupling damping B_c, in force per velocity.",
     ),
     click.option(
         "--mass",
         type=float,
         show_default=f"{_SCHEME.mass:g} kg*m^2, scaled",
-        help="Mass of the object, where it has mass, in force per acceleration.",
+        help="Mass of an object with mass, in force per acceleration.",
     ),
     click.option(
         "--damping",
         type=float,
         show_default=f"{_SCHEME.damping:g} N*m*s/rad, scaled",
-        help="Damping of the object, where it has mass, in force per velocity.",
+        help="Damping of an object with mass, in force per velocity.",
     ),
     click.option(
         "--play-radius",
         type=float,
         show_default="the model's, or 1 % of its travel",
-        help="r of a model with hysteresis, in its position unit.",
+        help="Play radius r of a model with hysteresis, in its position unit.",
     ),
     click.option(
         "--predict",
@@ -229,7 +229,7 @@ verbose_option = click.option("-v", "--verbose", is_flag=True, help="Print all d
 def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
     """Refuses, before the work, a name whose suffix is not a figure format."""
     if value is not None and value.suffix.lower() not in _FIGURES:
-        raise InputError(f"{value} is no figure file; its name must end in {', '.join(_FIGURES)}")
+        raise InputError(f"{value} is not a figure file: its name must end in {', '.join(_FIGURES)}")
     return value
 
 
@@ -257,13 +257,13 @@ def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) 
             raise InputError(f"{target} cannot be written: it is a folder")
         for given in inputs:
             if given is not None and given.exists() and target.exists() and target.samefile(given):
-                raise InputError(f"{target} is an input as well; writing the result there would destroy it")
+                raise InputError(f"{target} is also an input; the result would overwrite it")
         try:
             with tempfile.TemporaryFile(dir=target.parent):
                 pass
         except OSError as error:
             raise InputError(
-                f"{target} cannot be written: its folder takes no new file ({error.strerror})"
+                f"{target} cannot be written: its folder accepts no new file ({error.strerror})"
             ) from None
         if [each.absolute() for each in wanted].count(target.absolute()) > 1:
-            raise InputError(f"two results would both be written to {target}")
+            raise InputError(f"two results have the same file name: {target}")

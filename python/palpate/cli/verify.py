@@ -57,8 +57,8 @@ from .verb import (
     type=float,
     default=None,
     metavar="NUMBER",
-    help="r of a model with hysteresis: its play operator follows the positions, whatever the direction. "
-    "Without a direction: that of the flight record, the model or its plan, or 1 % of the travel.",
+    show_default="that of the flight record, the model or its plan, else 1 % of the travel",
+    help="Play radius r of a model with hysteresis. The play operator then ignores the recorded direction.",
 )
 @reading_options
 def verify(
@@ -137,6 +137,7 @@ def _further_numbers(recording: Recording, found: Verification) -> list[str]:
     ]
     if found.stiffness_within_jnd is not None:
         numbers.append(
-            f"stiffness within {STIFFNESS_JND:.0%} of the recorded one in {found.stiffness_within_jnd:.1%} of the position cells"
+            f"stiffness within {STIFFNESS_JND:.0%} of the recorded one in {found.stiffness_within_jnd:.1%} "
+            "of the position cells"
         )
     return numbers

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The summaries of identify, verify, plan and check-device: verdict, at most ten lines, details on request."""
+"""Summaries of identify, verify, plan and check-device: verdict, at most ten lines, details on request."""
 
 from __future__ import annotations
 
