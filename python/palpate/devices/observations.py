@@ -55,6 +55,8 @@ class Observation:
     advice: str = ""
     forbids_force: bool = False
     """True if a wrong property forbids any force"""
+    detail: bool = False
+    """True if a summary shows it only when it is wrong"""
 
     @property
     def finding(self) -> Finding | None:
@@ -81,7 +83,7 @@ def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
     if not summary["orderly"]:
         observations.insert(0, Observation("connection", summary["ended"], False, _CABLE_ADVICE, True))
     if "round_trip" in summary:
-        observations.append(Observation("round trip", _percentiles(summary["round_trip"])))
+        observations.append(Observation("round trip", _percentiles(summary["round_trip"]), detail=True))
     if "malformed" in summary:
         counts = {
             "malformed": "malformed packets",
@@ -96,6 +98,7 @@ def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
                 ", ".join(f"{summary[name]} {words}" for name, words in counts.items()),
                 not (summary["malformed"] or summary["stalls"] or summary["bus_errors"]),
                 f"malformed packets, stalls and bus errors must be 0: {_CABLE_ADVICE}",
+                detail=True,
             )
         )
     if summary["transducer"]:
@@ -125,6 +128,7 @@ def _period(period: Mapping[str, float], wanted: float) -> Observation:
         period["p999_us"] <= longest_us,
         f"99.9 % must be below {longest_us:.0f} us: close other programs, or give the loop "
         "real-time priority",
+        detail=True,
     )
 
 
@@ -140,6 +144,7 @@ def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
         bool(abs(mean * wanted - 1.0) <= _CLOCK_TOLERANCE),
         f"must be within {_CLOCK_TOLERANCE:.1%} of {1e6 / wanted:.1f} us: the firmware does not "
         "keep its stated rate",
+        detail=True,
     )
 
 

@@ -400,7 +400,7 @@ def test_a_check_without_pushes_never_enables_the_device(tmp_path: Path) -> None
 def test_pushing_without_a_terminal_requires_yes() -> None:
     answer = run_check("--push", device=["--no-hand"])
     assert answer.returncode == 2
-    assert "--push moves the handle; at no terminal it needs --yes" in answer.stdout
+    assert "--push moves the handle; without a terminal it needs --yes" in answer.stdout
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
