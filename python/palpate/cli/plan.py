@@ -94,7 +94,7 @@ def _list_examples(*, as_json: bool) -> None:
 @click.option("--coupling-stiffness", type=float, default=None, help="K_c; chosen from the device.")
 @click.option("--coupling-damping", type=float, default=None, help="B_c; chosen from the device.")
 @click.option("--mass", type=float, default=None, help="Object mass; the model's own. 0 leaves it out.")
-@click.option("--damping", type=float, default=None, help="Object damping; the model's own. 0 leaves it out.")
+@click.option("--object-damping", type=float, default=None, help="Object damping; the model's own. 0 leaves it out.")
 @click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
 @click.option(
     "--predict",
@@ -148,12 +148,12 @@ def plan(
     end_with(verdict)
 
 
-_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
+_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "basis", "source")
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
     error = plan.force_error
-    felt, steepest = plan.felt_slopes
+    felt, steepest = plan.slope_behind_couplings
     return {
         "structure": plan.structure,
         "verdict": str(plan.verdict),
@@ -165,9 +165,9 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
         "plan": plan.record(),
         "certificate": certificate_record(certificate),
         "inequalities": [{name: getattr(line, name) for name in _LINE} for line in certificate.inequalities],
-        "why": certificate.why,
+        "reason": certificate.reason,
         "steepest_slope": steepest,
-        "felt_slope": felt,
+        "slope_behind_coupling": felt,
         "seconds": seconds,
     }
 
@@ -186,11 +186,11 @@ def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: 
     click.echo("\ninequalities")
     for line in certificate.inequalities:
         word = "holds" if line.holds else "fails"
-        print_paragraph(f"{line.name}: {word}, {line.rests_on}", indent="  ")
+        print_paragraph(f"{line.name}: {word}, {line.basis}", indent="  ")
         print_paragraph(line.formula, indent="    ")
         sides = f"{number(line.left)} against {number(line.right)}, margin {number(line.margin)}"
         print_paragraph(sides, indent="    ")
-    print_paragraph(certificate.why)
+    print_paragraph(certificate.reason)
 
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:

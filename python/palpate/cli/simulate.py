@@ -120,7 +120,6 @@ def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
             return Plan.of(model)
         if not model.of_velocity:
             talk(
-                "no plan in the model: rendered behind the default coupling, which is felt; "
-                "'palpate plan' finds the simplest rendering that is not"
+                "the model has no plan: rendered behind the default coupling, which makes it softer; 'palpate plan' chooses a structure"
             )
     return Plan(model, rig.scheme(model, **scheme))

@@ -193,13 +193,13 @@ scheme_options = options(
         "--mass",
         type=float,
         show_default=f"{_SCHEME.mass:g} kg*m^2, scaled",
-        help="Mass of the object, where it has mass, in force per acceleration.",
+        help="Object mass, for structures with mass, in force per acceleration.",
     ),
     click.option(
-        "--damping",
+        "--object-damping",
         type=float,
-        show_default=f"{_SCHEME.damping:g} N*m*s/rad, scaled",
-        help="Damping of the object, where it has mass, in force per velocity.",
+        show_default=f"{_SCHEME.object_damping:g} N*m*s/rad, scaled",
+        help="Object damping, for structures with mass, in force per velocity.",
     ),
     click.option(
         "--play-radius",

@@ -122,7 +122,7 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(words: list[Any], tmp_
         (["--probe"], [], "a probe on a real device needs upper"),
         (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6, the device makes 5"),
         (["--object", OBJECT], [], "an object is mounted on the simulated device only; usb has its own"),
-        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
+        ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
     ],
 )
 def test_what_cannot_be_recorded_is_refused_before_anything_moves(
@@ -179,7 +179,7 @@ def test_a_simulated_object_is_recorded_and_found_again(tmp_path: Path) -> None:
     assert len(ticks) > 5
     recording = read_recording(tmp_path / "a.csv")
     assert recording.metadata["simulated"].startswith("yes")
-    assert recording.metadata["moved_by"].startswith("the device itself: a sweep from ")
+    assert recording.metadata["moved_by"].startswith("the device: a sweep from ")
     assert palpate.verify(knob, recording).nrmse < 0.01
 
 
@@ -203,13 +203,13 @@ def test_a_handle_that_nobody_moves_is_no_recording(tmp_path: Path) -> None:
     assert answer.returncode == 1
     verdict = json.loads(answer.stdout)["verdict"]
     assert verdict.startswith("no: ")
-    assert "so no force over position is known: move it over the whole object" in verdict
+    assert "so the force over position is unknown: move it over the whole object" in verdict
 
 
 def test_without_an_object_or_a_way_to_see_its_force_nothing_is_recorded(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="nothing is mounted on the simulated device"):
+    with pytest.raises(InputError, match="the simulated device has no object"):
         record(tmp_path / "a.csv")
-    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, and its motor"):
+    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, so it cannot"):
         record(tmp_path / "a.csv", object=load_model(OBJECT), transducer=False)
     with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
         record(tmp_path / "a.csv", device="knob")

@@ -92,7 +92,7 @@ def test_a_certificate_that_does_not_fit_the_network_of_the_plan_moves_nothing(l
 def test_without_a_plan_the_default_coupling_is_told_unless_it_was_chosen(tmp_path: Path) -> None:
     path = model_by_hand().save(tmp_path / "unplanned.json")
     words = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
-    assert "no plan in the model: rendered behind the default coupling" in control(*words).stderr
+    assert "the model has no plan: rendered behind the default coupling" in control(*words).stderr
     assert "no plan" not in control(*words, "--structure", "massless").stderr
 
 
@@ -109,7 +109,7 @@ def test_a_certified_run_takes_rate_and_device_of_its_certificate_and_says_so(
 def test_another_rate_than_the_certificate_s_is_refused(planned: Path) -> None:
     answer = control(planned, "--rate-hz", 500)
     assert answer.returncode == 2
-    assert "rate_hz is 500, and the certificate is for 1000 Hz" in answer.stderr
+    assert "rate_hz is 500, but the certificate is for 1000 Hz" in answer.stderr
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_what_the_certificate_does_not_cover_is_rendered_uncertified(
         planned, *words, "--duration-s", 0.6, "--record", record, "--lowest-rate-share", 0, "--rate-hz", 500
     )
     assert answer.returncode == 0, answer.stderr
-    assert "uncertified: the options change the planned rendering" in answer.stderr
+    assert "uncertified: the options change the plan" in answer.stderr
     assert "certified: no: the options" in metadata(record)
 
 

@@ -117,7 +117,7 @@ def test_a_fault_ends_the_run_with_a_record(
 @pytest.mark.parametrize(
     ("service", "reason"),
     [
-        (Service(devices=0), "sees no Inverse3: plug it in"),
+        (Service(devices=0), "detects no Inverse3: plug it in"),
         (Service(calibrated=False), "Inverse3 049D is not calibrated"),
     ],
     ids=["no device", "not calibrated"],
@@ -154,5 +154,5 @@ def test_a_certificate_or_the_risk_typed_in_full_is_needed(spring: Path) -> None
         assert "has no certificate" in answer.stderr
         answer = control(MODEL, "--device", f"inverse3:z@{service.port}", "--uncertified")
         assert answer.returncode == 2
-        assert "an Inverse3 moves along a line: it takes models in m and N" in answer.stderr
+        assert "an Inverse3 moves along a line and needs a model in m and N" in answer.stderr
     assert all(force == {"x": 0.0, "y": 0.0, "z": 0.0} for force in service.forces)

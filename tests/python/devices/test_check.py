@@ -53,7 +53,7 @@ def heard(**changed: Any) -> dict[str, Any]:
         "lost_samples": 0,
         "repeated_samples": 0,
         "orderly": True,
-        "ended": "ran its time",
+        "ended": "the duration ended",
         "transducer": True,
         "round_trip": percentiles,
         "delay": percentiles,
@@ -373,7 +373,7 @@ def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
     trace = tmp_path / "trace.csv"
     profile = tmp_path / "knob.toml"
     words = ["--push", "--yes", "--write-profile", profile]
-    answer = checked(*words, device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
+    answer = checked(*words, device=["--reversed", *hand, "--trace", str(trace)], seconds=seconds)
     result, findings = told_of(answer)
     assert answer.returncode == 1
     assert findings["sign of the force"]["right"] is False
@@ -386,7 +386,7 @@ def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
 @needs_emulation
 def test_a_device_that_is_only_listened_to_is_never_enabled(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
-    answer = checked(device=["--spring", "3", "--flipped", "--trace", str(trace)])
+    answer = checked(device=["--spring", "3", "--reversed", "--trace", str(trace)])
     _, findings = told_of(answer)
     assert findings["sign of the transducer"]["right"]
     assert findings["sign of the velocity"]["right"]

@@ -90,7 +90,7 @@ def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(
     reported: dict[str, Any],
 ) -> None:
     assert reported["unplugged"].endswith(
-        "asking who it is: it was unplugged meanwhile; plug it in and try again"
+        "asking who it is: it was unplugged; plug it in and try again"
     )
     assert reported["found without it"] == 0
     assert reported["opened without it"].startswith("no haptic USB device is plugged in")
@@ -112,7 +112,7 @@ def test_devices_lists_what_is_plugged_in() -> None:
     [
         (["--no-device"], "usable", "no haptic USB device is plugged in; --device simulated needs none"),
         (["--info-bytes", "33"], "no", "the answer to GET_INFO has 33 bytes, must have 32"),
-        (["--somebody-elses"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
+        (["--wrong-magic"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
     ],
 )
 def test_devices_says_what_keeps_it_from_a_device(device: list[str], level: str, sentence: str) -> None:
