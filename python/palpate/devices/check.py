@@ -13,7 +13,7 @@ import numpy as np
 from .._core.device import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..model import Model
-from ..planning import DeviceProfile
+from ..planning import DeviceProfile, mechanical_units
 from ..verdict import Verdict
 from .measuring import Progress, measure
 from .observations import Observation, compare, observe_at_rest
@@ -266,8 +266,7 @@ def with_pushes(check: Check, push: Push) -> Check:
 
 
 def _mechanics(mechanics: Mechanics, check: Check) -> list[Observation]:
-    turns = check.base.position_unit == "rad"
-    units = ("kg*m^2", "N*m*s/rad", "N*m") if turns else ("kg", "N*s/m", "N")
+    units = mechanical_units(check.base.position_unit)
     least = mechanics.friction_at_least
     if check.coulomb_friction is not None:
         friction = Observation("friction", f"{least:.3g} {units[2]}, stated and not measured")

@@ -49,6 +49,8 @@ class Observation:
     advice: str = ""
     forbids_force: bool = False
     """True if a wrong property forbids any force"""
+    detail: bool = False
+    """True if a summary shows it only when it is wrong"""
 
     @property
     def finding(self) -> Finding | None:
@@ -75,7 +77,7 @@ def observe_at_rest(listened: Mapping[str, Any]) -> list[Observation]:
     if not listened["orderly"]:
         observations.insert(0, Observation("stream", listened["ended"], False, _CABLE, True))
     if "round_trip" in listened:
-        observations.append(Observation("round trip", _percentiles(listened["round_trip"])))
+        observations.append(Observation("round trip", _percentiles(listened["round_trip"]), detail=True))
     if "malformed" in listened:
         counts = ("malformed", "stalls", "bus_errors", "timeouts", "skipped_commands")
         observations.append(
@@ -84,6 +86,7 @@ def observe_at_rest(listened: Mapping[str, Any]) -> list[Observation]:
                 ", ".join(f"{listened[name]} {name.replace('_', ' ')}" for name in counts),
                 not (listened["malformed"] or listened["stalls"] or listened["bus_errors"]),
                 _CABLE,
+                detail=True,
             )
         )
     if listened["transducer"]:
@@ -111,6 +114,7 @@ def _period(period: Mapping[str, float], wanted: float) -> Observation:
         _percentiles(period),
         period["p999_us"] <= _LATEST_PERIOD * 1e6 / wanted,
         "give the loop real-time priority, or a quieter machine",
+        detail=True,
     )
 
 
@@ -125,6 +129,7 @@ def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
         f"{1e6 * mean:.1f} us a sample, spread {1e6 * float(steps.std()):.1f} us",
         bool(abs(mean * wanted - 1.0) <= _CLOCK_TOLERANCE),
         f"it should be {1e6 / wanted:.1f} us: its firmware is not what it says",
+        detail=True,
     )
 
 

@@ -177,7 +177,7 @@ class Plan:
         )
 
     @property
-    def slope_behind_couplings(self) -> tuple[float, float]:
+    def felt_slopes(self) -> tuple[float, float]:
         """Steepest felt slope and that of the model; a coupling makes it softer [force/position].
 
         If the coupling was subtracted from the model, the bounds of the certificate are for the remainder.
@@ -189,11 +189,29 @@ class Plan:
         felt = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
         return felt, felt if self.scheme.compensated else steepest
 
-    def rows(self) -> dict[str, str]:
-        """Returns the numbers of a certified plan for display, by name."""
+    def summary(self) -> dict[str, str]:
+        """Returns the main properties of a certified plan for display, by name."""
         assert self.certificate is not None
-        scheme, error = self.scheme, self.force_error
+        error, certificate = self.force_error, self.certificate
         rows = {"structure": self.description}
+        unit = self.model.units["force"] or "in the model's unit"
+        felt, steepest = self.felt_slopes
+        if felt < steepest:
+            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {felt:.4g}"
+        rows["force error"] = (
+            f"up to {error.largest:.4g} {unit}, "
+            f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
+            if error.largest
+            else "none"
+        )
+        rows["certificate"] = _CERTIFICATE[certificate.verdict]
+        if not certificate.refused:
+            rows["certificate"] += f", for up to {1e3 * certificate.longest_period_s:.4g} ms between samples"
+        return rows
+
+    def settings(self) -> dict[str, str]:
+        """Returns the settings of the structure for display, by name."""
+        scheme, rows = self.scheme, {}
         if self.solver is not None:
             rows["solver"] = self.solver
         if scheme.has_coupling:
@@ -204,18 +222,6 @@ class Plan:
             rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
         if scheme.play_radius:
             rows["play radius"] = f"{scheme.play_radius:.4g}"
-        unit = self.model.units["force"] or "in the model's unit"
-        felt, steepest = self.slope_behind_couplings
-        if felt < steepest:
-            rows["softer"] = f"slopes up to {steepest:.4g} are felt as up to {felt:.4g}"
-        rows["force error"] = (
-            f"up to {error.largest:.4g} {unit}, "
-            f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
-            if error.largest
-            else "none"
-        )
-        rows["certificate"] = _CERTIFICATE[self.certificate.verdict]
-        rows["holds for"] = f"up to {1e3 * self.certificate.longest_period_s:.4g} ms between two samples"
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:

@@ -19,7 +19,7 @@ from .columns import Choice, Column, choose_columns
 from .files import Layout, sha256_of_file
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
-from .units import COLUMN_SUFFIX
+from .units import COLUMN_SUFFIX, UNITS, Unit
 
 UNSTATED = ""
 """Unit of an array that was given without one: SI, but not specified."""
@@ -165,6 +165,12 @@ class Conversion:
         return {role: column.unit.si if column.unit else UNSTATED for role, column in roles.items()}
 
     @property
+    def file_units(self) -> dict[str, Unit]:
+        """Unit of position and force in the table, where it is known."""
+        roles = {"position": self.choice.position.unit, "force": self.choice.force.unit}
+        return {role: unit for role, unit in roles.items() if unit is not None}
+
+    @property
     def names(self) -> dict[str, str]:
         """Role, or name of an input, to the name of its column."""
         choice = self.choice
@@ -263,7 +269,7 @@ def converted(
         words = None if words is None else words[check.kept]
     notes += check.notes
     x, f = how.si(choice.position, cells), how.si(choice.force, cells)
-    units = how.units
+    units, file_units = how.units, how.file_units
     if torque_constant is not None:
         if not (math.isfinite(torque_constant) and torque_constant > 0):
             raise InputError(f"--torque-constant-Nm-per-A is {torque_constant}; it must be a number > 0")
@@ -272,7 +278,7 @@ def converted(
                 f"{name}: --torque-constant-Nm-per-A turns a current into a torque, but the force is "
                 f"{choice.force.name}, which is not in A"
             )
-        f, units["force"] = f * torque_constant, "N*m"
+        f, units["force"], file_units["force"] = f * torque_constant, "N*m", UNITS["Nm"]
     if zero is not None:
         first, last = _row_range(name, zero, total)
         numbers = np.arange(start, stop)[check.kept]
@@ -306,6 +312,7 @@ def converted(
             columns=how.names,
         ),
         "notes": (how.note(torque_constant, table.notes), *notes, *_noticed(x, f, words)),
+        "file_units": file_units,
         "part_of": _motion(how, whole, start + np.flatnonzero(check.kept)) if partly else None,
     }
 

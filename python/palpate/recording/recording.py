@@ -19,7 +19,7 @@ from ..errors import InputError
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .files import Layout, free_name, write_csv
 from .table import FRAME, Cells, FrameTable, python_arguments
-from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS
+from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS, Unit
 
 T = TypeVar("T")
 
@@ -53,6 +53,8 @@ class Recording:
     """Choices, dropped rows and observations of the reader, in sentences"""
     part_of: Motion | None = field(default=None, repr=False)
     """Motion that contains the rows; None if the recording contains all of it"""
+    file_units: Mapping[str, Unit] = field(default_factory=dict, repr=False)
+    """Units of "position" and "force" in the file, for messages; a missing one is that of `units`"""
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -214,6 +216,10 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def in_file_unit(self, role: Literal["position", "force"], value: float) -> str:
+        """Returns a position or force [SI] as text in the unit of the file, such as "4.14 mm"."""
+        return self.file_units.get(role, Unit(self.units[role], self.units[role], 1.0)).text(value)
 
     @property
     def motion(self) -> Motion:

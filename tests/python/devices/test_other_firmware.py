@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from control_program import PATIENT, PROGRAM, needs_program
+from control_program import ANY_RATE, PROGRAM, needs_program
 from palpate import read_recording
 from usb_emulation import emulated, frames, needs_emulation
 
@@ -35,7 +35,7 @@ def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_
     model["continuation"] = {**model["continuation"], "below": "linear"}  # for any zero of the hand
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
-    control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *PATIENT, "--wait-ms", 10_000]))
+    control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *ANY_RATE, "--wait-ms", 10_000]))
     name = [sys.executable, "-c", 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])']
     script = f"""
         {shlex.join(PALPATE)} devices --zero --json > '{listed}' &&

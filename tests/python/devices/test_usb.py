@@ -89,9 +89,7 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) 
 def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(
     reported: dict[str, Any],
 ) -> None:
-    assert reported["unplugged"].endswith(
-        "asking who it is: it was unplugged; plug it in and try again"
-    )
+    assert reported["unplugged"].endswith("asking who it is: it was unplugged; plug it in and try again")
     assert reported["found without it"] == 0
     assert reported["opened without it"].startswith("no haptic USB device is plugged in")
     assert reported["found again"] == "EMU-1"

@@ -335,7 +335,9 @@ def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFi
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     stiffness = told["plan"]["coupling"]["stiffness"]
-    assert 1.0 / told["slope_behind_coupling"] == pytest.approx(1.0 / told["steepest_slope"] + 1.0 / stiffness)
+    assert 1.0 / told["slope_behind_coupling"] == pytest.approx(
+        1.0 / told["steepest_slope"] + 1.0 / stiffness
+    )
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
     assert f"slopes up to {told['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
 
