@@ -98,7 +98,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> GuestRuns:
     plan = Plan(load_model(MODEL), Scheme(structure="direct"))
     spring = Plan(load_model(SPRING), Scheme(structure="direct")).certified_for(WITH_FRICTION)
     assert spring.certificate is not None
-    assert spring.certificate.certified, spring.certificate.why
+    assert spring.certificate.certified, spring.certificate.reason
     spring.stored().save(folder / "spring.json")
     (folder / "render").write_text(RENDER_SCRIPT, encoding="utf-8")
     (folder / "facts").write_text(FACTS_SCRIPT, encoding="utf-8")
@@ -194,8 +194,8 @@ def test_low_rate_stops_a_certified_run_within_a_second(runs: GuestRuns) -> None
     for run, ticks_before, rate_hz in (("slow", 0, 900.0), ("slowed", SLOW_TICK, 1000.0 / 3.0)):
         summary = runs.summary(run)
         assert runs.text(f"{run}.code").strip() == "1"
-        assert "did not hold its rate" in summary["ended"]
-        assert "did not hold its rate" in runs.text(f"{run}.stderr")
+        assert "the rate was too low" in summary["ended"]
+        assert "the rate was too low" in runs.text(f"{run}.stderr")
         assert summary["ticks"] <= ticks_before + rate_hz + 1
         assert len(runs.table(f"{run}.csv")) == summary["ticks"]
 

@@ -114,7 +114,10 @@ def _list_examples(*, as_json: bool) -> None:
     help="Mass of the object [kg or kg*m^2]; default: that of the model; 0: none.",
 )
 @click.option(
-    "--damping", type=float, default=None, help="Damping of the object; default: that of the model; 0: none."
+    "--object-damping",
+    type=float,
+    default=None,
+    help="Damping of the object; default: that of the model; 0: none.",
 )
 @click.option(
     "--play-radius", type=float, default=None, help="Play radius r of a model with hysteresis [m or rad]."
@@ -181,7 +184,7 @@ def plan(
     end_with(verdict)
 
 
-_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
+_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "basis", "source")
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
@@ -198,9 +201,9 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
         "plan": plan.record(),
         "certificate": certificate_record(certificate),
         "inequalities": [{name: getattr(line, name) for name in _LINE} for line in certificate.inequalities],
-        "why": certificate.why,
+        "reason": certificate.reason,
         "steepest_slope": steepest,
-        "felt_slope": felt,
+        "slope_behind_coupling": felt,
         "seconds": seconds,
     }
 
@@ -234,10 +237,10 @@ def _details(plan: Plan, certificate: Certificate) -> list[str]:
     for line in certificate.inequalities:
         word = "holds" if line.holds else "fails"
         details.append(
-            f"{line.name}: {word}, {line.rests_on}; {line.formula}; {number(line.left)} against "
+            f"{line.name}: {word}, {line.basis}; {line.formula}; {number(line.left)} against "
             f"{number(line.right)}, margin {number(line.margin)}"
         )
-    return [*details, certificate.why]
+    return [*details, certificate.reason]
 
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:

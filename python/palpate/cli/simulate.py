@@ -32,7 +32,9 @@ from .verb import PATH, json_option, plot_option, require_writable, scheme_optio
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @scheme_options
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time [s].")
-@click.option("-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write."
+)
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
 @plot_option("rendered and modelled force, with their difference")
 @json_option

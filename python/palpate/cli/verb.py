@@ -201,9 +201,9 @@ scheme_options = options(
         help="Mass of an object with mass, in force per acceleration.",
     ),
     click.option(
-        "--damping",
+        "--object-damping",
         type=float,
-        show_default=f"{_SCHEME.damping:g} N*m*s/rad, scaled",
+        show_default=f"{_SCHEME.object_damping:g} N*m*s/rad, scaled",
         help="Damping of an object with mass, in force per velocity.",
     ),
     click.option(

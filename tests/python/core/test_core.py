@@ -199,7 +199,7 @@ def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None
     force = motion_driven(spring, Scheme(structure="direct"), slow, 1e-3)["force"]
     assert force == pytest.approx(5 * slow, abs=1e-12)
     for structure in ("implicit", "explicit"):
-        scheme = Scheme(structure=structure, damping=0.05)
+        scheme = Scheme(structure=structure, object_damping=0.05)
         moved = force_driven(spring, scheme, force, 1e-3, start_position=float(slow[0]))
         assert moved["environment_position"] == pytest.approx(slow, abs=5e-3)
 
@@ -216,7 +216,7 @@ def test_defaults_and_words_are_those_of_the_core() -> None:
         "energy-consistent",
     )
     scheme = Scheme()
-    assert (scheme.structure, scheme.mass, scheme.damping) == ("massless", 0.001, 0.5)
+    assert (scheme.structure, scheme.mass, scheme.object_damping) == ("massless", 0.001, 0.5)
     profile = DeviceProfile()
     assert (profile.inertia, profile.viscous_damping, profile.force_limit) == (2e-4, 0.06, 5.0)
     assert profile.encoder_step == pytest.approx(2 * np.pi / 65536)

@@ -53,7 +53,7 @@ def summary_without_force(**changed: Any) -> dict[str, Any]:
         "lost_samples": 0,
         "repeated_samples": 0,
         "orderly": True,
-        "ended": "ran its time",
+        "ended": "the duration ended",
         "transducer": True,
         "round_trip": percentiles,
         "delay": percentiles,
@@ -375,7 +375,7 @@ def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
     trace = tmp_path / "trace.csv"
     profile = tmp_path / "knob.toml"
     words = ["--push", "--yes", "--write-profile", profile]
-    answer = run_check(*words, device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
+    answer = run_check(*words, device=["--reversed", *hand, "--trace", str(trace)], seconds=seconds)
     result, findings = findings_of_answer(answer)
     assert answer.returncode == 1
     assert findings["sign of the force"]["right"] is False
@@ -388,7 +388,7 @@ def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
 @needs_emulation
 def test_a_check_without_pushes_never_enables_the_device(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
-    answer = run_check(device=["--spring", "3", "--flipped", "--trace", str(trace)])
+    answer = run_check(device=["--spring", "3", "--reversed", "--trace", str(trace)])
     _, findings = findings_of_answer(answer)
     assert findings["sign of the transducer"]["right"]
     assert findings["velocity"]["right"]

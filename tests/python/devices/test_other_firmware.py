@@ -25,7 +25,7 @@ pytestmark = [needs_emulation, pytest.mark.parametrize("seed", range(1, 1 + 3 * 
 
 
 def firmware_of(seed: int, *words: Any) -> list[str]:
-    return ["--lock-step", "--chosen-by", str(seed), *map(str, words)]
+    return ["--lock-step", "--seed", str(seed), *map(str, words)]
 
 
 @needs_program
