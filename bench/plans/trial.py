@@ -183,7 +183,9 @@ def candidates(model: Model, device: DeviceProfile, play_radius: float, grid: in
             ("implicit", "energy-consistent", "explicit"), (0.02, 2.0), (0.0, 0.5)
         ):
             mass = stability_factor * (stiffness_limit + stiffness) * device.period_s**2
-            yield Scheme(structure=structure, mass=mass, damping=ratio * mass / device.period_s, **coupling)
+            yield Scheme(
+                structure=structure, mass=mass, object_damping=ratio * mass / device.period_s, **coupling
+            )
 
 
 def unchanged_part(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:

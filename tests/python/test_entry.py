@@ -99,7 +99,7 @@ def test_inputs_named_as_columns_are_read_from_files_and_frames(tmp_path: Path) 
         (lambda t: t.assign(force_mN=[np.nan, *t.force_mN[1:]]), r"row 0 \(index 0\).*force_mN holds 'nan'"),
         (lambda t: t.assign(force_mN=["x", *t.force_mN[1:]]), r'holds \'x\'.*invalid="drop"'),
         (lambda t: t.assign(force_mN=t.force_mN * 1j), "force_mN holds complex numbers"),
-        (lambda t: t.assign(direction="sideways"), "'sideways', which is no direction"),
+        (lambda t: t.assign(direction="sideways"), "'sideways', which is not a direction"),
         (lambda t: t.drop(columns="depth_mm"), r'no column name has a unit of position.*position="operator"'),
         (lambda t: t.rename(columns={"operator": "force_mN"}), "several columns called force_mN"),
         (lambda t: t.rename(columns={"operator": 7}), "a column called 7"),

@@ -12,7 +12,7 @@ from .._core.model import ForceModel
 from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import (
     Certificate,
-    balancing_shift,
+    passive_shift,
     certify,
     explicit_scheme,
     force_bounds,
@@ -77,8 +77,8 @@ class Task:
     coupling_stiffness: float | None = None
     coupling_damping: float | None = None
     mass: float | None = None
-    damping: float | None = None
-    """Object damping"""
+    object_damping: float | None = None
+    """B_o [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
     """Samples of the prediction. 0: none; None: chosen by the plan"""
@@ -88,7 +88,7 @@ class Task:
     @property
     def dynamic(self) -> bool:
         """True if the object has mass or damping besides its force."""
-        return bool(self.mass) or bool(self.damping)
+        return bool(self.mass) or bool(self.object_damping)
 
     @property
     def chooses_play(self) -> bool:
@@ -123,7 +123,7 @@ class Task:
             return None
         parts = [
             f"a {word} of {value:.4g}"
-            for word, value in (("mass", self.mass), ("damping", self.damping))
+            for word, value in (("mass", self.mass), ("damping", self.object_damping))
             if value
         ]
         return Refusal(f"the object has {' and '.join(parts)}, which it would leave out")
@@ -191,7 +191,7 @@ def _massless(task: Task) -> Candidate | Refusal:
     if stiffness is None:
         static = damping == 0.0 and not model.hysteretic
         falling = 0.0 if static else max(0.0, -force_bounds(model, task.usual_play).slope_min)
-        stiffness = stiffest_coupling(damping=damping, falling=falling, device=device)
+        stiffness = stiffest_coupling(coupling_damping=damping, falling=falling, device=device)
         if static:
             stiffness = min(stiffness, usual_coupling_share * high)
     if stiffness <= 0.0:
@@ -227,7 +227,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
         damping = _COUPLING_DAMPING * task.device.viscous_damping
     stiffness = task.coupling_stiffness
     if stiffness is None:
-        stiffness = stiffest_coupling(damping=damping, falling=0.0, device=task.device)
+        stiffness = stiffest_coupling(coupling_damping=damping, falling=0.0, device=task.device)
     if stiffness <= 0.0:
         return Refusal(f"the device's damping {task.device.viscous_damping:.4g} holds no coupling")
     return task.certified(
@@ -236,7 +236,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
             coupling_stiffness=stiffness,
             coupling_damping=damping,
             mass=task.mass,
-            damping=task.damping or 0.0,
+            object_damping=task.object_damping or 0.0,
             play_radius=task.usual_play,
         )
     )
@@ -250,7 +250,7 @@ def _explicit(task: Task) -> Candidate | Refusal:
         force_bounds(task.model, task.usual_play, task.device.force_limit),
         task.device,
         mass=task.mass,
-        damping=task.damping,
+        object_damping=task.object_damping,
         coupling_stiffness=task.coupling_stiffness,
         coupling_damping=task.coupling_damping,
         play_radius=task.usual_play,
@@ -344,7 +344,7 @@ def _fits(model: ForceModel, low: float, high: float) -> bool:
 
 def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
     """Shifts a periodic model so that its mean force, limited by the device, is 0."""
-    shift = balancing_shift(model, device.force_limit)
+    shift = passive_shift(model, device.force_limit)
     return with_network(model, bias=model.bias + shift) if shift else model
 
 

@@ -122,8 +122,8 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], 
         ([], ["--no-transducer"], "EMU-1 has no force transducer"),
         (["--probe"], [], "a probe on a real device needs upper"),
         (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6, the device makes 5"),
-        (["--object", OBJECT], [], "an object is mounted on the simulated device only; usb has its own"),
-        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
+        (["--object", OBJECT], [], "an object needs device simulated; usb has a real one"),
+        ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
     ],
 )
 def test_an_impossible_recording_is_refused_before_the_device_moves(
@@ -182,7 +182,7 @@ def test_verify_confirms_a_recording_of_the_simulated_object(tmp_path: Path) -> 
     assert len(ticks) > 5
     recording = read_recording(tmp_path / "a.csv")
     assert recording.metadata["simulated"].startswith("yes")
-    assert recording.metadata["moved_by"].startswith("the device itself: a sweep from ")
+    assert recording.metadata["moved_by"].startswith("the device: a sweep from ")
     assert palpate.verify(knob, recording).nrmse < 0.01
 
 
@@ -206,13 +206,13 @@ def test_a_handle_without_motion_gives_the_verdict_no(tmp_path: Path) -> None:
     assert completed.returncode == 1
     verdict = json.loads(completed.stdout)["verdict"]
     assert verdict.startswith("no: ")
-    assert "so no force over position is known: move it over the whole object" in verdict
+    assert "so the force over position is unknown: move it over the whole object" in verdict
 
 
 def test_a_recording_without_object_or_force_measurement_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="nothing is mounted on the simulated device"):
+    with pytest.raises(InputError, match="the simulated device has no object"):
         record(tmp_path / "a.csv")
-    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, and its motor"):
+    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, so it cannot"):
         record(tmp_path / "a.csv", object=load_model(OBJECT), transducer=False)
     with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
         record(tmp_path / "a.csv", device="knob")

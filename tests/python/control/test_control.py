@@ -80,15 +80,15 @@ def test_the_version_equals_the_version_of_the_package() -> None:
         ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL] or inverse3"),
         ([MODEL, "--record", "/no/such/folder/out.csv"], "cannot be written: No such file or directory"),
         ([MODEL, "--record", "/tmp"], "cannot be written: it is not an ordinary file"),
-        ([MODEL, "--record", MODEL], ", the model; writing there would destroy it"),
+        ([MODEL, "--record", MODEL], ", the model file: choose another name"),
         ([MODEL, "--coupling-stiffness", "-1"], "--coupling-stiffness: must be a number above 0, not -1"),
         ([MODEL, "--coupling-stiffness", "hard"], "--coupling-stiffness: must be a number above 0, not hard"),
-        ([MODEL, "--damping", "-1"], "--damping: must be a number of 0 or more, not -1"),
+        ([MODEL, "--object-damping", "-1"], "--object-damping: must be a number of 0 or more, not -1"),
         ([MODEL, "--tolerated-samples", "-1"], "must be a number from 0 to 1000000, not -1"),
         ([MODEL, "--cpu", "0.5"], "--cpu: must be a whole number, not 0.5"),
         ([MODEL, "--rate-hz"], "--rate-hz needs a value"),
         (["--rate-hz", "1000"], "MODEL.json is required"),
-        ([MODEL, "--structure", "direct", "--compensated"], "no coupling to compensate"),
+        ([MODEL, "--structure", "direct", "--compensated"], "direct structure, which has no coupling"),
         ([MODEL, "--force-limit", "9"], "force_limit is 9, the device makes 5"),
         ([MODEL, "--force-limit", "0"], "--force-limit: must be a number above 0, not 0"),
         ([MODEL, "--ramp-s", "1e300"], "ramp_s is 1e+300, must be 0 to 3600"),
@@ -205,5 +205,5 @@ def test_a_rate_too_low_is_reported_and_ends_the_run(tmp_path: Path) -> None:
     process.send_signal(signal.SIGCONT)
     output, messages = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert "the loop did not hold its rate" in messages
+    assert "the rate was too low" in messages
     assert json.loads(output)["missed_deadlines"] > 1000

@@ -92,7 +92,7 @@ def test_a_certificate_of_another_network_is_refused(limited: Path) -> None:
 def test_the_default_coupling_is_reported_without_plan_and_structure(tmp_path: Path) -> None:
     path = model_by_hand().save(tmp_path / "unplanned.json")
     arguments = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
-    assert "no plan in the model: rendered behind the default coupling" in control(*arguments).stderr
+    assert "the model has no plan: rendered behind the default coupling" in control(*arguments).stderr
     assert "no plan" not in control(*arguments, "--structure", "massless").stderr
 
 
@@ -107,7 +107,7 @@ def test_a_certified_run_uses_the_rate_and_device_of_its_certificate(planned: Pa
 def test_a_rate_that_differs_from_the_certificate_is_refused(planned: Path) -> None:
     completed = control(planned, "--rate-hz", 500)
     assert completed.returncode == 2
-    assert "rate_hz is 500, and the certificate is for 1000 Hz" in completed.stderr
+    assert "rate_hz is 500, but the certificate is for 1000 Hz" in completed.stderr
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_options_outside_the_certificate_make_the_run_uncertified(
         500,
     )
     assert completed.returncode == 0, completed.stderr
-    assert "uncertified: the options change the planned rendering" in completed.stderr
+    assert "uncertified: the options change the plan" in completed.stderr
     assert "certified: no: the options" in metadata(record)
 
 

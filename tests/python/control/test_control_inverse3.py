@@ -127,7 +127,7 @@ def test_a_fault_ends_the_run_with_a_record(
 @pytest.mark.parametrize(
     ("service", "reason"),
     [
-        (Service(devices=0), "sees no Inverse3: plug it in"),
+        (Service(devices=0), "detects no Inverse3: plug it in"),
         (Service(calibrated=False), "Inverse3 049D is not calibrated"),
     ],
     ids=["no device", "not calibrated"],
@@ -166,5 +166,5 @@ def test_a_certificate_or_the_full_option_uncertified_is_required(spring: Path) 
         assert "has no certificate" in completed.stderr
         completed = control(MODEL, "--device", f"inverse3:z@{service.port}", "--uncertified")
         assert completed.returncode == 2
-        assert "an Inverse3 moves along a line: it takes models in m and N" in completed.stderr
+        assert "an Inverse3 moves along a line and needs a model in m and N" in completed.stderr
     assert all(force == {"x": 0.0, "y": 0.0, "z": 0.0} for force in service.forces)

@@ -70,7 +70,7 @@ def test_a_run_writes_a_complete_recording(tmp_path: Path, structure: str, rate:
     assert recording.source.columns["force"] == "force_Nm"
     assert recording.units == {"position": "rad", "force": "N*m"}
     assert "missed deadlines" in recording.metadata["timing"]
-    assert recording.metadata["ended"].startswith("ran its time; zero force sent, device closed")
+    assert recording.metadata["ended"].startswith("the duration ended; zero force sent, device closed")
     assert recording.metadata["simulated"].startswith("yes")
 
 
@@ -209,7 +209,7 @@ def test_a_file_that_appears_while_the_loop_runs_is_not_replaced(tmp_path: Path)
     assert completed.returncode == 0
     assert out.read_text(encoding="utf-8") == "precious"
     summary = json.loads(completed.stdout)
-    sentence = f"{out} appeared while this was recorded and is not replaced; the recording is {part}"
+    sentence = f"{out} was created by another program meanwhile and is not replaced; the recording is {part}"
     assert sentence in completed.stderr
     assert sentence in summary["verdict"]
     assert summary["record"] == str(part)
@@ -288,9 +288,9 @@ def test_the_verdict_is_the_first_line(
 def expect_cut_recording(completed: subprocess.CompletedProcess[str], out: Path, ticks: int) -> None:
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
-    assert summary["ended"] == "ran its time"
+    assert summary["ended"] == "the duration ended"
     assert summary["ticks"] + summary["missed_deadlines"] >= ticks
-    assert "the recording stopped, the loop goes on" in completed.stderr
+    assert "the recording stopped, the loop continues" in completed.stderr
     assert 0 < len(every_row(out)) == summary["recorded"] < summary["ticks"]
     assert summary["recorded"] + summary["lost_records"] == summary["ticks"]
     assert "incomplete" in read_recording(out).metadata["ended"]

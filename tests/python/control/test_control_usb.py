@@ -83,7 +83,7 @@ def test_a_model_certified_for_this_device_requires_no_option(tmp_path: Path) ->
     assert json.loads(completed.stdout)["ticks"] > 0
     refused = control("--structure", "massless", device=LOCK_STEP, model=certified)
     assert refused.returncode == 2
-    assert "is certified as it was planned: leave out structure and its numbers" in refused.stderr
+    assert "is certified for its plan only: do not set structure" in refused.stderr
 
 
 def planned(folder: Path, **device: Any) -> Path:
@@ -111,7 +111,7 @@ def test_a_certified_run_has_the_certified_force_limit_and_no_slew_limit(tmp_pat
     assert "# guards: force limit 3, no slew limit, ramp 0.2 s" in record.read_text(encoding="utf-8")
     refused = control("--force-limit", 2, device=LOCK_STEP, model=planned(tmp_path))
     assert refused.returncode == 2
-    assert "leave out structure and its numbers, force_limit" in refused.stderr
+    assert "do not set structure, its numbers, force_limit" in refused.stderr
 
 
 @pytest.mark.parametrize(
@@ -152,17 +152,17 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "device", "reason"),
     [
-        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
-        ([], ["--serial", "A", "--serial", "B"], "2 USB devices could be meant (A, B)"),
-        (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; there is EMU-1"),
+        ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
+        ([], ["--serial", "A", "--serial", "B"], "2 suitable USB devices are connected (A, B)"),
+        (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; connected: EMU-1"),
         (["--device", "usb:"], [], "device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
-        ([], ["--somebody-elses"], "is 1209:0001 but not of this protocol"),
+        ([], ["--wrong-magic"], "is 1209:0001 with another protocol"),
         ([], ["--info-bytes", "31"], "the answer to GET_INFO has 31 bytes, must have 32"),
         ([], ["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),
         ([], ["--denied"], "sudo palpate devices --install-udev-rule"),
-        (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: choose 1000"),
+        (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: must be 1000"),
         (["--force-limit", "6"], [], "force_limit is 6, the device makes 5"),
-        (["--fault", "late@1"], [], "faults are for the simulated device"),
+        (["--fault", "late@1"], [], "faults is set: must be empty for a real device"),
     ],
 )
 def test_impossible_arguments_are_refused_before_the_device_moves(

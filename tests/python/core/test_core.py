@@ -206,7 +206,7 @@ def test_motion_driven_and_force_driven_simulations_are_inverse_for_a_spring() -
     force = motion_driven(spring, Scheme(structure="direct"), position, 1e-3)["force"]
     assert force == pytest.approx(5 * position, abs=1e-12)
     for structure in ("implicit", "explicit"):
-        scheme = Scheme(structure=structure, damping=0.05)
+        scheme = Scheme(structure=structure, object_damping=0.05)
         simulated = force_driven(spring, scheme, force, 1e-3, start_position=float(position[0]))
         assert simulated["environment_position"] == pytest.approx(position, abs=5e-3)
 
@@ -223,7 +223,7 @@ def test_defaults_and_names_equal_those_of_the_core() -> None:
         "energy-consistent",
     )
     scheme = Scheme()
-    assert (scheme.structure, scheme.mass, scheme.damping) == ("massless", 0.001, 0.5)
+    assert (scheme.structure, scheme.mass, scheme.object_damping) == ("massless", 0.001, 0.5)
     profile = DeviceProfile()
     assert (profile.inertia, profile.viscous_damping, profile.force_limit) == (2e-4, 0.06, 5.0)
     assert profile.encoder_step == pytest.approx(2 * np.pi / 65536)

@@ -32,7 +32,7 @@ SETTINGS: dict[str, Any] = {
         slope_min=-0.1, slope_max=1 / 3, steepest=2.0, sliding=1.0, loss_max=1e-9, hysteresis=True
     ),
     "Inequality": Inequality(
-        id="i", name="a", formula="b > c", left=1 / 3, right=0.1, rests_on="linear", source="s", strict=True
+        id="i", name="a", formula="b > c", left=1 / 3, right=0.1, basis="linear", source="s", strict=True
     ),
     "TestRig": rig_for(model_by_hand()),
     "Certificate": certify(model_by_hand(), Scheme(structure="direct"), DeviceProfile()),

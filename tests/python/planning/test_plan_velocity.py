@@ -69,7 +69,7 @@ def test_a_device_that_the_velocity_is_too_much_for_is_refused_with_what_is_miss
 
 
 @pytest.mark.parametrize(
-    "wish", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"damping": 0.1}]
+    "wish", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"object_damping": 0.1}]
 )
 def test_behind_a_coupling_or_with_a_mass_it_is_refused_in_one_sentence(wish: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="no bound is known"):
