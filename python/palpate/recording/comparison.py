@@ -37,11 +37,6 @@ SPIKE_PERCENT = 0.5
 """Percentage of the rows at each end that may be position spikes."""
 
 
-def amount(value: float, unit: str) -> str:
-    """Returns a value with its unit for sentences; the value alone if the unit is not stated."""
-    return f"{value:.4g} {unit}".rstrip()
-
-
 @dataclass(frozen=True)
 class Travel:
     """Range of the position without spikes, and the rows inside it."""
@@ -249,7 +244,7 @@ def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
     return [
         usable(
             f"near row {split} the force at the same position and stroke changes by "
-            f"{amount(distance, recording.units['force'])}, {distance / spread:.0%} of its spread. The file "
+            f"{recording.file_unit('force').text(distance)}, {distance / spread:.0%} of its spread. The file "
             "probably holds two objects or two zeros, or the object changed (drift, settling): identify "
             f"each part separately with --rows 0:{split} and --rows {split}:{len(recording)}"
         )

@@ -119,8 +119,8 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
         notes = (
             "The force is compared at the predicted position, half a sample ahead of the handle."
             if flight.predicted
-            else "The force is compared at the position of the virtual object. A virtual coupling joins it to the "
-            "handle.",
+            else "The force is compared at the position of the virtual object. A virtual coupling "
+            "joins it to the handle.",
         )
     side = None
     if not model.hysteretic:
