@@ -12,10 +12,10 @@ from .._core.model import ForceModel
 from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import (
     Certificate,
-    passive_shift,
     certify,
     explicit_scheme,
     force_bounds,
+    passive_shift,
     steepest_stick,
     stiffest_coupling,
     usual_coupling_share,
