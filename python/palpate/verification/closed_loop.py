@@ -143,7 +143,8 @@ def force_driven(
         scheme = Scheme(**{**scheme.to_dict(), "structure": "implicit"})
         notes = (
             f"the implicit environment is used: with mass {scheme.mass:g} and object damping "
-            f"{scheme.object_damping:g} the explicit one is stable below a slope of {limit:.4g}, and the model reaches {steepest:.4g}",
+            f"{scheme.object_damping:g} the explicit one is stable below a slope of {limit:.4g}, and the "
+            f"model reaches {steepest:.4g}",
         )
 
     def run(_position: Float1D, force: Float1D) -> dict[str, Any]:
