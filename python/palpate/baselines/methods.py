@@ -189,7 +189,7 @@ class SmoothingSpline:
         )
         x, mean, count = merged(X[:, 0], y)
         if len(x) < 5:
-            raise ValueError(f"a cubic spline needs 5 positions; there are {len(x)}")
+            raise ValueError(f"there are {len(x)} positions: a cubic spline needs at least 5")
         # The spline cannot remove the scatter of rows with equal position.
         scatter = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
         allowed = max(multiple * len(y) * _noise(X[:, 0], y) - scatter, 0.0)

@@ -16,7 +16,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
-from ..recording.reading import Given, recordings_from
+from ..recording.reading import RecordingLike, recordings_from
 from ..verdict import Verdict
 from .classes.climb import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
@@ -24,12 +24,13 @@ from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_isolated
 from .data.rows import Rows, require_in_range, require_usable, rows_of
+from .decision import latest
 from .network.fitted import FittedNetwork
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
 
 
 def identify(
-    recording: Given | Iterable[Given] | npt.ArrayLike,
+    recording: RecordingLike | Iterable[RecordingLike] | npt.ArrayLike,
     force: npt.ArrayLike | None = None,
     *,
     time: npt.ArrayLike | None = None,
@@ -58,7 +59,8 @@ def identify(
     -------
     Model
         ``model.verdict`` judges it. ``model.fit`` holds its class and why growth stopped, ``model.path``
-        every network that was considered, ``model.notes["identification"]`` refusals and rows left out.
+        every network that was considered. ``model.notes["model_selection"]`` holds one line for each model
+        class, accepted or not; ``model.notes["identification"]`` sentences on unused rows and constraints.
 
     Raises
     ------
@@ -80,7 +82,8 @@ def identify(
     for other in recordings[1:]:
         if dict(other.units) != units:
             raise InputError(
-                f"the recordings have different units, {units} and {dict(other.units)}; identify them apart"
+                f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
+                "separately"
             )
     recordings, isolated = without_isolated(recordings)
     for each in recordings:
@@ -121,6 +124,7 @@ def fit_environment(
     names: Sequence[str] | None = None,
     weight: Float1D | None = None,
     within: float = 0.0,
+    units: Mapping[str, str] | None = None,
 ) -> FittedNetwork:
     """Identify a force law from arrays.
 
@@ -142,6 +146,8 @@ def fit_environment(
         Samples that each row represents, above 0; 1 without it.
     within : float
         Sum of squares of the force inside rows that represent several samples.
+    units : mapping, optional
+        Units of position and force, for the messages.
 
     Returns
     -------
@@ -156,6 +162,8 @@ def fit_environment(
     given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
     side = None if side is None else np.sign(side).astype(float)
     rows = Rows(tuple(given), positions, force, side, starts, (), weight, within, options.period)
+    if units is not None:
+        rows = replace(rows, position_unit=units["position"], force_unit=units["force"])
     return fit_rows(rows, options)
 
 
@@ -163,7 +171,7 @@ def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     """Identify a force law from rows; as :func:`fit_environment`."""
     require_usable(rows, options)
     if scale := ForceScale.of(rows.force, options):
-        return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale)
+        return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
     return _fitted(rows, options)
 
 
@@ -174,16 +182,17 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
         rows, side = replace(rows, side=None), None
     if side is None or side.all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
         return identified(select(rows, options))
-    left_out = f"{np.count_nonzero(side == 0)} rows without a direction were left out to judge hysteresis"
+    left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not used to test hysteresis."
     found = identified(select(replace(rows, notes=(*rows.notes, left_out)).only(side != 0), options))
     if found.weight_hysteresis is not None:
         return found
     # hysteresis was refused, so rows without a direction need not be left out
-    every_row = replace(rows, side=None, starts=None, parts=(), notes=(), findings=())
+    every_row = replace(rows, side=None, starts=None, parts=(), decisions=(), notes=(), findings=())
     again = identified(select(every_row, options))
     return replace(
         again,
         path=found.path + again.path,
+        decisions=latest(found.decisions + again.decisions)[0],
         notes=found.notes + again.notes,
         findings=found.findings + again.findings,
     )
@@ -212,7 +221,11 @@ def model_of(
         else network.damping,
         fit=network.fit(),
         data=source,
-        notes={"identification": list(network.notes), "verdict": verdict.record()},
+        notes={
+            "model_selection": [str(decision) for decision in network.decisions],
+            "identification": list(network.notes),
+            "verdict": verdict.record(),
+        },
     )
 
 

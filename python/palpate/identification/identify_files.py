@@ -31,7 +31,7 @@ from ..arguments import path_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
-from ..recording.conversion import mirrored
+from ..recording.conversion import mirror_notes
 from ..recording.motion import strokes_from_order
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
@@ -40,6 +40,7 @@ from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.outliers import refuse_isolated
 from .data.rows import modulo, require_in_range
+from .decision import Decision
 from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
@@ -49,6 +50,9 @@ LEAST_KNOWN = 0.5
 
 MOST_CELLS = 8192
 """Cells of position that are kept apart: as fine as identification needs."""
+
+UNKNOWN_STROKES = "no column states the direction, and the order of rows does not show it"
+"""Reason for which hysteresis is not tested."""
 
 SCATTER_ROWS = 16
 """Neighbouring cells in which the force of single rows is compared with one line."""
@@ -111,7 +115,7 @@ def identify_files(
     _require_summable(settings)
     paths = [path_of("files", each) for each in (files if isinstance(files, (list, tuple)) else [files])]
     if not paths:
-        raise InputError("identify_files was given no file; give one, or a list of them")
+        raise InputError("files is empty: give a path or a list of paths")
     recordings = [
         open_long_recording(
             os.fspath(path),
@@ -131,7 +135,8 @@ def identify_files(
             recordings[0].direction is None
         ):
             raise InputError(
-                f"{other.path} differs from {recordings[0].path} in its units or in having a direction"
+                f"{other.path} and {recordings[0].path} differ in their units, or only one has a direction "
+                "column; identify each one separately"
             )
     parts = [(recording, part) for recording in recordings for part in recording.parts]
     read = in_order(
@@ -145,13 +150,13 @@ def identify_files(
     notes: list[str] = []
     for recording, found in zip(recordings, of_file, strict=True):
         _require_all_rows(recording, found)
-        told = found.left_out.sentences(recording.places())
         # The source of the model holds the columns, but not the form of the file.
-        told = [note for note in recording.notes[:1] if "read as" in note] + [*recording.notes[1:], *told]
-        notes += [f"{recording.path}: {sentence}" for sentence in told] if len(recordings) > 1 else told
+        sentences = [note for note in recording.notes[:1] if "read as" in note]
+        sentences += [*recording.notes[1:], *found.left_out.sentences(recording.places())]
+        notes += [f"{recording.path}: {each}" for each in sentences] if len(recordings) > 1 else sentences
     summaries = [found.summary for found in of_file if found.summary is not None]
     if not summaries:
-        raise InputError(f"{', '.join(str(path) for path in paths)}: there is no usable row")
+        raise InputError(f"{', '.join(str(path) for path in paths)}: no row is usable")
     return _identified(reduce(merged, summaries), recordings, settings, notes)
 
 
@@ -200,8 +205,8 @@ def _require_all_rows(recording: LongRecording, read: PartRead) -> None:
     used = 0 if read.summary is None else round(read.summary.rows)
     if not used + read.left_out.rows == read.rows == recording.rows:
         raise InputError(
-            f"{recording.path} has {recording.rows} rows, but {used} were used and {read.left_out.rows} left "
-            "out: the file may have changed while it was read. Read it again, or without --out-of-core"
+            f"{recording.path} has {recording.rows} rows, but {used} were used and {read.left_out.rows} were "
+            "not. The file may have changed while it was read: read it again, or without --out-of-core"
         )
 
 
@@ -225,17 +230,19 @@ def _identified(
 ) -> Model:
     width = 0.0 if summary.level is None else 2.0**summary.level
     refuse_isolated(summary.position, summary.count, width)
-    notes += mirrored(summary.correlation)
+    notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
+    decisions: tuple[Decision, ...] = ()
     findings: list[Finding] = []
     if all(recording.direction is None for recording in recordings):
         if settings.inputs != "auto" and "hysteresis" not in settings.inputs:
             side = None
         elif _known_strokes(summary):
-            notes.append("direction is taken from the order of rows, block by block")
+            notes.append("The direction is taken from the order of rows, block by block.")
         else:
             side = None
-            findings.append(_untested(summary))
+            decisions = (Decision("hysteresis", "not tested", UNKNOWN_STROKES),)
+            findings.append(_untested(summary, recordings[0].units["force"]))
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
             summary.position[:, None],
@@ -244,6 +251,7 @@ def _identified(
             settings,
             weight=summary.count,
             within=summary.within,
+            units=recordings[0].units,
         )
     spread = float(np.sqrt(summary.variance))
     rmse = _error_on_rows(summary, network, side, settings.period)
@@ -253,6 +261,7 @@ def _identified(
         network,
         rmse=rmse,
         nrmse=nrmse,
+        decisions=(*network.decisions, *decisions),
         notes=(*notes, *network.notes),
         findings=(*findings, *network.findings),
     )
@@ -273,15 +282,15 @@ def _known_strokes(summary: Summary) -> bool:
     return min(press, release) > 0.0 and press + release >= LEAST_KNOWN * summary.rows
 
 
-def _untested(summary: Summary) -> Finding:
+def _untested(summary: Summary, force_unit: str) -> Finding:
     """Hysteresis could not be tested; reports the largest difference that the rows allow."""
     scatter = summary.scatter
     reach = float(np.ptp(summary.force)) or 1.0
     return usable(
-        "hysteresis was not tested: no column states the direction, and the order of rows does not show it. "
-        f"At the same position the force has a standard deviation of {scatter:.3g} ({scatter / reach:.1%} of "
-        "its range), from noise or from a difference between press and release. Cure: add a column direction "
-        "with the words press and release"
+        f"hysteresis was not tested: {UNKNOWN_STROKES}. At the same position the force has a standard "
+        f"deviation of {f'{scatter:.3g} {force_unit}'.rstrip()} ({scatter / reach:.1%} of its range), from "
+        "noise or from a difference between press and release. Cure: add a column direction with the words "
+        "press and release"
     )
 
 
@@ -289,10 +298,11 @@ def _require_summable(settings: IdentifyOptions) -> None:
     further = set(() if settings.inputs == "auto" else settings.inputs) - {"position", "hysteresis"}
     if further:
         raise InputError(
-            f"inputs names {', '.join(sorted(further))}; files read part by part give a force over position"
+            f"inputs names {', '.join(sorted(further))}: must be position and hysteresis only, for files "
+            "that are read part by part"
         )
     if settings.loss != "squares":
-        raise InputError(f"loss is {settings.loss!r}; sums over parts of files are squares")
+        raise InputError(f"loss is {settings.loss!r}: must be 'squares' for files that are read part by part")
 
 
 @dataclass(frozen=True)
@@ -503,7 +513,7 @@ def _needed(name: str) -> Any:
         return import_module(name)
     except ImportError:
         raise InputError(
-            f"work in several processes needs {name}: install it with pip install palpate[parallel]"
+            f"several processes need {name}: install it with pip install palpate[parallel]"
         ) from None
 
 

@@ -80,7 +80,7 @@ class SearchOptions:
         _require(self)
         radii: object = self.play_radius
         if not isinstance(radii, (tuple, list)) or not radii:
-            raise InputError(f"play_radius is {shown(radii)}; it must be a tuple of shares of the travel")
+            raise InputError(f"play_radius is {shown(radii)}: must be a tuple of shares of the travel")
         for radius in radii:
             _require_number("play_radius", radius, 0.0)
 
@@ -146,7 +146,7 @@ class IdentifyOptions:
         if given is None:
             object.__setattr__(self, "search", SearchOptions())
         elif not isinstance(given, SearchOptions):
-            raise InputError(f"search is {shown(given)}; it must be a SearchOptions")
+            raise InputError(f"search is {shown(given)}: must be a SearchOptions")
         self._require_possible_slopes()
 
     @property
@@ -162,18 +162,16 @@ class IdentifyOptions:
     def _require_possible_slopes(self) -> None:
         bounds: tuple[float, ...] | None = self.slope_bounds
         if bounds is not None and not (_is_pair(bounds) and bounds[0] < bounds[1]):
-            raise InputError(
-                f"slope_bounds is {shown(self.slope_bounds)}; it must be (min, max) with min below max"
-            )
+            raise InputError(f"slope_bounds is {shown(self.slope_bounds)}: must be (min, max) with min < max")
         limits = self.slope_limits
         if limits is not None and not limits[0] < limits[1]:
             raise InputError(
-                f"slope_bounds, monotone and coupling_stiffness ask for a slope of {limits[0]:g} or more, "
-                f"but allow no more than {limits[1]:g}"
+                f"slope_bounds, monotone and coupling_stiffness require a slope of at least {limits[0]:g} "
+                f"and at most {limits[1]:g}: the first must be smaller"
             )
         fixed: tuple[float, ...] | None = self.fixed_force
         if fixed is not None and not (_is_pair(fixed) and all(map(math.isfinite, fixed))):
-            raise InputError(f"fixed_force is {shown(self.fixed_force)}; it must be (position, force)")
+            raise InputError(f"fixed_force is {shown(self.fixed_force)}: must be (position, force)")
 
 
 _LEAST = {
@@ -212,15 +210,13 @@ def _require(options: IdentifyOptions | SearchOptions) -> None:
         name, value = each.name, getattr(options, each.name)
         if name in CHOICES:
             if not isinstance(value, str) or value not in CHOICES[name]:
-                raise InputError(f"{name} is {shown(value)}; it must be one of {', '.join(CHOICES[name])}")
+                raise InputError(f"{name} is {shown(value)}: must be one of {', '.join(CHOICES[name])}")
         elif isinstance(each.default, bool):
             if not isinstance(value, (bool, np.bool_)):
-                raise InputError(f"{name} is {shown(value)}; it must be True or False")
+                raise InputError(f"{name} is {shown(value)}: must be True or False")
         elif name in _LEAST:
             if not isinstance(value, int) or isinstance(value, bool) or value < _LEAST[name]:
-                raise InputError(
-                    f"{name} is {shown(value)}; it must be a whole number of {_LEAST[name]} or more"
-                )
+                raise InputError(f"{name} is {shown(value)}: must be a whole number >= {_LEAST[name]}")
         elif name in _ABOVE:
             _require_number(name, value, _ABOVE[name])
 
@@ -235,7 +231,7 @@ def _parsed(name: str, text: str) -> Any:
     """
     known = {each.name: each.default for each in fields(SearchOptions)}
     if name not in known:
-        raise InputError(f"search has no setting {name!r}; it has {', '.join(known)}")
+        raise InputError(f"search has no setting {name!r}; its settings are {', '.join(known)}")
     default = known[name]
     if isinstance(default, str):
         return text
@@ -247,7 +243,7 @@ def _parsed(name: str, text: str) -> Any:
         return int(text) if isinstance(default, int) else float(text)
     except ValueError:
         kinds = {tuple: "numbers joined by commas", int: "a whole number", float: "a number"}
-        raise InputError(f"{name} is {text!r}; it must be {kinds[type(default)]}") from None
+        raise InputError(f"{name} is {text!r}: must be {kinds[type(default)]}") from None
 
 
 def kind_of(each: Field[Any]) -> str:
@@ -282,7 +278,7 @@ def options_from(keywords: Mapping[str, Any]) -> IdentifyOptions:
     known = [field.name for field in fields(IdentifyOptions)]
     for name in keywords:
         if name not in known:
-            cure = f"it has {', '.join(known)}"
+            cure = f"its options are {', '.join(known)}"
             if name in {field.name for field in fields(SearchOptions)}:
                 cure = f"give search=SearchOptions({name}=...)"
             raise InputError(f"identify has no option {name!r}; {cure}")
@@ -294,13 +290,13 @@ def _require_number(name: str, value: Any, above: float) -> None:
         return
     number = math.nan if isinstance(value, bool) or not isinstance(value, (int, float)) else float(value)
     if not math.isfinite(number) or not number > above:
-        bound = f" above {above:g}" if math.isfinite(above) else ""
-        raise InputError(f"{name} is {shown(value)}; it must be a finite number{bound}")
+        bound = f" > {above:g}" if math.isfinite(above) else ""
+        raise InputError(f"{name} is {shown(value)}: must be a finite number{bound}")
 
 
 def _require_names(inputs: object) -> None:
     if not isinstance(inputs, (tuple, list)) or not all(isinstance(name, str) for name in inputs):
-        raise InputError(f'inputs is {shown(inputs)}; it must be "auto" or a tuple of names')
+        raise InputError(f'inputs is {shown(inputs)}: must be "auto" or a tuple of names')
 
 
 def _is_pair(values: object) -> bool:

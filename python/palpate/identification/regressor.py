@@ -31,7 +31,8 @@ try:
     from sklearn.utils.validation import check_is_fitted, validate_data
 except ImportError as missing:
     raise ImportError(
-        "WaveletNetworkRegressor needs scikit-learn 1.6 or later: pip install palpate[sklearn] brings it"
+        "WaveletNetworkRegressor needs scikit-learn 1.6 or later: install it with pip install "
+        "palpate[sklearn]"
     ) from missing
 
 SETTINGS = {
@@ -200,11 +201,13 @@ def fit_regression(
         weight = np.ones(len(y))
     counted = weight > 0.0
     if not counted.any():
-        raise InputError("the sample weights are all zero; at least one row must count")
+        raise InputError("sample_weight is 0 in every row: at least one must be > 0")
     X, y, weight = X[counted], y[counted], weight[counted]
     largest = max(float(np.abs(X).max()), float(np.abs(y).max()))
     if largest > LARGEST:
-        raise InputError(f"the data hold {largest:.3g}; the limit is {LARGEST:g}. Use other units")
+        raise InputError(
+            f"the largest absolute value is {largest:.3g}: must be at most {LARGEST:g}. Use other units"
+        )
     if scale := ForceScale.of(y, options):
         columns, scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
         return columns, scaled.unscaled(scale)
@@ -215,7 +218,9 @@ def fit_regression(
     if not varies.any():
         lower, upper = lower - 0.5 * _unit(lower), upper + 0.5 * _unit(upper)
     if options.criterion in ON_HELD_OUT_ROWS and not held_out_rows(len(y), None).any():
-        raise InputError(f"criterion {options.criterion!r} holds rows out; {len(y)} are too few for that")
+        raise InputError(
+            f"criterion is {options.criterion!r}: needs held-out rows, and {len(y)} rows are too few"
+        )
     names = tuple(f"x{column}" for column in columns)
     rows = Rows(names, X[:, columns], y, weight=weight, corners=(lower, upper))
     with threadpool_limits(limits=1, user_api="blas"):
@@ -248,14 +253,14 @@ def _validated(estimator: WaveletNetworkRegressor, X: object, *y: object, **chec
     """X and y as scikit-learn validates them; its ValueError becomes an InputError that names them."""
     for name, values in zip("Xy", (X, *y), strict=False):
         if np.ma.is_masked(values):
-            raise InputError(f"{name} is a masked array; leave the masked rows out of X, y and sample_weight")
+            raise InputError(f"{name} is a masked array; remove the masked rows from X, y and sample_weight")
     try:
         return validate_data(estimator, X, *y, **checks)
     except InputError:
         raise
     except ValueError as error:
-        told = " ".join(str(error).split())[:300]
-        raise InputError(f"X{' or y' if y else ''} cannot be used: {told}") from None
+        reason = " ".join(str(error).split())[:300]
+        raise InputError(f"X{' or y' if y else ''} cannot be used: {reason}") from None
 
 
 def _plain(value: Any) -> Any:
@@ -270,12 +275,12 @@ def _weights(sample_weight: npt.ArrayLike, n: int) -> Float1D:
             raise TypeError
         weight = given.astype(np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"sample_weight is {shown(sample_weight)}; it must hold real numbers") from None
+        raise InputError(f"sample_weight is {shown(sample_weight)}: must contain real numbers") from None
     if weight.shape != (n,):
-        raise InputError(f"sample_weight has shape {weight.shape}; it must be ({n},), one for each row of X")
+        raise InputError(f"sample_weight has shape {weight.shape}: must be ({n},), one for each row of X")
     if not np.isfinite(weight).all() or (weight < 0).any():
         wrong = weight[~np.isfinite(weight) | (weight < 0)][0]
-        raise InputError(f"sample_weight holds {wrong}; every weight must be a finite number of 0 or more")
+        raise InputError(f"sample_weight contains {wrong}: every weight must be a finite number >= 0")
     return weight
 
 

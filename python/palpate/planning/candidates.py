@@ -126,22 +126,24 @@ class Task:
             for word, value in (("mass", self.mass), ("damping", self.object_damping))
             if value
         ]
-        return Refusal(f"the object has {' and '.join(parts)}, which it would leave out")
+        return Refusal(f"the object has {' and '.join(parts)}, which this structure cannot render")
 
     def not_direct(self) -> Refusal | None:
         """Refuses direct rendering for an object with mass, or if a coupling is required."""
-        return self.not_static() or (Refusal("a coupling was asked for") if self.coupling else None)
+        return self.not_static() or (
+            Refusal("a coupling is required, and this structure has none") if self.coupling else None
+        )
 
     def only_direct(self) -> Refusal | None:
         """Refuses a prediction: only the direct structure of the identified model supports it."""
         if not self.predict:
             return None
         return Refusal(
-            f"it has no prediction of the model as it was identified, and predict is {self.predict}"
+            f"predict is {self.predict}: only direct rendering of the identified model has a prediction"
         )
 
 
-_NOT_LIMITED = Refusal("the model is to be rendered as it was identified")
+_NOT_LIMITED = Refusal("the identified model must be rendered without changes")
 
 
 def _direct(task: Task) -> Candidate | Refusal:
@@ -174,7 +176,7 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
         else _within(task.model, low, high, task.device)
     )
     if limited is None:
-        return Refusal(f"no network was found whose slopes lie between {low:.4g} and {high:.4g}")
+        return Refusal(f"no network with slopes between {low:.4g} and {high:.4g} was found")
     return _predicted(task.certified(task.direct_scheme(limited), limited), task)
 
 
@@ -183,7 +185,7 @@ def _massless(task: Task) -> Candidate | Refusal:
     if refusal := task.not_static():
         return refusal
     if not task.coupling:
-        return Refusal("no coupling was asked for, and none makes a steeper slope possible")
+        return Refusal("no coupling is required, and a coupling does not allow steeper slopes")
     model, device = task.model, task.device
     damping = task.coupling_damping or 0.0
     stiffness = task.coupling_stiffness
@@ -212,16 +214,16 @@ def _massless(task: Task) -> Candidate | Refusal:
         return _NOT_LIMITED
     limited = _within(balanced, low, high, device)
     if limited is None:
-        return Refusal(f"no network was found whose slopes lie below {highest:.4g} = {compensated_share} K_c")
+        return Refusal(f"no network with slopes below {highest:.4g} = {compensated_share} K_c was found")
     return task.certified(scheme, limited)
 
 
 def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
     """Renders the model with its mass behind a coupling."""
     if not task.dynamic:
-        return Refusal("the object has no mass or damping of its own")
+        return Refusal("the object has no mass and no damping")
     if not task.mass:
-        return Refusal("the object has damping but no mass; give one with mass")
+        return Refusal("the object has damping but no mass: give mass")
     damping = task.coupling_damping
     if damping is None:
         damping = _COUPLING_DAMPING * task.device.viscous_damping
@@ -229,7 +231,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
     if stiffness is None:
         stiffness = stiffest_coupling(coupling_damping=damping, falling=0.0, device=task.device)
     if stiffness <= 0.0:
-        return Refusal(f"the device's damping {task.device.viscous_damping:.4g} holds no coupling")
+        return Refusal(f"device damping is {task.device.viscous_damping:.4g}: too small for any coupling")
     return task.certified(
         Scheme(
             structure=structure,
@@ -268,7 +270,7 @@ def _of_position(propose: Propose) -> Propose:
         if not task.model.of_velocity:
             return propose(task)
         return Refusal(
-            "of a force of position and velocity no bound is known but for direct rendering as it is"
+            "the force depends on velocity: only direct rendering of the identified model has known bounds"
         )
 
     return guarded
@@ -284,7 +286,7 @@ class CandidateStructure:
 
 
 CANDIDATES: Mapping[str, CandidateStructure] = {
-    "direct": CandidateStructure("the model as it was identified", _direct),
+    "direct": CandidateStructure("the identified model", _direct),
     "direct, slope limited": CandidateStructure(
         "the nearest force that the device can render", _of_position(_direct_limited)
     ),
@@ -298,7 +300,7 @@ CANDIDATES: Mapping[str, CandidateStructure] = {
         "if the force falls too steeply for implicit",
         _of_position(lambda task: _with_mass("energy-consistent", task)),
     ),
-    "explicit": CandidateStructure("stable at best", _of_position(_explicit)),
+    "explicit": CandidateStructure("stable, but not certified as passive", _of_position(_explicit)),
 }
 """Candidate structures in the order in which they are tried"""
 
@@ -325,9 +327,9 @@ def _predicted(found: Candidate, task: Task) -> Candidate:
 
 def _no_slope(device: DeviceProfile) -> Refusal:
     return Refusal(
-        f"the device can hold no slope at all: friction {device.coulomb_friction:.4g}, damping "
-        f"{device.viscous_damping:.4g}, encoder step {device.encoder_step:.4g}, "
-        f"force step {device.force_step:.4g}"
+        f"the device can render no slope: device friction {device.coulomb_friction:.4g}, device damping "
+        f"{device.viscous_damping:.4g}, encoder step {device.encoder_step:.4g}, force step "
+        f"{device.force_step:.4g}"
     )
 
 

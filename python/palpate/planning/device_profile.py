@@ -129,7 +129,7 @@ def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) ->
     file = profile_file(os.fspath(device))
     if not file.exists() and file == Path(file.name) and not file.suffix:
         raise InputError(
-            f"device is '{device}': there is no such file, and no such example; {_example_names()}"
+            f"device is '{device}': must be the path of an existing TOML file, or {_example_names()}"
         )
     return DeviceProfile.load(file)
 

@@ -122,7 +122,7 @@ class Plan:
         """
         instance_of("model", model, Model, "make one with palpate.load_model")
         if model.plan is None:
-            raise InputError("the model has no plan; make one with palpate plan")
+            raise InputError("the model has no plan: make one with palpate plan")
         rendered = model.planned
         certificate = None
         if model.certificate is not None:
@@ -145,7 +145,7 @@ class Plan:
             The verdict on the plan is no.
         """
         if self.verdict.level == "no":
-            raise InputError(f"a plan is not stored whose verdict is {self.verdict}")
+            raise InputError(f"a plan with verdict no is not stored: {self.verdict}")
         content = self.model.to_dict()
         content["plan"] = self.record()
         content["certificate"] = None if self.certificate is None else certificate_record(self.certificate)
@@ -219,7 +219,7 @@ class Plan:
         if scheme.has_mass:
             rows["object"] = f"mass {scheme.mass:.4g}, damping {scheme.object_damping:.4g}"
         if scheme.predict:
-            rows["prediction"] = f"half a sample ahead, from {scheme.predict} samples before"
+            rows["prediction"] = f"half a sample ahead, from {scheme.predict} previous samples"
         if scheme.play_radius:
             rows["play radius"] = f"{scheme.play_radius:.4g}"
         return rows
@@ -245,11 +245,11 @@ class Plan:
 
     def _certificate_findings(self) -> tuple[Finding, ...]:
         if self.certificate is None:
-            return (usable("nothing is proved of this plan; palpate plan certifies one for a device"),)
+            return (usable("the plan has no certificate: make a plan for a device with palpate plan"),)
         if self.certificate.refused:
-            cure = f"the object {self.needs}; " if self.needs else ""
-            reasons = "; ".join(self.refused) or self.certificate.reason
-            return (no(f"no structure holds on this device: {cure}{reasons}"),)
+            cure = f"; the object {self.needs}" if self.needs else ""
+            reason = "" if self.needs else f": {self.certificate.reason}"
+            return (no(f"no structure can render the model on this device{cure}{reason}"),)
         if not self.certificate.certified:
             cure = f"; for a certificate the object {self.needs}" if self.needs else ""
             return (
@@ -265,19 +265,19 @@ class Plan:
         if error.share <= FORCE_FLOOR:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
-        told = (
-            f"the felt force is up to {error.largest:.3g} {unit} away from the identified force, "
+        difference = (
+            f"the felt force differs from the identified force by up to {error.largest:.3g} {unit}, "
             f"{_percent(error.share)} of its range"
         )
         if error.share <= ACCEPTED_FORCE_ERROR:
-            return (usable(told),)
+            return (usable(difference),)
         if error.share <= self.accept_force_error:
-            return (usable(f"{told}, which was accepted"),)
+            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} are accepted"),)
         cause = f"; the object {self.needs}" if self.needs else ""
         share = math.ceil(100.0 * error.share) / 100.0
         return (
             no(
-                f"{told}; at most {_percent(self.accept_force_error)} are accepted{cause}; "
+                f"{difference}; at most {_percent(self.accept_force_error)} are accepted{cause}; "
                 f"to accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
             ),
         )

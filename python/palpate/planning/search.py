@@ -91,13 +91,13 @@ def plan(
     unit = model.units["position"]
     if unit not in ("", device.position_unit):
         raise InputError(
-            f"the device {device.id} moves in {device.position_unit}, the model in {unit}; "
-            f"a force over {unit} needs a device whose position_unit is {unit}"
+            f"position_unit of the device {device.id} is {device.position_unit}: must be {unit}, the "
+            "position unit of the model"
         )
     if model.units["force"] not in ("", _FORCE_UNIT[device.position_unit], "A"):
         raise InputError(
-            f"the device {device.id} makes {_FORCE_UNIT[device.position_unit]}, the model's force is in "
-            f"{model.units['force']}"
+            f"the force unit of the model is {model.units['force']}: must be "
+            f"{_FORCE_UNIT[device.position_unit]}, that of the device {device.id}"
         )
     require_force(model)
     task = Task(
@@ -113,13 +113,13 @@ def plan(
     )
     if model.of_velocity and (task.coupling or task.dynamic):
         raise InputError(
-            "a force of position and velocity is rendered directly: behind a coupling, or with a mass or "
-            "damping beside it, no bound is known"
+            "the model has position and velocity as inputs: it can only be rendered directly, without "
+            "coupling, mass and damping"
         )
     if samples and (model.of_velocity or task.coupling or task.dynamic):
         raise InputError(
-            f"predict is {samples}: must be 0 (off) for a coupling, a mass, a damping or a force of "
-            "velocity; a prediction is certified for direct rendering of a force of position"
+            f"predict is {samples}: must be 0 (off) with a coupling, mass, damping or velocity input; a "
+            "prediction is certified only for direct rendering of a force of position"
         )
     refused: list[str] = []
     chosen: Candidate | None = None
@@ -228,7 +228,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
             other = least(*otherwise)
             return f"needs {need}" + (f", or {other}" if other else "")
     if task.coupling_stiffness is not None:
-        return f"needs another coupling stiffness than {task.coupling_stiffness:.4g}"
+        return f"needs a coupling stiffness other than {task.coupling_stiffness:.4g}"
     return ""
 
 

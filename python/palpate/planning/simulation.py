@@ -20,6 +20,7 @@ from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
+from ..recording.comparison import amount
 from ..recording.units import COLUMN_SUFFIX
 from ..verdict import Finding, Verdict, no, usable
 from .plan import Plan, describe
@@ -158,7 +159,9 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
     suffix = _suffix(plan.model.units["position"])
     period = rendered.sample_period
     if period is None:
-        raise InputError("a rendering of one tick has no force error; simulate a longer time")
+        raise InputError(
+            "the rendering has one tick: the force error needs at least 2; simulate a longer time"
+        )
     errors = _core.simulation.force_error(
         plan.model,
         plan.scheme.play_radius,
@@ -199,10 +202,13 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
     status = Counter(rendered.columns["status"])
     ticks = len(rendered)
     if failed := status["NonFinite"]:
-        return Verdict((no(f"the rendering ran away: {failed} of {ticks} ticks had no finite force"),))
+        return Verdict((no(f"the rendering diverged: {failed} of {ticks} ticks had no finite force"),))
     lower, upper = float(rendered.position.min()), float(rendered.position.max())
+    position_unit = plan.model.units["position"]
     if not rendered.force.any():
-        still = no(f"every force was zero: the handle stayed between {lower:.4g} and {upper:.4g}")
+        still = no(
+            f"every force was zero: the handle stayed between {lower:.4g} and {amount(upper, position_unit)}"
+        )
         return Verdict((still,))
     domain = float(plan.model.upper[0]) - float(plan.model.lower[0])
     covered = (upper - lower) / domain
@@ -211,7 +217,10 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         findings.append(no("the handle did not move: simulate a longer time, or a stiffer hand"))
     elif covered < smallest_domain_share:
         findings.append(
-            usable(f"the handle covered {100 * covered:.3g} % of the model's domain: simulate a longer time")
+            usable(
+                f"the handle covered {100 * covered:.3g} % of the model's domain, at least "
+                f"{100 * smallest_domain_share:.3g} % are needed: simulate a longer time"
+            )
         )
     span = force_range(plan)
     share = error.end / span if span > 0 else 0.0
@@ -219,16 +228,16 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         level = no if share > plan.accept_force_error else usable
         findings.append(
             level(
-                f"the force error is {100 * share:.3g} % of the object's force range: "
-                "choose a structure with palpate plan, or a stiffer coupling"
+                f"the force error is {100 * share:.3g} % of the object's force range, above "
+                f"{100 * _TOLERATED_ERROR:.3g} %: choose a structure with palpate plan, or a stiffer coupling"
             )
         )
     outside = int(rendered.columns["extrapolated"].sum())
     unsolved = status["MaxIterations"] + status["NotUnique"]
     for count, sentence in (
-        (outside, "lay outside the model's data: identify the model over a larger range"),
-        (unsolved, "did not solve the load line: choose the structure with palpate plan"),
-        (status["Limited"], "clipped the force to the device's limit: a stronger device is needed"),
+        (outside, "were outside the domain of the model: identify the model over a larger range"),
+        (unsolved, "had no unique solution of the load line: choose the structure with palpate plan"),
+        (status["Limited"], "limited the force to that of the device: a stronger device is needed"),
     ):
         if count > tolerated_change * ticks:
             findings.append(usable(f"{count} of {ticks} ticks ({100 * count / ticks:.3g} %) {sentence}"))
@@ -255,7 +264,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
         Force [N*m or N].
     """
     if period_s is None and plan.model.of_velocity:
-        raise InputError("the force depends on the velocity: period_s must be given")
+        raise InputError("period_s is None: must be given for a force that depends on velocity")
     exact = Scheme(structure="direct", play_radius=plan.scheme.play_radius)
     force: Float1D = motion_driven(plan.model, exact, position, period_s or 1.0)["force"]
     return force

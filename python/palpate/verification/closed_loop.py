@@ -131,8 +131,7 @@ def force_driven(
     default = scheme or Scheme(structure="explicit")
     if default.structure not in ("explicit", "implicit"):
         raise InputError(
-            f"structure is {default.structure}; a recorded force drives an explicit or an implicit "
-            "environment"
+            f"structure is {default.structure}: must be explicit or implicit for a recorded force"
         )
     radius = default.play_radius or default_play_radius(model, 0.0)
     scheme = Scheme(**{**default.to_dict(), "play_radius": radius})
@@ -142,9 +141,9 @@ def force_driven(
     if scheme.structure == "explicit" and not steepest < limit:
         scheme = Scheme(**{**scheme.to_dict(), "structure": "implicit"})
         notes = (
-            f"the implicit environment is used: with mass {scheme.mass:g} and object damping "
+            f"The implicit environment is used: with object mass {scheme.mass:g} and object damping "
             f"{scheme.object_damping:g} the explicit one is stable below a slope of {limit:.4g}, and the "
-            f"model reaches {steepest:.4g}",
+            f"steepest slope of the model is {steepest:.4g}.",
         )
 
     def run(_position: Float1D, force: Float1D) -> dict[str, Any]:
@@ -170,7 +169,7 @@ def _closed_loop(
     if motion.assumed_speed is not None:
         unit = recording.units["position"] or "SI"
         notes += (
-            f"the recording has no time: a stroke speed of {motion.assumed_speed:.4g} {unit}/s is assumed",
+            f"The recording has no time. A stroke speed of {motion.assumed_speed:.4g} {unit}/s is assumed.",
         )
     try:
         result = run(motion.position, motion.force)
@@ -240,14 +239,14 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     require_period(period_s)
     if recording.time is not None:
         if stroke_speed is not None:
-            raise InputError("a stroke speed was given, but the recording has a time of its own")
+            raise InputError("stroke_speed is given, but the recording has time: omit stroke_speed")
         return _sampled(recording, recording.time - recording.time[0], period_s, None)
     travel = float(np.ptp(recording.position))
     if travel == 0:
-        raise InputError("the recording does not move, so no time can be assumed for it")
+        raise InputError("the position of the recording is constant: no time can be assumed")
     speed = travel / ASSUMED_STROKE_S if stroke_speed is None else stroke_speed
     if not 0 < speed < np.inf:
-        raise InputError(f"stroke_speed is {speed}; it must be > 0 and finite")
+        raise InputError(f"stroke_speed is {speed}: must be > 0 and finite")
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(recording.position)))])
     with np.errstate(over="ignore"):  # a motion of infinite length is refused below
         time = way / speed
@@ -257,7 +256,7 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
 def require_period(period_s: float) -> None:
     """Refuses a sample time that is not positive."""
     if not 0 < period_s < np.inf:
-        raise InputError(f"period_s is {period_s}; it must be > 0 and finite")
+        raise InputError(f"period_s is {period_s}: must be > 0 and finite")
 
 
 def _sampled(recording: Recording, time: Float1D, period_s: float, assumed_speed: float | None) -> EvenMotion:
@@ -270,7 +269,7 @@ def _sampled(recording: Recording, time: Float1D, period_s: float, assumed_speed
     last = np.append(np.diff(time) > 0, True)
     samples = int(time[-1] / period_s * (1 + 1e-12)) + 1
     if samples < 2:
-        raise InputError(f"the recording lasts {time[-1]:g} s, less than two samples of {period_s:g} s")
+        raise InputError(f"the recording lasts {time[-1]:g} s: must be at least one sample of {period_s:g} s")
     grid: Float1D = np.arange(samples, dtype=np.float64) * period_s
     return EvenMotion(
         time=grid,

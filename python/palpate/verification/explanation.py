@@ -77,24 +77,24 @@ def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanat
     """Yields the sign, an offset and a factor of the force."""
     yield Explanation(
         _share(modelled + force, force),
-        "the recording fits with the sign of its force turned; give --negate force",
+        "the model fits with the opposite sign of the recorded force: give --negate force",
         order=0,
     )
     offset = float(np.mean(force - modelled))
     yield Explanation(
         _share(modelled - (force - offset), force),
-        f"the recording fits with its force less {amount(offset, unit)}, as if the sensor had an offset; "
-        "give --zero START:STOP, the rows without contact",
+        f"the model fits if {amount(offset, unit)} is subtracted from the recorded force: the sensor may "
+        "have an offset. Give --zero START:STOP, the rows without contact",
         order=2,
     )
     factor = float(modelled @ force) / float(force @ force)
     if factor == 0.0 or float(np.std(modelled)) == 0.0:
         return
     known = _unit_of(factor, unit)
-    cause = f"as if {known}; name its unit with --units" if known else "as if the gain were another"
+    cause = f"{known}. Give its unit with --units" if known else "the gain may differ"
     yield Explanation(
         _share(modelled - factor * force, modelled),
-        f"the recording fits with its force x {factor:.4g}, {cause}",
+        f"the model fits if the recorded force is multiplied by {factor:.4g}: {cause}",
         order=3 if known else 6,
     )
 
@@ -113,24 +113,24 @@ def _of_position(
     if side is not None:
         yield Explanation(
             left(position, -side),
-            "the recording fits with press and release exchanged; check the words of its direction column",
+            "the model fits with press and release exchanged: check the words of the direction column",
             order=0,
         )
     yield Explanation(
         left(-position, None if side is None else -side),
-        "the recording fits with the sign of its position turned; give --negate position",
+        "the model fits with the opposite sign of the recorded position: give --negate position",
         order=1,
     )
     for symbol, other in UNITS.items():
         if other.si == unit and other.factor != 1.0:
             for factor, cause in (
-                (other.factor, f"it were in {symbol}"),
-                (1.0 / other.factor, f"it were in {unit}, not in {symbol}"),
+                (other.factor, f"it may be in {symbol}"),
+                (1.0 / other.factor, f"it may be in {unit}, not in {symbol}"),
             ):
                 yield Explanation(
                     left(factor * position, side),
-                    f"the recording fits with its position x {factor:.4g}, as if {cause}; name its unit with "
-                    "--units",
+                    f"the model fits if the recorded position is multiplied by {factor:.4g}: {cause}. Give "
+                    "its unit with --units",
                     order=4,
                 )
     # Search the offset on a grid over the travel, then on finer grids around the best one.
@@ -141,8 +141,8 @@ def _of_position(
         step *= 4.0 / (SHIFTS - 1)
     yield Explanation(
         left(position + best, side),
-        f"the recording fits with its position {'plus' if best > 0.0 else 'less'} "
-        f"{amount(abs(best), unit)}, as if its zero had moved; correct it in the file",
+        f"the model fits if {amount(abs(best), unit)} is {'added to' if best > 0.0 else 'subtracted from'} "
+        "the recorded position: its zero may have moved. Correct it in the file",
         order=5,
     )
 
@@ -152,7 +152,7 @@ def _unit_of(factor: float, unit: str) -> str | None:
     for symbol, other in UNITS.items():
         if other.si == unit and other.factor != 1.0:
             if abs(factor / other.factor - 1.0) < SAME_FACTOR:
-                return f"it were in {symbol}"
+                return f"it may be in {symbol}"
             if abs(factor * other.factor - 1.0) < SAME_FACTOR:
-                return f"it were in {unit}, not in {symbol}"
+                return f"it may be in {unit}, not in {symbol}"
     return None

@@ -147,16 +147,17 @@ def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
     for model in (first, second):
         if model.dimension > 1:
             raise InputError(
-                f"a model over {' and '.join(model.inputs)} has several inputs: two models are laid beside "
-                "each other along one position"
+                f"the inputs of a model are {' and '.join(model.inputs)}: must be position only for a "
+                "comparison"
             )
     if dict(first.units) != dict(second.units):
-        raise InputError(f"the models have different units, {first.units} and {second.units}")
+        raise InputError(f"the units of the models are {first.units} and {second.units}: must be equal")
     lower = max(float(first.lower[0]), float(second.lower[0]))
     upper = min(float(first.upper[0]), float(second.upper[0]))
     if lower >= upper:
         raise InputError(
-            f"the models share no position: one ends at {upper:.6g}, the other begins at {lower:.6g}"
+            f"the domains of the models have no common position: one ends at {upper:.6g}, the other begins "
+            f"at {lower:.6g}"
         )
     position = np.linspace(lower, upper, _POSITIONS)
     directions = {"press": 1, "release": -1} if first.hysteretic or second.hysteretic else {"": 1}

@@ -19,9 +19,9 @@ from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
-from ..recording.motion import GAP, acceleration, ordered_strokes, turns_of, velocity
+from ..recording.motion import GAP_RATIO, acceleration, ordered_strokes, turns_of, velocity
 
-NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are left out"
+NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are not compared."
 
 _UNSTATED = ""
 
@@ -66,7 +66,7 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
     """
     require_same_units(model, recording.units)
     if play_radius is not None and not (math.isfinite(play_radius) and play_radius > 0.0):
-        raise InputError(f"play_radius is {play_radius}; it must be a finite number above 0")
+        raise InputError(f"play_radius is {play_radius}: must be a finite number > 0")
     notes: tuple[str, ...] = ()
     if play_radius is None:
         recording, notes = with_strokes(model, recording)
@@ -79,8 +79,7 @@ def _moving(model: Model, recording: Recording, play_radius: float | None) -> Pr
     """Adds the force of mass and damping: m a + B v, with the time of the recording."""
     if recording.time is None:
         raise InputError(
-            "the model has a mass or a damping, which act on acceleration and velocity: "
-            "the recording needs time (--time NAME)"
+            "the recording has no time, which the mass or damping of the model needs: give --time NAME"
         )
     static = _static(model, recording, play_radius)
     total, known = np.zeros(len(recording)), np.ones(len(recording), dtype=bool)
@@ -103,7 +102,10 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
     if model.dimension > 1:
         X, rows = input_columns(recording, model.inputs)
         if not rows.any():
-            raise InputError("no row of the recording has the velocity that the model needs")
+            raise InputError(
+                "no row of the recording has a velocity, which the model needs: record a longer motion "
+                "without gaps"
+            )
         X = X[rows]
         outside = ((model.lower > X) | (model.upper < X)).any(axis=1)
         left_out = int(np.count_nonzero(~rows))
@@ -115,10 +117,10 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
     if flight.object_position is not None:
         position = flight.object_position
         notes = (
-            "the force is compared at the predicted position, half a sample ahead of the handle"
+            "The force is compared at the predicted position, half a sample ahead of the handle."
             if flight.predicted
-            else "the force is compared at the position of the virtual object: a virtual coupling lies "
-            "between it and the handle",
+            else "The force is compared at the position of the virtual object. A virtual coupling joins it to the "
+            "handle.",
         )
     side = None
     if not model.hysteretic:
@@ -147,11 +149,13 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
         rows = recording.direction != 0
         if not rows.any():
             raise InputError(
-                "no row of the recording has a direction, which the model needs; give --play-radius to take "
-                "it from the motion"
+                "no row of the recording has a direction, which the model needs; give --play-radius to "
+                "compute it from the motion"
             )
         left_out = int(np.count_nonzero(~rows))
-        resting = (f"{left_out} rows without a direction (pause, hold) are left out",) if left_out else ()
+        resting = (
+            (f"{left_out} rows without a direction (pause, hold) are not compared.",) if left_out else ()
+        )
         return _State(recording.direction.astype(float), rows, resting)
     radius, origin = _radius(model, flight, play_radius)
     if flight.object_position is None or flight.predicted:
@@ -161,12 +165,12 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
     play = HysteresisInput.of_play(np.split(whole.position, _gaps(whole.time)), radius)
     known = play.known[whole.rows]
     unit = f" {model.units['position']}" if model.units["position"] else ""
-    why = "there is no direction" if recording.direction is None else "the direction is not used"
+    why = "There is no direction" if recording.direction is None else "The direction is not used"
     notes: tuple[str, ...] = (
-        f"{why}: the play operator follows the positions with a radius of {radius:.4g}{unit}, {origin}",
+        f"{why}: the play operator follows the positions. Its radius is {radius:.4g}{unit}, {origin}.",
     )
     if left_out := int(np.count_nonzero(~known)):
-        notes += (f"{left_out} rows before the motion has covered the play are left out",)
+        notes += (f"{left_out} rows before the motion has covered twice the play radius are not compared.",)
     side = play.side[whole.rows]
     if flight.predicted and flight.object_position is not None:
         # The play operator follows the handle; the force is that of a trial move from its position.
@@ -185,7 +189,9 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
     ):
         if radius:
             return float(radius), origin
-    return default_play_radius(model, 0.0), "1 % of the travel: neither recording nor model states one"
+    return default_play_radius(
+        model, 0.0
+    ), "1 % of the travel, because neither the recording nor the model has one"
 
 
 def _gaps(time: Float1D | None) -> NDArray[np.intp]:
@@ -193,7 +199,7 @@ def _gaps(time: Float1D | None) -> NDArray[np.intp]:
     if time is None or len(time) < 2:
         return np.empty(0, dtype=np.intp)
     steps = np.diff(time)
-    return np.flatnonzero(steps > GAP * np.median(steps)) + 1
+    return np.flatnonzero(steps > GAP_RATIO * np.median(steps)) + 1
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:
@@ -201,8 +207,8 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
     for role in ("position", "force"):
         ours, theirs = model.units[role], units[role]
         if ours != theirs and _UNSTATED not in (ours, theirs):
-            hint = "; give --torque-constant-Nm-per-A for the one in A" if "A" in (ours, theirs) else ""
-            raise InputError(f"the model's {role} is in {ours}, the recording's in {theirs}{hint}")
+            hint = "; give --torque-constant-Nm-per-A for the current" if "A" in (ours, theirs) else ""
+            raise InputError(f"the {role} of the model is in {ours}, that of the recording in {theirs}{hint}")
 
 
 @dataclass(frozen=True)
@@ -247,7 +253,7 @@ def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[s
         return recording, ()
     turns = turns_of(direction)
     if turns:
-        note = f"direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}"
+        note = f"The direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}."
         return replace(recording, direction=direction), (note,)
 
     def error(side: int) -> float:
@@ -256,5 +262,5 @@ def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[s
 
     side = 1 if error(1) <= error(-1) else -1
     word = "press" if side > 0 else "release"
-    note = f"the position never turns back: all rows are taken as {word}, whose force in the model is nearer"
+    note = f"The position never turns back. All rows are taken as {word}, whose model force is nearer."
     return replace(recording, direction=np.full(len(recording), side, dtype=np.int8)), (note,)

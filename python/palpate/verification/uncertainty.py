@@ -78,11 +78,12 @@ def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Un
     """
     if model.dimension != 1 or model.mass is not None or model.damping is not None:
         raise InputError(
-            "standard errors are known for models of position and stroke; this one has more inputs"
+            f"the inputs of the model are {', '.join(model.inputs)}, or it has mass or damping: standard "
+            "errors need position as the only input"
         )
     parts = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if model.hysteretic and any(part.direction is None for part in parts):
-        raise InputError("standard errors of a hysteresis model need recordings with directions")
+        raise InputError("a recording has no direction, which the standard errors of a hysteresis model need")
     gram, squares, lagged, n = None, 0.0, 0.0, 0
     for part in parts:
         found = verify(model, part)
@@ -95,7 +96,7 @@ def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Un
         lagged += float(found.residual[:-1] @ found.residual[1:])
         n += len(found.residual)
     if gram is None or n <= len(gram):
-        raise InputError(f"there are {n} rows; standard errors of the model's parameters need more")
+        raise InputError(f"there are {n} rows: standard errors need more rows than parameters")
     variance = squares / (n - len(gram))
     rho = min(max(lagged / squares, 0.0), LARGEST_RHO) if squares > 0 else 0.0
     covariance = variance * (1.0 + rho) / (1.0 - rho) * _inverse(gram)

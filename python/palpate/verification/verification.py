@@ -17,7 +17,8 @@ from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
-from ..recording.reading import Given, recording_from
+from ..recording.comparison import amount
+from ..recording.reading import RecordingLike, recording_from
 from ..verdict import FORCE_JND, GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
 from .metrics import (
@@ -97,7 +98,7 @@ class Verification:
 
 def verify(
     model: Model,
-    recording: Given | npt.ArrayLike,
+    recording: RecordingLike | npt.ArrayLike,
     force: npt.ArrayLike | None = None,
     *,
     time: npt.ArrayLike | None = None,
@@ -140,13 +141,13 @@ def verify(
     reference = recording.force[rows]
     residual = prediction.force - reference
     if not np.isfinite(residual).all():
-        raise InputError("the model's force is not a finite number at every row of the recording")
+        raise InputError("the force of the model is not finite in every row of the recording")
     rmse = root_mean_square(residual)
     nrmse = normalised(rmse, reference)
     fresh = is_fresh(model.data, recording.source)
     notes = prediction.notes
     if not fresh:
-        notes += ("the model was identified on this data: this is not a fresh recording",)
+        notes += ("The model was identified on this data: this is not a fresh recording.",)
     found = Verification(
         nrmse=nrmse,
         rmse=rmse,
@@ -210,7 +211,7 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
     if not found.fresh:
         findings.append(
             usable(
-                "the model was identified on this data, so the error says nothing about other data; verify "
+                "the model was identified on this data, and the error on other data may be larger: verify "
                 "with another recording, or identify with --hold-out-every 5"
             )
         )
@@ -220,7 +221,7 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
         findings.append(
             judge(
                 f"{found.extrapolated} of {found.n} rows ({outside:.0%}) lie outside the model's domain"
-                f"{_domain(model)}; there the force is only continued: identify on a recording of this range"
+                f"{_domain(model)}, where the force is extrapolated: identify on a recording of this range"
             )
         )
     if flight_of(recording).object_position is not None:
@@ -230,13 +231,17 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
         if felt > USABLE_NRMSE:
             findings.append(
                 usable(
-                    f"at the position of the handle the NRMSE is {felt:.3g}: the virtual coupling is softer "
-                    "than the object; plan the model with palpate plan, or render with --structure direct"
+                    f"at the position of the handle the NRMSE is {felt:.3g}, above {USABLE_NRMSE:g}: the "
+                    "virtual coupling is softer than the object. Plan the model with palpate plan, or "
+                    "render with --structure direct"
                 )
             )
     if found.n < FEW_COMPARED * len(recording):
         findings.append(
-            usable(f"only {found.n} of {len(recording)} rows were compared: {'; '.join(found.notes)}")
+            usable(
+                f"only {found.n} of {len(recording)} rows were compared, fewer than {FEW_COMPARED:.0%}: "
+                f"{' '.join(found.notes)}"
+            )
         )
     return findings
 
@@ -251,15 +256,16 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
         elif found.whiteness > STRUCTURED:
             findings.append(
                 usable(
-                    f"neighbouring rows err alike (correlation {found.whiteness:.2g}): the force depends on "
-                    "something that the model does not have, such as velocity, hysteresis or another input"
+                    f"the errors of neighbouring rows are correlated ({found.whiteness:.2g}, above "
+                    f"{STRUCTURED:g}): the force depends on an input that the model does not have, such as "
+                    "velocity, hysteresis or another column"
                 )
             )
     if found.within_jnd < FELT:
         findings.append(
             usable(
-                f"a hand feels the error in {1.0 - found.within_jnd:.0%} of the rows: it is larger than "
-                f"{FORCE_JND:.0%} of the force there"
+                f"a hand feels the error in {1.0 - found.within_jnd:.0%} of the rows: it is larger than the "
+                f"just noticeable difference, {FORCE_JND:.0%} of the force"
             )
         )
     return findings
@@ -268,4 +274,4 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
 def _domain(model: Model) -> str:
     if model.dimension > 1:
         return ""
-    return f" from {float(model.lower[0]):.4g} to {float(model.upper[0]):.4g}"
+    return f" from {float(model.lower[0]):.4g} to {amount(float(model.upper[0]), model.units['position'])}"

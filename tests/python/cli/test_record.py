@@ -122,7 +122,7 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], 
         ([], ["--no-transducer"], "EMU-1 has no force transducer"),
         (["--probe"], [], "a probe on a real device needs upper"),
         (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6, the device makes 5"),
-        (["--object", OBJECT], [], "an object is mounted on the simulated device only; usb has its own"),
+        (["--object", OBJECT], [], "an object needs device simulated; usb has a real one"),
         ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
     ],
 )

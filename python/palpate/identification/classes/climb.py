@@ -16,9 +16,11 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import InputError
+from ...recording.comparison import amount
 from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
+from ..decision import in_words
 from ..network.basis import Basis
 from ..network.constraints import Bound, crossing, domain_bounds, impose, moved_to_bounds
 from ..network.separable import SeparableProblem, Solution
@@ -83,7 +85,7 @@ class Climb:
         self.spread = float(np.std(data.force)) or 1.0
         given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))
         if self.samples.used < given:
-            self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread")
+            self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread.")
         self.best = constant(self)
         """The candidate of the highest class that the judge accepted"""
         self.take(classes)
@@ -172,17 +174,27 @@ class Climb:
             trial = impose(problem, problem.solve(regrown.solution.basis), bounds)
             if self._judged_on(regrown.problem, trial) < self._judged_on(regrown.problem, kept):
                 kept = trial
-        names = " and ".join(dict.fromkeys(bound.name for bound in bounds))
-        price = f"RMS error {problem.rmse(kept):.4g} with, {candidate.rmse:.4g} without"
-        crossed = ""
-        if options.hysteresis_nonnegative:
-            lower, reach = float(self.data.lower[0]), float(self.data.reach[0])
-            crossed = crossing(problem, candidate.solution, lower, reach)
-        self.report.notes.append(
-            f"{candidate.model_class}: {names} imposed over the domain, {price}{crossed}"
-        )
+        self.report.notes.append(self._cost_of(bounds, candidate, problem.rmse(kept)))
         more = problem.n_parameters(len(kept.basis)) - problem.n_parameters(candidate.n_wavelets)
         return replace(candidate, solution=kept, n_parameters=candidate.n_parameters + more)
+
+    def _cost_of(self, bounds: Sequence[Bound], free: Candidate, rmse: float) -> str:
+        """Sentences on imposed bounds: their cost, and the largest height of release above press."""
+        names, unit = " and ".join(dict.fromkeys(bound.name for bound in bounds)), self.data.force_unit
+        note = (
+            f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS error "
+            f"from {amount(free.rmse, unit)} to {amount(rmse, unit)}."
+        )
+        above = crossing(free.problem, free.solution) if self.options.hysteresis_nonnegative else None
+        if above is None:
+            return note
+        lower, reach, position = float(self.data.lower[0]), float(self.data.reach[0]), self.data.position_unit
+        return (
+            f"{note} Without this constraint release is up to {amount(above.height, unit)} above press between "
+            f"{amount(lower + reach * above.start, position)} and "
+            f"{amount(lower + reach * above.end, position)}; a passive object cannot do that. The force may "
+            "be recorded late: try --force-late-s."
+        )
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
         """The bounds that the options require."""
@@ -207,7 +219,8 @@ class Climb:
         (place, fixed), lower, reach = self.options.fixed_force, self.data.lower[0], self.data.reach[0]
         if not lower <= place <= lower + reach:
             raise InputError(
-                f"fixed_force is at {place:g}, outside the positions from {lower:g} to {lower + reach:g}"
+                f"fixed_force is at position {place:g}: must be within the recorded positions, {lower:g} to "
+                f"{lower + reach:g}"
             )
         return float((place - lower) / reach), fixed
 

@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
+from ...recording.comparison import amount
 from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.limits import RESOLVED
 from ..data.rows import Rows, modulo
+from ..decision import Decision, decided, signed, squared_error_change
 from ..network.basis import Basis
 from ..network.separable import TINY, solve_gram
 from ..options import IdentifyOptions
-from ..search.evidence import CRITERIA, ON_HELD_OUT_ROWS, Moving
+from ..search.evidence import CRITERIA, CRITERION_NAMES, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
 """Stretches of the recording that are held out one after the other."""
@@ -104,7 +106,8 @@ LEAST_SPREAD = 0.19
 """Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
 v is close to its sign, and damping cannot be distinguished from friction."""
 
-TOO_SHORT = "velocity and mass were not tested: the motion between gaps of time is too short, or too noisy"
+TOO_SHORT = "the motion between gaps of time is too short or too noisy"
+"""Reason for which damping and mass are not tested."""
 
 SLOW = 0.1
 """Speed at which the smoothed sign of the velocity is tanh(1), as a share of the RMS speed."""
@@ -133,8 +136,8 @@ class Dynamics:
         self._step = max(1, int(1.0 / (PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
-    def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[str]]:
-        """Which of damping and mass are accepted with f on these wavelets, and notes on each.
+    def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[Decision]]:
+        """Returns damping and mass, those that are accepted with f on these wavelets, and all decisions.
 
         Parameters
         ----------
@@ -145,14 +148,15 @@ class Dynamics:
         """
         regression = self._regression(basis, side)
         if regression is None:
-            return {}, [TOO_SHORT]
-        notes: list[str] = []
+            return {}, [Decision(name, "not tested", TOO_SHORT) for name in NAMES]
+        decisions: list[Decision] = []
         allowed: tuple[str, ...] = NAMES
         if (spread := self._spread_of_speeds()) < LEAST_SPREAD:
-            notes.append(
-                f"damping was not tested: the speed was nearly constant (varies by {100 * spread:.2g} %), so "
-                "that damping and hysteresis look alike; record slow and fast strokes"
+            reason = (
+                f"the speed was nearly constant: it varies by {100 * spread:.2g} %, at least "
+                f"{100 * LEAST_SPREAD:.2g} % is needed; record slow and fast strokes"
             )
+            decisions.append(Decision("damping", "not tested", reason))
             allowed = ("mass",)
         criterion = self._criterion
         valued = {
@@ -166,25 +170,32 @@ class Dynamics:
             with_it = tuple(other for other in allowed if other in names or other == name)
             without = tuple(other for other in with_it if other != name)
             falls = regression.value(use, without, criterion) - regression.value(use, with_it, criterion)
-            changes = (
-                f"{criterion} falls by {falls:.4g}" if falls > 0 else f"{criterion} rises by {-falls:.4g}"
-            )
+            change = f"{CRITERION_NAMES[criterion]} {signed(-falls)}"
             if name not in names:
-                notes.append(f"{name} refused: {changes}")
+                bound = f"must fall by at least {self._evidence:.4g}"
+                decisions.append(decided(name, False, f"{change}, {bound}"))
                 continue
             share, error = regression.held_out_gain(use, without, with_it)
             found = regression.solved(use, with_it)[name]
-            way = "falls" if share > 0.0 else "rises"
-            by = f"{100 * abs(share):.3g} +- {100 * error:.2g} %"
-            measured = f"the squared error on held-out stretches {way} by {by}"
+            measured = squared_error_change(share, error, "held-out stretches")
             if share > error and found > 0.0:
-                notes.append(f"{name} accepted: {changes}, {measured}")
+                decisions.append(decided(name, True, f"{measured}, {change}"))
                 continue
             names = tuple(other for other in names if other != name)
-            notes.append(
-                f"{name} refused: {changes}, but {measured if found > 0.0 else f'it would be {found:.4g}'}"
-            )
-        return regression.solved(use, names), notes
+            reason = f"{measured}, must fall by more than {100 * error:.2g} %"
+            if not found > 0.0:
+                reason = (
+                    f"its value is {amount(found, self._unit_of(name))}, a passive object needs more than 0"
+                )
+            decisions.append(decided(name, False, f"{reason}; {change}"))
+        return regression.solved(use, names), decisions
+
+    def _unit_of(self, name: str) -> str:
+        """Unit of damping or mass; empty if the units of force and position are not known."""
+        force, position = self._data.force_unit, self._data.position_unit
+        if not (force and position):
+            return ""
+        return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
 
     def values(self, basis: Basis, side: Float1D | None, names: Sequence[str]) -> dict[str, float]:
         """Values of these terms with f on these wavelets; empty where the motion is too short for them."""

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
+from ...recording.comparison import amount
 from ...recording.quality import findings_of
 from ...verdict import Finding, Verdict, no, usable
 from ..data.rows import period_notes
+from ..decision import latest
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
@@ -43,7 +45,12 @@ def error_findings(nrmse: float, rows: str) -> list[Finding]:
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
     explained = max(0.0, 1.0 - nrmse * nrmse)
-    return [judge(f"the NRMSE on {rows} is {nrmse:.3g}: the model explains {explained:.0%} of the force")]
+    return [
+        judge(
+            f"the NRMSE on {rows} is {nrmse:.3g}, a good model has at most {USABLE_NRMSE:g}: the model "
+            f"explains {explained:.0%} of the variance of the force"
+        )
+    ]
 
 
 def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> list[Finding]:
@@ -63,11 +70,11 @@ def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> li
     counted = min(distinct, round(network.independent_rows))
     subject = f"{rows} rows"
     if counted < rows:
-        subject = f"{counted} independent of {rows} rows (the others repeat them, or follow correlated noise)"
+        subject = f"{rows} rows ({counted} independent, the others repeat them or have correlated noise)"
     return [
         usable(
-            f"{subject} determine {network.n_parameters} parameters, {needed} would be needed to trust the "
-            "NRMSE: the error between the rows may be larger; record more rows, or verify the model on "
+            f"{subject} determine {network.n_parameters} parameters: {needed} rows are needed for a reliable "
+            "NRMSE. The error between the rows may be larger: record more rows, or verify the model on "
             "another recording"
         )
     ]
@@ -153,8 +160,9 @@ def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
     in_time = _explained(residual, np.arange(len(residual)) * BLOCKS // len(residual))
     if max(by_direction, in_time) < CAUSE:
         return (
-            "another input (a second position, a place on the object, velocity), or noise of the force",
-            "record the other inputs as columns and name them with --inputs, or identify each place alone",
+            "another input (a second position, the place on the object, velocity), or noise of the force",
+            "record the other inputs as columns and name them with --inputs, or identify each place "
+            "separately",
         )
     if by_direction >= in_time:
         return (
@@ -163,7 +171,7 @@ def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
         )
     return (
         "time: the force changes at a constant position (relaxation, creep or drift)",
-        "record continuous strokes without pauses, or cut the pauses off",
+        "record continuous strokes without pauses, or remove the pauses",
     )
 
 
@@ -179,7 +187,12 @@ def _explained(values: Float1D, group: NDArray[np.intp]) -> float:
 
 
 def explained_findings(
-    position: Float1D, force: Float1D, residual: Float1D, side: Float1D | None, nrmse: float
+    position: Float1D,
+    force: Float1D,
+    residual: Float1D,
+    side: Float1D | None,
+    nrmse: float,
+    force_unit: str = "",
 ) -> list[Finding]:
     """A finding if most of a model's error is force that position cannot explain.
 
@@ -191,6 +204,8 @@ def explained_findings(
         Direction, where the model has hysteresis.
     nrmse : float
         Of the model.
+    force_unit : str
+        For the message.
     """
     rows = _thinned(force)
     spread = float(np.var(force))
@@ -201,14 +216,14 @@ def explained_findings(
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
     share = max(0.0, 1.0 - least)
-    what = "position explains" if side is None else "position and direction explain"
+    inputs = "position explains" if side is None else "position and direction explain"
     cause, cure = likely_cause(position[rows], residual[rows])
     apart = float(np.sqrt(2.0 * least * spread))
     return [
         judge(
-            f"{what} at most {share:.0%} of the force: rows at neighbouring positions differ by "
-            f"{apart:.3g} RMS, so that no model of these inputs has an NRMSE below {np.sqrt(least):.2g}. "
-            f"Likely cause: {cause}. Cure: {cure}"
+            f"{inputs} at most {share:.0%} of the variance of the force: rows at neighbouring positions "
+            f"differ by {amount(apart, force_unit)} RMS. No model of these inputs has an NRMSE below "
+            f"{np.sqrt(least):.2g}. Likely cause: {cause}. Cure: {cure}"
         )
     ]
 
@@ -242,7 +257,7 @@ UNFIT_BEYOND = 1.0
 """The same, from which the model is unfit [-]."""
 
 
-def extreme_forces(error: RowError) -> list[Finding]:
+def extreme_forces(error: RowError, force_unit: str = "") -> list[Finding]:
     """A finding if few rows of extreme force hide a large error of all others."""
     rows = np.flatnonzero(error.weight > 0.0)
     if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
@@ -257,8 +272,9 @@ def extreme_forces(error: RowError) -> list[Finding]:
     return [
         judge(
             f"the NRMSE is {error.nrmse:.3g} over all rows, but {inner.nrmse:.3g} without the "
-            f"{EXTREME_SHARE:.0%} of most extreme force (|force| up to {np.abs(error.force).max():.3g}, "
-            f"the others span {np.ptp(error.force[kept]):.3g}): few large forces hide the error of the "
+            f"{EXTREME_SHARE:.0%} with the most extreme forces. These reach "
+            f"{amount(float(np.abs(error.force).max()), force_unit)}, the others have a range of "
+            f"{amount(float(np.ptp(error.force[kept])), force_unit)}, so that few rows hide the error of the "
             "others. If they are wrong readings, remove these rows or give --loss huber"
         )
     ]
@@ -272,7 +288,9 @@ def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
     return bool(error.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
 
 
-def beyond_rows(network: FittedNetwork, force: Float1D, *, repeats: bool) -> list[Finding]:
+def beyond_rows(
+    network: FittedNetwork, force: Float1D, *, repeats: bool, position_unit: str = "", force_unit: str = ""
+) -> list[Finding]:
     """A finding if a model of one input leaves the range of the recorded forces between the rows.
 
     A stroke begins with a play of 2 r, without sliding; a force that repeats is without such ends.
@@ -301,23 +319,32 @@ def beyond_rows(network: FittedNetwork, force: Float1D, *, repeats: bool) -> lis
     judge = no if share > UNFIT_BEYOND else usable
     return [
         judge(
-            f"between the rows the model's force reaches {value:.4g} at position {place:.4g}{stroke}, but "
-            f"the recorded forces lie between {force.min():.4g} and {force.max():.4g}. Likely cause: few "
-            "rows of that stroke near this position. Cure: record more strokes there, or give fewer "
-            "--max-wavelets"
+            f"between the rows the force of the model is {amount(value, force_unit)} at position "
+            f"{amount(place, position_unit)}{stroke}, but the recorded forces lie between {force.min():.4g} "
+            f"and {amount(float(force.max()), force_unit)}. Likely cause: few rows of that stroke near this "
+            "position. Cure: record more strokes there, or give a smaller --max-wavelets"
         )
     ]
 
 
-def disagreement(on_rows: RowError, on_cells: float, travel: float, cells: int) -> list[Finding]:
+def disagreement(
+    on_rows: RowError,
+    on_cells: float,
+    travel: float,
+    cells: int,
+    *,
+    position_unit: str = "",
+    force_unit: str = "",
+) -> list[Finding]:
     """A finding if the error on rows is far above the error on the cells that were fitted."""
     if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= DISAGREEMENT * on_cells:
         return []
     return [
         no(
-            f"the error is {on_rows.rmse:.3g} on the rows but {on_cells:.3g} on the cells that were fitted: "
-            f"the cells, 1/{cells} of the travel of {travel:.3g}, are wider than the force's structure. "
-            "Remove rows that stretch the travel, or raise max_positions"
+            f"the RMS error is {amount(on_rows.rmse, force_unit)} on the rows, but "
+            f"{amount(on_cells, force_unit)} on the fitted cells. The cells are too wide for this force: "
+            f"1/{cells} of the travel of {amount(travel, position_unit)}. Remove rows with wrong positions, "
+            "or increase max_positions"
         )
     ]
 
@@ -327,12 +354,12 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
-    period = "" if options.period or best.problem.dimension > 1 else ", or --period if it repeats"
+    period = "" if options.period or best.problem.dimension > 1 else ", or --period if the force repeats"
     spread = float(np.std(best.data.force)) or 1.0
     return [
         usable(
-            f"growth ended at the limit of {limit} wavelets and the error is still structured "
-            f"(NRMSE {best.rmse / spread:.3g}); give --max-wavelets {4 * limit}{period}"
+            f"the network has {limit} wavelets, the largest number allowed, and the error (NRMSE "
+            f"{best.rmse / spread:.3g}) is not yet noise; give --max-wavelets {4 * limit}{period}"
         )
     ]
 
@@ -343,19 +370,25 @@ def identified(climb: Climb) -> FittedNetwork:
     data, error, network = best.data, best.error, best.network
     single, counted = len(data.names) == 1, error.weight
     notes, findings = list(data.notes), list(data.findings)
+    decisions, replaced = latest([*report.decisions, *data.decisions])
     if data.period is not None:
-        note, of_period = period_notes(data.lower[0] + data.reach[0] * data.path[:, 0], data.period)
+        positions = data.lower[0] + data.reach[0] * data.path[:, 0]
+        note, of_period = period_notes(positions, data.period, data.position_unit)
         notes, findings = [*notes, note], findings + of_period
     findings += report.findings + limit_findings(best, options)
     if data.robust is not None:
-        findings += data.robust.findings(best.residual)
-    findings += extreme_forces(error)
-    findings += disagreement(best.error_on(data.weight), best.rmse, float(data.reach[0]), best.rows.cells)
-    findings += beyond_rows(network, data.force[counted > 0.0], repeats=data.period is not None)
+        findings += data.robust.findings(best.residual, data.force_unit)
+    units = {"position_unit": data.position_unit, "force_unit": data.force_unit}
+    findings += extreme_forces(error, data.force_unit)
+    on_rows, travel = best.error_on(data.weight), float(data.reach[0])
+    findings += disagreement(on_rows, best.rmse, travel, best.rows.cells, **units)
+    findings += beyond_rows(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
     if data.counted is None and single:
         rows = np.flatnonzero(counted)
         side, position = None if best.side is None else best.side[rows], data.domain[rows, 0]
-        findings += explained_findings(position, data.force[rows], best.residual[rows], side, error.nrmse)
+        findings += explained_findings(
+            position, data.force[rows], best.residual[rows], side, error.nrmse, data.force_unit
+        )
     near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(data.force[data.reported])))
     left_there = single and abs(best.at_lower) <= near_zero and data.period is None
     return replace(
@@ -364,6 +397,7 @@ def identified(climb: Climb) -> FittedNetwork:
         rmse=error.rmse,
         nrmse=error.nrmse,
         path=tuple(report.path),
-        notes=(*notes, *report.notes),
+        decisions=decisions,
+        notes=(*notes, *report.notes, *(f"Replaced decision: {decision}." for decision in replaced)),
         findings=tuple(findings),
     )

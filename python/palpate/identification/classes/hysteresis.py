@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from ...errors import InputError
 from ...verdict import usable
 from ..data.strokes import HysteresisInput
+from ..decision import Decision
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
@@ -70,8 +71,8 @@ class Hysteresis(ModelClass):
         told = data.side is not None or (data.starts is not None and len(data.names) == 1)
         if not told and "hysteresis" in inputs:
             raise InputError(
-                "inputs names hysteresis, but the recording has neither both directions nor time; "
-                "name a direction column or leave hysteresis out"
+                "inputs names hysteresis: the recording needs time, or both directions in a direction "
+                "column; name that column, or remove hysteresis from inputs"
             )
         return told and (inputs == "auto" or "hysteresis" in inputs)
 
@@ -82,10 +83,10 @@ class Hysteresis(ModelClass):
         strokes = self._play.best_tried(below.solution.basis)
         if strokes is not None:
             return self._play.with_first_states(self._of(below, strokes))
-        untested = "the motions between gaps of time are too short to show it, or never turn back"
+        untested = "the motions between gaps of time are too short, or never turn back"
         if self._named:
-            raise InputError(f"inputs names hysteresis, but {untested}")
-        self._climb.report.notes.append(f"hysteresis was not tested: {untested}")
+            raise InputError(f"inputs names hysteresis: {untested}")
+        self._climb.report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
     def _of(self, below: Candidate, strokes: HysteresisInput) -> Candidate:
@@ -111,7 +112,8 @@ class Hysteresis(ModelClass):
         best = judge.better(single, kept)
         if best is single and best.n_wavelets < below.n_wavelets:
             self._climb.report.notes.append(
-                f"{best.n_wavelets} wavelets over position are left: the others were of the loop"
+                f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed ones "
+                "modelled the difference between press and release."
             )
         self._report_sign(best, kept, free)
         return best
@@ -170,24 +172,24 @@ class Hysteresis(ModelClass):
         if kept.rmse <= GAINS_ENERGY * free.rmse:
             return
         spread, report = self._climb.spread, self._climb.report
-        price = f"{kept.rmse / spread:.3g} with h >= 0, {free.rmse / spread:.3g} without"
+        cost = f"NRMSE {kept.rmse / spread:.3g} with press >= release, {free.rmse / spread:.3g} without"
         turned = self._turned_rmse(free)
         if turned < math.sqrt(kept.rmse * free.rmse):
             cure = (
-                f"with the sign of the force turned it is {turned / spread:.3g}: press and release seem to "
-                "be exchanged; give --negate force or --negate position"
+                f"with the opposite sign of the force the NRMSE is {turned / spread:.3g}. Press and release "
+                "may be exchanged: give --negate force or --negate position"
             )
         elif crosses_where_steep(free.problem, free.solution):
             cure = (
-                "release lies above press where the force is steep, as if the force were recorded late; give "
+                "release lies above press where the force is steep. The force may be recorded late: try "
                 "--force-late-s"
             )
         else:
             cure = (
-                f"with the sign of the force turned it is {turned / spread:.3g}, which does not help: the "
-                "object seems to release stored energy, as a latch does; give --no-hysteresis-nonnegative"
+                f"the opposite sign of the force does not help (NRMSE {turned / spread:.3g}). The object may "
+                "release stored energy, as a latch does: give --no-hysteresis-nonnegative"
             )
-        sentence = f"hysteresis gains energy on a part of the loop (NRMSE {price}); {cure}"
+        sentence = f"hysteresis gains energy on a part of the loop ({cost}); {cure}"
         if best.rmse > USABLE_NRMSE * spread:
             report.sign_findings.append(usable(sentence))
             report.findings.append(usable(sentence))

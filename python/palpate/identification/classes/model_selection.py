@@ -11,6 +11,7 @@ from ..._typing import Float1D
 from ..data.limits import MOST_ORDERED, RESOLVED, correlation, independent_share, innovation_deviance
 from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
+from ..decision import decided, in_words, signed
 from ..network.separable import NOISE_WIDTHS
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
@@ -108,7 +109,7 @@ def correlated_noise(first: Climb) -> Climb:
         if share > WORTH_CLIMBING * limits.independent or share < LEAST_INDEPENDENT:
             break
         again = current.again(replace(current.data, limits=replace(limits, independent=share)))
-        note = f"the noise is correlated: {share * count:.4g} of {count} rows are independent"
+        note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."
         again.report.replaces(current.report, note)
         current = again
     chosen = min(found, key=lambda each: each[0])[1]
@@ -139,8 +140,8 @@ def no_finer_than_explained(first: Climb) -> Climb:
     wide = first.again(replace(data, limits=replace(data.limits, position_noise=noise)))
     wide.report.replaces(
         first.report,
-        f"wavelets narrower than {2 * LEAST_CORE:g} of the travel were not tried: position does not explain "
-        "most of the error",
+        f"Wavelets narrower than {200 * LEAST_CORE:.3g} % of the travel were not tried: position does not "
+        "explain most of the error.",
     )
     return wide
 
@@ -156,8 +157,8 @@ class MassAndDamping(ModelClass):
     def better(self, below: Candidate) -> Candidate:
         climb, motion, data = self._climb, self._climb.motion, self._climb.data
         assert motion is not None
-        values, notes = motion.accepted(below.solution.basis, below.side)
-        climb.report.notes.extend(notes)
+        values, decisions = motion.accepted(below.solution.basis, below.side)
+        climb.report.decisions.extend(decisions)
         best, current, names = below, climb, tuple(values)
         for _ in range(DYNAMIC_ROUNDS):
             if not values or min(values.values()) <= 0.0:
@@ -176,7 +177,8 @@ class MassAndDamping(ModelClass):
             values = motion.values(best.solution.basis, best.side, names)
         if best is below:
             return below
-        climb.report.add(current.report, f"without the force of {' and '.join(names)}:")
+        note = f"The model was selected again after the force of {' and '.join(names)} was subtracted."
+        climb.report.add(current.report, note)
         return climb.recorded(best)
 
 
@@ -209,25 +211,27 @@ class Velocity(ModelClass):
             data.force[rows],
             starts=(0,),
             weight=None if data.weight is None else data.weight[rows],
+            decisions=data.decisions,
             notes=data.notes,
             findings=data.findings,
+            position_unit=data.position_unit,
+            force_unit=data.force_unit,
         )
         both = select(over_both, self._climb.options)
         before = float(np.mean(residual[rows] ** 2))
         share = 1.0 - both.best.error.rmse**2 / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
-        beside = "beside a constant damping" if constant else f"compared with {below.model_class}"
-        gains = (
-            f"a network over position and velocity lowers the squared error by {100 * share:.3g} % {beside}"
-        )
+        compared = "constant damping" if constant else in_words(below.model_class)
+        change = f"squared error {signed(-100 * share)} % compared with {compared}"
+        bound = f"must fall by at least {100 * worth:g} %"
+        report.path += both.report.path
+        report.decisions.append(decided("velocity", share >= worth, f"{change}, {bound}"))
         if share < worth:
-            report.path += both.report.path
-            report.notes.append(
-                f"velocity refused as an input: {gains}, it has to be {100 * worth:g} % or more"
-            )
             return below
-        both.report.findings[:0] = report.sign_findings
-        report.add(both.report, f"velocity accepted as an input: {gains}")
+        over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.report.decisions]
+        report.notes += [*over_both_inputs, *both.report.notes]
+        report.findings = [*report.sign_findings, *both.report.findings]
+        report.sign_findings = both.report.sign_findings
         return both.best
 
 

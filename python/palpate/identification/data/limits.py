@@ -115,7 +115,7 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
     again = np.zeros(len(force), dtype=bool)
     again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
     if again.mean() > REPEATED:
-        return again, f"{np.count_nonzero(again)} rows that repeat the row before count once"
+        return again, f"{np.count_nonzero(again)} rows repeat the previous row and are not counted."
     probes = np.linspace(0, len(force) - 1, PROBED).astype(np.intp)
     if all(np.count_nonzero(force == force[row]) > 1 for row in probes):
         chosen, _, count = distinct_rows(np.column_stack(columns))
@@ -123,7 +123,7 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
         if usual > 1 and np.mean(count == usual) > ALL_BUT_TURNS:
             again[:] = True
             again[chosen] = False
-            return again, f"each row occurs {usual} times in the data and counts once"
+            return again, f"Each row occurs {usual} times in the data and is counted once."
     return np.zeros(len(force), dtype=bool), ""
 
 

@@ -25,6 +25,7 @@ from scipy.spatial import cKDTree
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
+from ...recording.comparison import amount
 from ...verdict import Finding, no, usable
 from .limits import RESOLVED
 
@@ -67,9 +68,10 @@ def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], 
         columns.append((name, np.concatenate([recording.inputs[:, index] for recording in recordings])))
     dropped = np.zeros(len(position), dtype=bool)
     findings: list[Finding] = []
+    units = recordings[0].units
     for name, values in columns:
-        dropped |= _judged(name, values, ~dropped, None, findings)
-    dropped |= _judged("force", force, ~dropped, position, findings)
+        dropped |= _judged(name, values, ~dropped, None, findings, units.get(name, ""))
+    dropped |= _judged("force", force, ~dropped, position, findings, units["force"])
     if not dropped.any():
         return list(recordings), findings
     apart = np.split(dropped, np.cumsum(counts)[:-1])
@@ -116,9 +118,9 @@ def refuse_isolated(position: Float1D, count: Float1D, width: float) -> None:
     low, high = float(position[~apart].min()) - width, float(position[~apart].max()) + width
     named = ", ".join(f"{value:.4g}" for value in position[apart][:NAMED])
     raise InputError(
-        f"{int(count[apart].sum())} of {int(total)} rows have a position ({named}) far outside the "
-        f"others' range, {low:.4g} to {high:.4g}. They are likely wrong readings: remove them, or "
-        "identify in memory, which leaves them out"
+        f"{int(count[apart].sum())} of {int(total)} rows have a position ({named}) far outside the range of "
+        f"the others, {low:.4g} to {high:.4g}. They are likely wrong readings: remove them, or identify "
+        "without --out-of-core, which drops them"
     )
 
 
@@ -131,7 +133,12 @@ def _median(values: Float1D, count: Float1D | None) -> float:
 
 
 def _judged(
-    name: str, values: Float1D, given: NDArray[np.bool_], position: Float1D | None, findings: list[Finding]
+    name: str,
+    values: Float1D,
+    given: NDArray[np.bool_],
+    position: Float1D | None,
+    findings: list[Finding],
+    unit: str = "",
 ) -> NDArray[np.bool_]:
     """Rows (n,) to be dropped for their values, among the given ones; adds findings."""
     found = np.zeros(len(values), dtype=bool)
@@ -155,14 +162,15 @@ def _judged(
         named = ", ".join(f"row {row} at {values[row]:.4g}" for row in here[:NAMED])
         more = ", ..." if count > NAMED else ""
         result = (
-            "They were left out as wrong readings"
+            "They are likely wrong readings and were dropped"
             if drop
-            else f"They stretch the range of {name}. If they are wrong readings, remove them"
+            else f"They extend the range of {name}. If they are wrong readings, remove them"
         )
         findings.append(
             usable(
-                f"{count} of {len(rows)} rows ({named}{more}) have a {name} outside the others' range, "
-                f"{others.min():.4g} to {others.max():.4g}, by {ratio:.3g} times its width. {result}"
+                f"{count} of {len(rows)} rows ({named}{more}) have a {name} outside the range of the others, "
+                f"{others.min():.4g} to {amount(float(others.max()), unit)}, by {ratio:.3g} times its width. "
+                f"{result}"
             )
         )
         break
@@ -274,8 +282,8 @@ class Robust:
     """(n,) rows that were left out"""
     note: str
 
-    def findings(self, residual: Float1D) -> list[Finding]:
-        """A finding on the rows that were left out, with their residuals (n,) among all."""
+    def findings(self, residual: Float1D, force_unit: str = "") -> list[Finding]:
+        """A finding on the dropped rows; residual (n,) is that of all rows."""
         count = int(np.count_nonzero(self.outliers))
         if not count:
             return []
@@ -284,9 +292,9 @@ class Robust:
         largest = float(np.abs(residual[self.outliers]).max())
         return [
             judge(
-                f"{count} rows ({share:.2g} of all) lie more than {FAR:g} standard deviations from the "
-                f"model and from their neighbours, the farthest by {largest:.3g}: they were left out as "
-                "wrong readings, and the error is that of the other rows"
+                f"{count} rows ({100 * share:.2g} %) differ by more than {FAR:g} standard deviations from "
+                f"the model and from their neighbours, at most by {amount(largest, force_unit)}. They are "
+                "likely wrong readings and were dropped; the error is that of the other rows"
             )
         ]
 
@@ -325,7 +333,7 @@ def robust_weights(
     outliers = (share == 0.0) & (given > 0.0)
     far = int(np.count_nonzero(share < 0.5))
     note = (
-        f"{far} rows farther than {2 * BEND:g} standard deviations were weighed down, "
-        f"{np.count_nonzero(outliers)} of them left out"
+        f"{far} rows differ by more than {2 * BEND:g} standard deviations from the model and have less "
+        f"weight; {np.count_nonzero(outliers)} of them were dropped."
     )
     return Robust(given * share, outliers, note)

@@ -14,9 +14,11 @@ from ..._core.dynamics import environment_filters, paper_sample_time_s
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
+from ...recording.comparison import amount
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, pieces, velocity
 from ...verdict import Finding, no, usable
+from ..decision import Decision
 from ..options import IdentifyOptions
 from .compression import EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
@@ -36,7 +38,7 @@ def require_in_range(name: str, values: Float1D) -> None:
         Names the largest value and the limit.
     """
     if (largest := float(np.abs(values).max())) > LARGEST:
-        raise InputError(f"{name} reaches {largest:.3g}; the limit is {LARGEST:g}. Use another unit")
+        raise InputError(f"{name} reaches {largest:.3g}: must be at most {LARGEST:g}. Use another unit")
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,8 @@ class Rows:
     """Sum of squares inside rows that represent several samples [force^2]"""
     period: float | None = None
     """Of an environment that repeats [position]"""
+    decisions: tuple[Decision, ...] = ()
+    """Decisions on model classes before the selection"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     """Reservations for the verdict"""
@@ -72,6 +76,10 @@ class Rows:
     """Limits of the information in the rows"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) least and largest corner of the box; None: those of the positions"""
+    position_unit: str = ""
+    """For messages; empty if not known"""
+    force_unit: str = ""
+    """For messages; empty if not known, or if the forces are scaled"""
 
     @cached_property
     def lower(self) -> Float1D:
@@ -134,6 +142,7 @@ class Rows:
             force=scale.scaled(self.force),
             within=self.within * scale.factor**2,
             parts=[replace(part, force=scale.scaled(part.force)) for part in self.parts],
+            force_unit=self.force_unit if scale.factor == 1.0 else "",
         )
 
     def limited(self) -> Rows:
@@ -163,39 +172,42 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
     names, positions, force = rows.names, rows.positions, rows.force
     if positions.ndim != 2 or force.shape != (len(positions),):
         raise InputError(
-            f"positions are {positions.shape} and force {force.shape}; (n, d) and (n,) are needed"
+            f"positions have shape {positions.shape} and force {force.shape}: must be (n, d) and (n,)"
         )
     if len(force) < MIN_ROWS:
-        raise InputError(f"the recording has {len(force)} rows; {MIN_ROWS} or more are needed")
+        raise InputError(f"the recording has {len(force)} rows; at least {MIN_ROWS} are needed")
     for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
             raise InputError(
-                f"{name} in row {bad[0]} is {column[bad[0]]}; every value must be a finite number"
+                f"{name} in row {bad[0]} is {column[bad[0]]}: every value must be a finite number"
             )
     for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
         require_in_range(name, column)
     if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST:
         raise InputError(
-            f"the largest force is {largest:.3g}; the least is {1.0 / LARGEST:g}, or 0. Use another unit"
+            f"the largest |force| is {largest:.3g}: must be at least {1.0 / LARGEST:g}, or 0. Use another "
+            "unit"
         )
     for name, column in zip(names, positions.T, strict=True):
         if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST:
-            raise InputError(f"{name} spans {travel:.3g}; the least is {1.0 / LARGEST:g}. Use another unit")
+            raise InputError(
+                f"{name} has a range of {travel:.3g}: must be at least {1.0 / LARGEST:g}. Use another unit"
+            )
         if column.min() == column.max():
-            raise InputError(f"every {name} is {column[0]:g}; identifying needs one that moves")
+            raise InputError(f"every {name} is {column[0]:g}: must vary")
         if len(np.unique(column)) < MIN_POSITIONS:
             raise InputError(
-                f"{name} takes only {len(np.unique(column))} distinct values; "
-                f"{MIN_POSITIONS} or more are needed"
+                f"{name} has only {len(np.unique(column))} distinct values; "
+                f"at least {MIN_POSITIONS} are needed"
             )
     if len(names) > 1 and (options.slope_limits is not None or options.fixed_force is not None):
         raise InputError(
-            "slope_bounds, monotone, coupling_stiffness and fixed_force are for a force over position alone, "
-            f"not over {', '.join(names)}"
+            f"the inputs are {', '.join(names)}: slope_bounds, monotone, coupling_stiffness and fixed_force "
+            "need position as the only input"
         )
     if len(names) > 1 and options.period is not None:
-        raise InputError(f"period is for a force over position alone, not over {', '.join(names)}")
+        raise InputError(f"the inputs are {', '.join(names)}: period needs position as the only input")
 
 
 def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
@@ -212,7 +224,7 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
     columns = [X[rows] for X, rows in found]
     lost = sum(int(np.count_nonzero(~rows)) for rows in kept)
     notes: tuple[str, ...] = (
-        (f"{lost} rows at the ends and at gaps of time have no velocity",) if lost else ()
+        (f"{lost} rows at the ends and at gaps of time have no velocity and are not used.",) if lost else ()
     )
     side, starts = None, None
     if all(part.direction is not None for part in recordings):
@@ -226,12 +238,14 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
             for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
             for piece in pieces(recording)
         )
+    decisions: tuple[Decision, ...] = ()
     findings: tuple[Finding, ...] = ()
     if side is None and all(part.time is not None for part in recordings):
         starts = _starts(recordings, kept)
     elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
         strokes = strokes_of(recordings, named=options.inputs != "auto")
         side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
+        decisions = strokes.decisions
     if options.search.filters == "matched":
         forces = [part.force for part in recordings]
     else:
@@ -245,8 +259,11 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
         starts,
         parts,
         period=options.period,
+        decisions=decisions,
         notes=notes,
         findings=findings,
+        position_unit=recordings[0].units["position"],
+        force_unit=recordings[0].units["force"],
     )
 
 
@@ -298,7 +315,8 @@ def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, .
     further = [name for name in options.inputs if name not in ("position", "hysteresis")]
     if further and "hysteresis" in options.inputs:
         raise InputError(
-            f"inputs names hysteresis and {', '.join(further)}; hysteresis is identified over position alone"
+            f"inputs names hysteresis and {', '.join(further)}: hysteresis needs position as the only other "
+            "input"
         )
     by_file_name = {recording.source.columns.get(known): known for known in recording.input_names}
     return ("position", *(by_file_name.get(name, name) for name in further))
@@ -318,12 +336,12 @@ def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
     """
     period = recording.sample_period
     if recording.time is None or period is None:
-        raise InputError("the paper's filters need time: the recording has none (--time NAME)")
+        raise InputError("the recording has no time, which the paper's filters need: give --time NAME")
     steps = np.diff(recording.time)
     if np.abs(steps / paper_sample_time_s - 1.0).max() > PERIOD_TOLERANCE:
         raise InputError(
-            f"the paper's filters are made for steps of {paper_sample_time_s:g} s; the recording's are from "
-            f"{steps.min():g} to {steps.max():g} s"
+            f"the time steps of the recording are {steps.min():g} to {steps.max():g} s: the paper's filters "
+            f"need {paper_sample_time_s:g} s"
         )
     filters = environment_filters(options.search.filters.removeprefix("paper-"), "paper")
     velocity = filters.g2.filter(recording.position - recording.position[0])
@@ -340,17 +358,18 @@ UNFIT_GAP = 0.5
 """Share of the period without a position above which the model is unfit [-]."""
 
 
-def period_notes(position: Float1D, period: float) -> tuple[str, list[Finding]]:
-    """The note and the findings on positions (n,) and a period."""
+def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str, list[Finding]]:
+    """The note and the findings on positions (n,) and a period [unit]."""
     lower, travel = float(position.min()), float(np.ptp(position))
     note = (
-        f"the positions span {travel / period:.4g} periods of {period:.6g}: they are taken modulo the period"
+        f"The positions span {travel / period:.4g} periods of {_exact(period, unit)} and are taken modulo "
+        "the period."
     )
     if travel <= period:
         gap = period - travel
         note = (
-            f"the gap of {gap:.4g} between the last and the first position, {100 * gap / period:.2g} % of "
-            f"the period of {period:.6g}, is closed"
+            f"The positions leave a gap of {amount(gap, unit)}, {100 * gap / period:.2g} % of the period of "
+            f"{_exact(period, unit)}. The model closes it."
         )
     box = np.sort(modulo((position - lower) / period))
     steps = np.diff(np.append(box, box[0] + 1.0))
@@ -361,10 +380,15 @@ def period_notes(position: Float1D, period: float) -> tuple[str, list[Finding]]:
     start = lower + period * float(box[widest])
     judge = no if share > UNFIT_GAP else usable
     sentence = (
-        f"no position lies between {start:.6g} and {start + share * period:.6g}, {100 * share:.3g} % of the "
-        f"period of {period:.6g}; record a whole period, or check the unit of --period"
+        f"no position lies between {start:.6g} and {_exact(start + share * period, unit)}, {100 * share:.3g} "
+        f"% of the period of {_exact(period, unit)}; record a whole period, or check the unit of --period"
     )
     return note, [judge(sentence)]
+
+
+def _exact(value: float, unit: str) -> str:
+    """A value with six digits and its unit."""
+    return f"{value:.6g} {unit}".rstrip()
 
 
 def modulo(box: Float1D) -> Float1D:

@@ -15,6 +15,7 @@ from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
 from ...recording.motion import ordered_strokes, turns_of
 from ...verdict import Finding, usable
+from ..decision import Decision
 
 CELLS = 32
 """Cells of the travel in which the strokes are compared."""
@@ -54,6 +55,7 @@ class Strokes:
     """(n,) +1 into the object, -1 out of it, 0 neither; None where hysteresis cannot be tested"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    decisions: tuple[Decision, ...] = ()
 
 
 def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
@@ -78,11 +80,13 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
     unit = recordings[0].units["force"] and f" {recordings[0].units['force']}"
     if len(known) < len(found):
         missing = _names(recordings, [direction is None for direction in found])
-        return _untested(position, force, unit, f"{missing} has no direction, and its rows are in no order")
+        return _untested(
+            position, force, unit, f"the rows of {missing} have no direction and are not in recorded order"
+        )
     findings: tuple[Finding, ...] = ()
     turns = sum(map(turns_of, known))
     side = np.concatenate(known).astype(np.float64)
-    note = f"direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}"
+    note = f"The direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}"
     if len(recordings) > 1:
         note += f" in {len(recordings)} recordings, " + _ways(recordings, known)
     if not ((side > 0).any() and (side < 0).any()):
@@ -92,17 +96,18 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
         side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
         harder, softer = _names(recordings, press > 0), _names(recordings, press < 0)
         difference = float(np.nanmean(_Cells.of(position, force, side).difference))
-        note = f"{harder} is taken as press, {softer} as release, because its force is higher"
+        note = f"{harder} is taken as press and {softer} as release: the press force is higher"
         findings = (
             usable(
-                f"{note} by {difference:.3g}{unit} on average; no direction is stated, and all positions run "
-                f"the same way. If these are two objects, identify them one by one; if they are repetitions "
-                f"of one stroke, give --inputs position; else {CURE}"
+                f"{note} by {difference:.3g}{unit} on average. There is no direction column, and all "
+                "positions change in the same direction. If these are two objects, identify each one "
+                f"separately. If they repeat one stroke, give --inputs position. Else {CURE}"
             ),
         )
     elif not named and not _Cells.of(position, force, side).differ:
-        return Strokes(None, (f"{note}; press and release do not differ",))
-    return Strokes(side, (note,), findings)
+        reason = f"press and release do not differ by {SIGNIFICANT:g} standard errors"
+        return Strokes(None, (f"{note}.",), decisions=(Decision("hysteresis", "not accepted", reason),))
+    return Strokes(side, (f"{note}.",), findings)
 
 
 @dataclass(frozen=True)
@@ -185,30 +190,32 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
 
 def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> Strokes:
     """Hysteresis cannot be tested; reports by how much the strokes may differ, where the rows show it."""
-    seen = f"hysteresis was not tested: {why or 'the position never turns back in the order of rows'}"
+    reason = why or "the position never turns back in the order of rows"
+    decisions = (Decision("hysteresis", "not tested", reason),)
     # Repetitions of a row would be groups of one force.
     rows = np.unique(position + 1j * force)
     if len(rows) < LEAST_WINDOWS * WINDOW:
-        return Strokes(None, (seen,))
+        return Strokes(None, decisions=decisions)
     reach = float(np.ptp(force)) or 1.0
     shares, gaps, spreads = _two_groups(rows.real, rows.imag)
     gap, most, spread = float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(np.median(spreads))
     levels = np.diff(np.unique(force))
     step = float(levels[levels > 1e-9 * reach].min(initial=reach))
     if np.median(shares) > TWO_BRANCHES and gap > max(SPREAD_SHARE / 2 * reach, 1.5 * step):
-        told = (
-            f"The force has two values at the same position, typically {gap:.3g}{unit} apart, up to "
-            f"{most:.3g}{unit} ({gap / reach:.1%} and {most / reach:.1%} of its range), as press and release "
-            "have. The model lies between them"
+        evidence = (
+            f"At the same position the force has two values, typically {gap:.3g}{unit} and up to "
+            f"{most:.3g}{unit} apart ({gap / reach:.1%} and {most / reach:.1%} of its range), as for press "
+            "and release. The model lies between them"
         )
     elif why is not None and spread > SPREAD_SHARE * reach:
-        told = (
+        evidence = (
             f"At the same position the force has a standard deviation of {spread:.3g}{unit} "
             f"({spread / reach:.1%} of its range), from noise or from a difference between press and release"
         )
     else:
-        return Strokes(None, (seen,))
-    return Strokes(None, findings=(usable(f"{seen}. {told}. Cure: {CURE}"),))
+        return Strokes(None, decisions=decisions)
+    finding = usable(f"hysteresis was not tested: {reason}. {evidence}. Cure: {CURE}")
+    return Strokes(None, findings=(finding,), decisions=decisions)
 
 
 def _two_groups(x: Float1D, f: Float1D) -> tuple[Float1D, Float1D, Float1D]:

@@ -103,11 +103,11 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     """
     a0, b0, whole = number_of("a0", a0), number_of("b0", b0), number_of("voices", voices)
     if not a0 > 1.0:
-        raise InputError(f"a0 is {a0!r}; the ratio of neighbouring dilations must be a finite number above 1")
+        raise InputError(f"a0, the ratio of neighbouring dilations, is {a0!r}: must be a finite number > 1")
     if not b0 > 0.0:
-        raise InputError(f"b0 is {b0!r}; the translation step must be a finite number above 0")
+        raise InputError(f"b0, the translation step, is {b0!r}: must be a finite number > 0")
     if int(whole) != whole or whole < 1:
-        raise InputError(f"voices is {voices!r}; it must be a whole number of 1 or more")
+        raise InputError(f"voices is {voices!r}: must be a whole number >= 1")
     # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, for every voice
     levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)
     frequency = np.linspace(1.0, a0, 1001)[:, None] * a0**levels

@@ -94,7 +94,7 @@ def domain_bounds(
     bounds = []
     if periodic:
         bounds += [
-            Bound(part, of_slope, "one period", sign, 0.0, 0.0, seam=True)
+            Bound(part, of_slope, "equal ends of the period", sign, 0.0, 0.0, seam=True)
             for part in ([(1.0, 0.0), (0.0, 1.0)] if two else [(1.0,)])
             for of_slope in (False, True)
             for sign in (1.0, -1.0)
@@ -103,7 +103,7 @@ def domain_bounds(
         g = (1.0, 0.0) if two else (1.0,)
         bounds += [Bound(g, False, "fixed force", sign, fixed[1], 0.0, fixed[0]) for sign in (1.0, -1.0)]
     if hysteresis and two:
-        bounds.append(Bound((0.0, 1.0), False, "h >= 0", 1.0, 0.0, 1.0))
+        bounds.append(Bound((0.0, 1.0), False, "press force >= release force", 1.0, 0.0, 1.0))
     for stroke in [(1.0, 1.0), (1.0, -1.0)] if two else [(1.0,)]:
         for sign, limit in zip((1.0, -1.0), slopes or (), strict=False):
             if np.isfinite(limit):
@@ -322,28 +322,35 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
     return bool(np.average(steepness, weights=above**2) > STEEP * np.mean(steepness))
 
 
-def crossing(problem: SeparableProblem, free: Solution, lower: float, reach: float) -> str:
-    """Largest height of release above press, and its place, as the end of a sentence; empty where small.
+@dataclass(frozen=True)
+class Crossing:
+    """Interval in which release lies above press."""
 
-    free is a solution g + s h that h >= 0 was not imposed on, over one input from lower to lower + reach.
-    Only places where both strokes were measured count.
+    height: float
+    """Largest force of release minus press [force]"""
+    start: float
+    """[box]"""
+    end: float
+    """[box]"""
+
+
+def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
+    """Returns the interval where release lies highest above press; None if the height is small.
+
+    free is a solution g + s h without the bound h >= 0. Only positions measured on both strokes count.
     """
     first = max(float(block.positions.min()) for block in problem.blocks)
     last = min(float(block.positions.max()) for block in problem.blocks)
     if len(problem.readout) < 2 or last <= first:
-        return ""
+        return None
     places = np.linspace(first, last, PLACES)
     columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
     bias, slope, *weights = problem.readout[1] @ free.coefficients
     above = -2.0 * (bias + slope * places + columns @ np.asarray(weights))
     deepest = int(np.argmax(above))
     if above[deepest] < WORTH_REPORTING * problem.resolved_rmse(free):
-        return ""
+        return None
     within = np.flatnonzero(above <= 0.0)
     start = within[within < deepest].max(initial=-1) + 1
     end = within[within > deepest].min(initial=PLACES) - 1
-    near, far = lower + reach * places[start], lower + reach * places[end]
-    return (
-        f"; release lies above press by up to {above[deepest]:.3g} between {near:.4g} and {far:.4g}, "
-        "which no passive object does, but a force that is recorded late (--force-late-s)"
-    )
+    return Crossing(float(above[deepest]), float(places[start]), float(places[end]))

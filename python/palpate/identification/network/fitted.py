@@ -12,8 +12,10 @@ import numpy as np
 from ..._core.model import ForceModel
 from ..._typing import Float1D, Float2D
 from ...model import Fit, PathStep
+from ...recording.comparison import amount
 from ...verdict import Finding
 from ..data.limits import ForceScale
+from ..decision import Decision
 from .separable import Solution
 
 
@@ -72,8 +74,10 @@ class FittedNetwork:
     """rmse over the standard deviation of the force"""
     path: tuple[PathPoint, ...] = ()
     """Every network that was considered"""
+    decisions: tuple[Decision, ...] = ()
+    """Last decision on each model class"""
     notes: tuple[str, ...] = ()
-    """Sentences on refusals, rows left out, and bounds with their price"""
+    """Sentences on unused rows, constraints with their cost, and replaced decisions"""
     independent_rows: float = np.inf
     """Rows of the identification, fewer where repeats or correlated noise make them depend on each other"""
     findings: tuple[Finding, ...] = ()
@@ -114,15 +118,19 @@ class FittedNetwork:
             path=path,
         )
 
-    def unscaled(self, scale: ForceScale) -> FittedNetwork:
-        """The network in the unit of the force."""
+    def unscaled(self, scale: ForceScale, force_unit: str = "") -> FittedNetwork:
+        """Returns the network in the unit of the force, which is `force_unit` in messages."""
 
         factor = scale.factor
         notes = self.notes
         if factor != 1.0:
-            notes = (f"forces were multiplied by {factor:g} to identify them; notes name these", *notes)
+            multiplied = (
+                f"The forces were multiplied by {factor:g} for the fit. Forces in these notes are multiplied."
+            )
+            notes = (multiplied, *notes)
         if scale.offset:
-            notes = (f"an offset of {scale.offset:g} was subtracted from the force to identify it", *notes)
+            offset = amount(scale.offset, force_unit)
+            notes = (f"An offset of {offset} was subtracted from the force for the fit.", *notes)
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor

@@ -39,6 +39,7 @@ from ..data.compression import (
 )
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
+from ..decision import Decision, decided, in_words, signed, squared_error_change
 from ..network.fitted import FittedNetwork, PathPoint
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
@@ -64,6 +65,16 @@ CRITERIA: dict[str, Callable[[float, int], float]] = {
     "perceptual": lambda n, p: 0.0,
 }
 """Name of the criterion to its price of p parameters on n samples."""
+
+CRITERION_NAMES = {
+    "bic": "BIC",
+    "aicc": "AICc",
+    "gcv": "GCV",
+    "fpe": "FPE",
+    "fresh": "deviance on held-out rows",
+    "perceptual": "deviance in just noticeable differences",
+}
+"""Name of the criterion to its name in messages."""
 
 ON_HELD_OUT_ROWS = ("fresh", "perceptual")
 """The criteria whose error is that on held-out rows."""
@@ -109,7 +120,7 @@ def criterion_of(
     if name in ON_HELD_OUT_ROWS:
         rows = problem.held_out
         if rows is None:
-            raise InputError(f"criterion is {name!r}, but no rows were held out to judge on")
+            raise InputError(f"criterion is {name!r}: needs held-out rows, and there are none")
         return held_out_deviance(name, rows, problem.errors(solution, rows))
     p = problem.n_parameters(len(solution.basis)) if n_parameters is None else n_parameters
     share = problem.limits.independent
@@ -322,7 +333,10 @@ class Report:
     """Path, notes and findings of a model selection."""
 
     path: list[PathPoint] = field(default_factory=list)
+    decisions: list[Decision] = field(default_factory=list)
+    """Decisions on the model classes, in order"""
     notes: list[str] = field(default_factory=list)
+    """Sentences on constraints with their cost, and on unused rows"""
     findings: list[Finding] = field(default_factory=list)
     sign_findings: list[Finding] = field(default_factory=list)
     """Those on the signs of position and force"""
@@ -332,10 +346,11 @@ class Report:
         self.path[:0] = other.path
         self.notes.insert(0, note)
 
-    def add(self, other: Report, heading: str) -> None:
-        """Adds the path and the notes of a climb that takes the place of this one, and takes its findings."""
+    def add(self, other: Report, note: str) -> None:
+        """Adds the path, decisions and notes of a later selection and takes its findings."""
         self.path += other.path
-        self.notes += [heading, *other.notes]
+        self.decisions += other.decisions
+        self.notes += [note, *other.notes]
         self.findings, self.sign_findings = other.findings, other.sign_findings
 
 
@@ -470,8 +485,7 @@ class Judge:
     def noted(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
         """The comparison of two candidates, with a note."""
         judged = self.compared(below, above, errors=errors)
-        decision = "accepted" if judged.earned else "refused"
-        self._report.notes.append(f"{above.model_class} {decision}: {judged.why}")
+        self._report.decisions.append(decided(above.model_class, judged.earned, judged.why))
         return judged
 
     def earned(self, below: Candidate, above: Candidate) -> bool:
@@ -491,24 +505,20 @@ class Judge:
         name, evidence = self.criterion, self.evidence
         if not self.on_held_out:
             falls = self.fall(below, above)
-            return Judgement(falls >= evidence, f"{name} changes by {-falls:.4g}", False)
+            return Judgement(falls >= evidence, f"{CRITERION_NAMES[name]} {signed(-falls)}", False)
         if enough(name, below.criterion(name)):
-            return Judgement(False, f"{below.model_class} is already closer than a hand can feel", False)
+            reason = f"the error of the {in_words(below.model_class)} is below the just noticeable difference"
+            return Judgement(False, reason, False)
         falls = self.fall(below, above)
-        changes = f"{name} {'falls' if falls > 0 else 'rises'} by {abs(falls):.4g}"
+        change = f"{CRITERION_NAMES[name]} {signed(-falls)}"
         rows = self._samples.held_out_rows(above.strokes)
         if name in ON_HELD_OUT_ROWS:
             evidence = max(evidence, standard_error(len(rows.force)))
         if falls < evidence:
-            return Judgement(False, f"{changes}, it has to fall by {evidence:.4g} or more", False)
+            return Judgement(False, f"{change}, must fall by at least {evidence:.4g}", False)
         share, error = self._samples.held_out_gain(below, above)
-        way = "falls" if share > 0.0 else "rises"
-        by = f"{_percent(abs(share), 4)} +- {_percent(error, 2)} %"
-        measured = f"the squared error on held-out rows {way} by {by}"
+        measured = squared_error_change(share, error, "held-out rows")
         if share <= errors * error and len(rows.force) >= LEAST_HELD_OUT:
-            return Judgement(False, f"{changes}, but {measured}", True)
-        return Judgement(True, f"{changes}, {measured}", True)
-
-
-def _percent(share: float, digits: int) -> str:
-    return f"{100 * share:.{digits}g}" if share < 1.0 else f"{100 * share:.0f}"
+            bound = f"must fall by more than {100.0 * errors * error:.2g} %"
+            return Judgement(False, f"{measured}, {bound}; {change}", True)
+        return Judgement(True, f"{measured}, {change}", True)

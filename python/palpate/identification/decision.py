@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Decisions of the model selection: one short line for each model class."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+_WORDS = {
+    "constant": "constant force",
+    "linear": "straight line",
+    "position": "curve over position",
+    "velocity": "curve over position and velocity",
+    "network": "curve over all inputs",
+}
+"""Model classes whose name alone does not explain them, in words."""
+
+_ROUNDED = 100.0
+"""Absolute value from which a number is written without decimals [-]: three digits are enough to compare."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Decision on one model class, printed as ``straight line: accepted (BIC -426)``."""
+
+    model_class: str
+    """In words"""
+    outcome: Literal["accepted", "not accepted", "not tested"]
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.model_class}: {self.outcome} ({self.reason})"
+
+
+def in_words(model_class: str) -> str:
+    """Returns the name of a model class for messages."""
+    return _WORDS.get(model_class, model_class)
+
+
+def decided(model_class: str, accepted: bool, reason: str) -> Decision:
+    """Returns the decision on a model class that was tested."""
+    return Decision(in_words(model_class), "accepted" if accepted else "not accepted", reason)
+
+
+def latest(decisions: Iterable[Decision]) -> tuple[tuple[Decision, ...], tuple[Decision, ...]]:
+    """Returns the last decision on each model class, in order of the first ones, and the replaced ones."""
+    last: dict[str, Decision] = {}
+    replaced: list[Decision] = []
+    for decision in decisions:
+        if decision.model_class in last:
+            replaced.append(last[decision.model_class])
+        last[decision.model_class] = decision
+    return tuple(last.values()), tuple(replaced)
+
+
+def signed(value: float) -> str:
+    """Returns a number with its sign and three digits, whole from 100 on."""
+    return f"{value:+.0f}" if abs(value) >= _ROUNDED else f"{value:+.3g}"
+
+
+def squared_error_change(share: float, error: float, on: str) -> str:
+    """Returns the change of a squared error with its standard error, for messages.
+
+    Parameters
+    ----------
+    share : float
+        Fall of the squared error, as a share of it.
+    error : float
+        Standard error of `share`.
+    on : str
+        Name of the rows of the error.
+    """
+    return f"squared error on {on} {signed(-100.0 * share)} +- {100.0 * error:.2g} %"
