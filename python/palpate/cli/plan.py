@@ -203,7 +203,7 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
         "inequalities": [{name: getattr(line, name) for name in _LINE} for line in certificate.inequalities],
         "reason": certificate.reason,
         "steepest_slope": steepest,
-        "slope_behind_coupling": felt,
+        "felt_slope": felt,
         "seconds": seconds,
     }
 

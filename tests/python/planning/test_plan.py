@@ -311,7 +311,7 @@ def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.Capt
     assert told["force_error_share"] == 0.0
     assert told["written"] == "m.json"
     assert (told["plan"], told["certificate"]) == (stored["plan"], stored["certificate"])
-    assert told["slope_behind_coupling"] == told["steepest_slope"]
+    assert told["felt_slope"] == told["steepest_slope"]
     for stored_line, line in zip(told["certificate"]["inequalities"], told["inequalities"], strict=True):
         assert stored_line == {name: line[name] for name in ("id", "left", "right")}
         assert line["margin"] == line["left"] - line["right"]
@@ -335,9 +335,7 @@ def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFi
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     stiffness = told["plan"]["coupling"]["stiffness"]
-    assert 1.0 / told["slope_behind_coupling"] == pytest.approx(
-        1.0 / told["steepest_slope"] + 1.0 / stiffness
-    )
+    assert 1.0 / told["felt_slope"] == pytest.approx(1.0 / told["steepest_slope"] + 1.0 / stiffness)
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
     assert f"slopes up to {told['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
 
