@@ -361,9 +361,9 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
         at = np.unique(recording.position[rows])
         if len(at) < 10:
             continue
-        apart = np.diff(at)
-        bound = max(LEAST_GAP_SHARE * travel.length, LEAST_GAP_RATIO * float(np.percentile(apart, 90.0)))
-        for k in np.flatnonzero(apart > bound).tolist():
+        distances = np.diff(at)
+        bound = max(LEAST_GAP_SHARE * travel.length, LEAST_GAP_RATIO * float(np.percentile(distances, 90.0)))
+        for k in np.flatnonzero(distances > bound).tolist():
             if (at[k], at[k + 1]) not in reported:
                 reported.add((at[k], at[k + 1]))
                 found.append(_gap(recording, travel, name, float(at[k]), float(at[k + 1])))
