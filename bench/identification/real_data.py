@@ -26,7 +26,7 @@ from bench.identification.figures import LIMIT
 from bench.studies import SCALE, count, measured_data, write_results
 
 import palpate
-from palpate.baselines import PASSIVE, Compared, comparable, compare
+from palpate.baselines import PASSIVE_SPLINE, Compared, comparable, compare
 from palpate.recording.motion import velocity
 from palpate.verification.metrics import normalised, root_mean_square
 
@@ -178,7 +178,7 @@ def row_of(path: Path, kind: Set) -> dict[str, Any]:
         "file": path.stem,
         **found,
         "splines": _numbers(splines),
-        "passive_splines": _numbers(others[PASSIVE]) if PASSIVE in others else None,
+        "passive_splines": _numbers(others[PASSIVE_SPLINE]) if PASSIVE_SPLINE in others else None,
         "baselines": {name: _numbers(each) for name, each in others.items()} if kind.beside else {},
     }
 

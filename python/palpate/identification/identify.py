@@ -18,7 +18,7 @@ from ..model import Model
 from ..recording import Source
 from ..recording.reading import Given, recordings_from
 from ..verdict import Verdict
-from .classes.climb import VELOCITY_INPUTS
+from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
 from .classes.model_selection import select
 from .data.limits import ForceScale

@@ -28,6 +28,7 @@ _CERTIFICATE = {
     "stable-locally": "stable (local), passivity not certified",
     "refused": "refused",
 }
+"""Verdict of a certificate to its text."""
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
