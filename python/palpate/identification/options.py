@@ -175,7 +175,6 @@ class IdentifyOptions:
 
 
 _LEAST_WHOLE = {
-    """Settings that are whole numbers and their least value."""
     "max_wavelets": 0,
     "patience": 1,
     "refine_steps": 1,
@@ -184,10 +183,9 @@ _LEAST_WHOLE = {
     "resolved_by": 3,
     "max_positions": 16,
 }
-"""Whole-number settings and the least that makes sense."""
+"""Settings that are whole numbers and their least value."""
 
 _LOWER_BOUND = {
-    """Settings that are real numbers and their exclusive lower bound."""
     "evidence": -math.inf,
     "frame_scale": 1.0,
     "frame_step": 0.0,
@@ -197,7 +195,7 @@ _LOWER_BOUND = {
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
-"""Real settings and the number that they must exceed."""
+"""Settings that are real numbers and their exclusive lower bound."""
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:

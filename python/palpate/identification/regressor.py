@@ -201,7 +201,7 @@ def fit_regression(
         weight = np.ones(len(y))
     counted = weight > 0.0
     if not counted.any():
-        raise InputError("sample_weight is 0 in every row: at least one must be > 0")
+        raise InputError("sample_weight is zero in every row: at least one must be > 0")
     X, y, weight = X[counted], y[counted], weight[counted]
     largest = max(float(np.abs(X).max()), float(np.abs(y).max()))
     if largest > LARGEST_MAGNITUDE:

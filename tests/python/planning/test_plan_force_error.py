@@ -283,7 +283,7 @@ def test_a_device_is_taken_by_object_name_and_path(tmp_path: Path) -> None:
     ("arguments", "sentence"),
     [
         ({"device": 3}, "device is a int: must be a DeviceProfile, the path of its TOML file, or one of"),
-        ({"device": "tuoch"}, "device is 'tuoch': there is no such file, and no such example; one of the"),
+        ({"device": "tuoch"}, "device is 'tuoch': must be the path of an existing TOML file, or one of the"),
         ({"device": Path("none.toml")}, "there is no file none.toml"),
         ({"model": "press.json"}, "it must be a Model: make one with palpate.identify or palpate.load_model"),
         ({"model": None}, "model is None; it must be a Model: make one with palpate.identify"),

@@ -31,7 +31,7 @@ def test_structures_are_drawn_from_top_to_bottom_with_both_errors() -> None:
     np.testing.assert_array_equal(end.get_xdata(), [0.01, 0.15])
     assert mean.get_markerfacecolor() != end.get_markerfacecolor()
     low, high = one.get_ylim()
-    assert low > high, "the first structure stands at the top"
+    assert low > high, "the first structure must be at the top"
     assert one.get_xlabel() == "force error, RMS [N]"
 
 

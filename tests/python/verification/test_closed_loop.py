@@ -135,7 +135,7 @@ def test_a_recording_without_time_is_followed_at_an_assumed_speed() -> None:
     speed = np.abs(np.diff(loop.recorded_position)) / 1e-3
     assert np.median(speed) == pytest.approx(0.5, rel=1e-6)
     assert loop.rmse < 1e-12
-    assert loop.notes == ("the recording has no time: a stroke speed of 0.5 rad/s is assumed",)
+    assert loop.notes == ("The recording has no time. A stroke speed of 0.5 rad/s is assumed.",)
     faster = motion_driven(spring(), sweep(timed=False), stroke_speed=1.0)
     assert faster.time[-1] == pytest.approx(2.0, abs=2e-3)
 

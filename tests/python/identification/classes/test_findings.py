@@ -77,13 +77,13 @@ def test_slope_bounds_hold_for_huge_forces() -> None:
     ("x", "y", "words"),
     [
         (X, Y * 1e150, "force reaches"),
-        (X, Y * 1e-150, "the largest force is"),
+        (X, Y * 1e-150, "the largest .force. is"),
         (X * 1e200, Y, "position reaches"),
-        (X * 1e-200, Y, "position spans"),
+        (X * 1e-200, Y, "position has a range of"),
     ],
 )
 def test_numbers_beyond_the_bound_are_refused_with_it(x: Array, y: Array, words: str) -> None:
-    with pytest.raises(palpate.InputError, match=rf"{words} .*e[+-]\d+; .*Use another unit"):
+    with pytest.raises(palpate.InputError, match=rf"{words} .*e[+-]\d+: .*Use another unit"):
         palpate.identify(recorded(x, y))
 
 

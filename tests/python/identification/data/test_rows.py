@@ -172,7 +172,7 @@ def test_period_with_a_missing_step_is_closed_and_the_gap_reported(tmp_path: Pat
     (note,) = (
         note
         for note in model.notes["identification"]
-        if note.startswith("The positions leave a gap of 0.01571 rad")
+        if note.startswith("The positions leave a gap of 0.01571")
     )
     assert "0.25 % of the period" in note
     assert model.verdict.level == "good"

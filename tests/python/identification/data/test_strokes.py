@@ -125,7 +125,7 @@ def test_a_difference_below_the_noise_is_bounded_where_rows_are_in_no_order() ->
     rows = np.random.default_rng(5).permutation(800)
     reported = str(identify(bare(rows, loop(h=0.05, noise=0.2))).verdict)
     assert (
-        "its rows are in no order. At the same position the force has a standard deviation of 0.19"
+        "are not in recorded order. At the same position the force has a standard deviation of 0.19"
         in reported
     )
 

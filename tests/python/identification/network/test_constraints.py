@@ -140,7 +140,7 @@ def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
     assert g_and_h(bounded, fine)[1].min() >= 0.0
     assert g_and_h(free, fine)[1].min() < 0.0
     assert bounded.rmse <= 1.02 * free.rmse
-    assert any("h >= 0" in note for note in bounded.notes)
+    assert any("press force >= release force imposed" in note for note in bounded.notes)
 
 
 def test_crossing_strokes_are_replaced_by_their_mean() -> None:

@@ -126,4 +126,4 @@ def test_hubers_loss_changes_error_little_without_outliers() -> None:
     x, _, y = wall(3000, 4)
     network = fit_environment(x[:, None], y, None, IdentifyOptions(loss="huber"))
     assert network.rmse == pytest.approx(0.02, rel=0.15)
-    assert any("were weighed down" in note for note in network.notes)
+    assert any("have less weight" in note for note in network.notes)

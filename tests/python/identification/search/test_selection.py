@@ -117,7 +117,7 @@ def test_stretched_members_differ_from_a_member_in_one_dilation() -> None:
 def test_distinct_candidates_differ_in_position_or_dilation() -> None:
     rows = rows_of("one force")
     library = library_of(problem_of(rows, resolved_by=5), rows)
-    chosen = library.unlike(np.arange(len(library)), 8)
+    chosen = library.distinct(np.arange(len(library)), 8)
     assert len(chosen) == 8
     for first, second in itertools.combinations(chosen, 2):
         alpha, beta = library.basis.alpha[[first, second], 0], library.basis.beta[[first, second], 0]
